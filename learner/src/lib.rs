@@ -1,0 +1,1 @@
+//! Preference-based Bayesian learning over a finite grid of actions.

@@ -1,0 +1,120 @@
+//! The result: an optimised walking trajectory over one stride, in SI units and radians.
+
+use crate::bounds::TunedBounds;
+use crate::settings::GaitSettings;
+use crate::subject::{Device, Subject};
+use serde::{Deserialize, Serialize};
+
+/// A gait: eight domains over one stride from right heel strike.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Gait {
+    /// Version of this layout.
+    pub format_version: u32,
+    /// Who walks.
+    pub subject: Subject,
+    /// With which device.
+    pub device: Device,
+    /// Whether the muscle constraints C5-C12 are part of the problem.
+    pub muscles: bool,
+    /// The tuned bounds.
+    pub bounds: TunedBounds,
+    /// The other settings of the problem.
+    pub settings: GaitSettings,
+    /// Mean walking speed, m/s.
+    pub speed_m_s: f64,
+    /// Stride length, m.
+    pub stride_length_m: f64,
+    /// Length of the step that ends with left heel strike, m.
+    pub right_step_length_m: f64,
+    /// Stride time, s.
+    pub stride_time_s: f64,
+    /// v_hip of the four impact-free runs of domains (DS2_R; DS3_R+SS2_R; DS2_L; DS3_L+SS2_L), m/s.
+    pub hip_velocity_m_s: [f64; 4],
+    /// The eight domains in order.
+    pub domains: Vec<DomainTrajectory>,
+}
+
+/// One contact row of a domain: a component of the ground force on one point of a foot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContactRowName {
+    /// `heel` or `toe`.
+    pub point: FootPoint,
+    /// `left` (intact) or `right` (prosthesis).
+    pub side: Side,
+    /// `x` forward, `z` up.
+    pub axis: Axis,
+}
+
+/// A contact point of a foot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FootPoint {
+    /// Heel.
+    Heel,
+    /// Toe (ball of the foot).
+    Toe,
+}
+
+/// A side of the body. The prosthesis is on the right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Intact leg.
+    Left,
+    /// Prosthetic leg.
+    Right,
+}
+
+/// A component in the sagittal plane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// Forward.
+    X,
+    /// Up.
+    Z,
+}
+
+/// The trajectory within one domain at its equidistant mesh points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DomainTrajectory {
+    /// `DS2_R`, `DS3_R`, `SS2_R`, `SS1_R`, `DS2_L`, ... (R: stance on the prosthesis).
+    pub name: String,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// q at each point: px, pz (m), torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R (rad).
+    pub q: Vec<[f64; 9]>,
+    /// Velocities, m/s and rad/s.
+    pub qd: Vec<[f64; 9]>,
+    /// Accelerations, m/s² and rad/s².
+    pub qdd: Vec<[f64; 9]>,
+    /// Joint torques hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R, N m.
+    pub u: Vec<[f64; 6]>,
+    /// Which ground-force component each entry of `contact_forces` is.
+    pub contact_rows: Vec<ContactRowName>,
+    /// Ground forces on the walker at each point, N.
+    pub contact_forces: Vec<Vec<f64>>,
+    /// Muscle states at each point, in the variant with muscles.
+    pub muscles: Option<MuscleTrajectory>,
+    /// Coordinates (indices into q) that the virtual constraints drive.
+    pub outputs: Vec<usize>,
+    /// Bezier coefficients: one row of degree + 1 per output, rad.
+    pub bezier: Vec<Vec<f64>>,
+    /// Hip-position phase limits of the domain, m.
+    pub phase_start_m: f64,
+    /// See `phase_start_m`.
+    pub phase_end_m: f64,
+    /// Impulse of the impact that opens the domain (DS2, DS3), N s, in the order of `contact_rows`.
+    pub impulse: Option<Vec<f64>>,
+}
+
+/// States of the ten muscles (HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MuscleTrajectory {
+    /// Fibre length over optimal length.
+    pub fibre_length: Vec<[f64; 10]>,
+    /// Fibre velocity, optimal lengths per second (shortening negative).
+    pub fibre_velocity: Vec<[f64; 10]>,
+    /// Activation, 0..1.
+    pub activation: Vec<[f64; 10]>,
+}

@@ -1,0 +1,24 @@
+//! Gait optimisation for a human walking with a powered transfemoral prosthesis.
+//!
+//! (subject, device, bounds, variant) -> gait: the multi-domain hybrid-zero-dynamics gait problem with
+//! Hill-type muscles of Li, Tucker, Gehlhar, Yue and Ames (RA-L 2022), solved by the crate's own sparse
+//! interior point. The crate knows nothing of learning, storage or HTTP.
+
+pub mod bounds;
+pub mod gait;
+pub mod metrics;
+pub mod nlp;
+pub mod reference;
+pub mod settings;
+pub mod solve;
+pub mod subject;
+
+pub use bounds::TunedBounds;
+pub use gait::{DomainTrajectory, Gait};
+pub use reference::ReferenceGait;
+pub use settings::{GaitSettings, Mesh};
+pub use solve::{
+    CancelToken, GaitProblem, IterationRecord, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus,
+    Violation, WarmStart, solve,
+};
+pub use subject::{Device, ModelError, Subject};

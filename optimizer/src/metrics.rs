@@ -1,0 +1,1 @@
+//! Figures of a gait: Gait RMSE against a reference.

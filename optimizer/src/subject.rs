@@ -1,0 +1,135 @@
+//! The person and the prosthesis: what the walking model is built from.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Why a subject, device, bound or setting was refused. Names the field, the value and the allowed range.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ModelError {
+    /// A number outside its allowed range.
+    #[error("{field} = {value} is outside the allowed range [{minimum}, {maximum}]")]
+    OutOfRange {
+        /// Field name with its unit, as in the public interface (`height_m`).
+        field: String,
+        /// The value that was given.
+        value: f64,
+        /// Smallest allowed value.
+        minimum: f64,
+        /// Largest allowed value.
+        maximum: f64,
+    },
+    /// A name that is not known.
+    #[error("{field}: unknown value {value:?}; known: {known}")]
+    Unknown {
+        /// Field name.
+        field: String,
+        /// The value that was given.
+        value: String,
+        /// What would have been accepted.
+        known: String,
+    },
+    /// A text or file that cannot be read.
+    #[error("{what}: {reason}")]
+    Malformed {
+        /// What was being read.
+        what: String,
+        /// What is wrong, with the place where it is known.
+        reason: String,
+    },
+}
+
+impl ModelError {
+    /// `Ok(value)` when `minimum <= value <= maximum`, else [`ModelError::OutOfRange`] (NaN is refused).
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn check_range(field: &str, value: f64, minimum: f64, maximum: f64) -> Result<f64, Self> {
+        if value >= minimum && value <= maximum {
+            Ok(value)
+        } else {
+            Err(Self::OutOfRange { field: field.to_owned(), value, minimum, maximum })
+        }
+    }
+}
+
+/// A person: the two numbers that scale the human segments (Winter 2009).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subject {
+    /// Body height in metres.
+    pub height_m: f64,
+    /// Body mass in kilograms.
+    pub body_mass_kg: f64,
+}
+
+impl Subject {
+    /// Allowed heights in metres: outside, the device's fixed shank leaves no sensible thigh link.
+    pub const HEIGHT_RANGE_M: (f64, f64) = (1.4, 2.2);
+    /// Allowed body masses in kilograms.
+    pub const BODY_MASS_RANGE_KG: (f64, f64) = (35.0, 160.0);
+
+    /// A subject with validated height and mass.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming `height_m` or `body_mass_kg`.
+    pub fn new(height_m: f64, body_mass_kg: f64) -> Result<Self, ModelError> {
+        let subject = Self { height_m, body_mass_kg };
+        subject.validate()?;
+        Ok(subject)
+    }
+
+    /// The paper's subjects: 1 (female, 1.727 m, 65.7 kg) and 2 (male, 1.803 m, 75 kg).
+    ///
+    /// # Errors
+    /// [`ModelError::Unknown`] for any other number.
+    pub fn builtin(number: u32) -> Result<Self, ModelError> {
+        match number {
+            1 => Self::new(1.727, 65.7),
+            2 => Self::new(1.803, 75.0),
+            other => Err(ModelError::Unknown {
+                field: "subject".to_owned(),
+                value: other.to_string(),
+                known: "1, 2 (the paper's subjects); or give height and mass".to_owned(),
+            }),
+        }
+    }
+
+    /// Checks both numbers against their allowed ranges.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::check_range("height_m", self.height_m, Self::HEIGHT_RANGE_M.0, Self::HEIGHT_RANGE_M.1)?;
+        ModelError::check_range(
+            "body_mass_kg",
+            self.body_mass_kg,
+            Self::BODY_MASS_RANGE_KG.0,
+            Self::BODY_MASS_RANGE_KG.1,
+        )?;
+        Ok(())
+    }
+}
+
+/// A prosthesis worn on the right leg. Every value of the built-in device carries its source in the data file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Device {
+    /// Name shown to people.
+    pub name: String,
+}
+
+impl Device {
+    /// The AMPRO3 powered knee-ankle prosthesis (values and sources in `data/ampro3.json`).
+    pub fn ampro3() -> Self {
+        Self { name: "AMPRO3".to_owned() }
+    }
+
+    /// Reads a device from JSON.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column, or [`ModelError::OutOfRange`] naming the field.
+    pub fn from_json(text: &str) -> Result<Self, ModelError> {
+        serde_json::from_str(text)
+            .map_err(|e| ModelError::Malformed { what: "device file".to_owned(), reason: e.to_string() })
+    }
+}

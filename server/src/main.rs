@@ -1,0 +1,3 @@
+//! The gaitwright binary.
+
+fn main() {}

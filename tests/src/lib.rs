@@ -1,0 +1,1 @@
+//! Whole-system tests of Gaitwright live in `tests/tests`.
