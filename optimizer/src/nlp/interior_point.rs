@@ -278,7 +278,7 @@ impl<'p> Run<'p> {
                         self.correction.accept();
                         return true;
                     }
-                    self.correction.singular(settings, self.mu)
+                    session.newton.distrust() || self.correction.singular(settings, self.mu)
                 }
                 Some(i) if i.zero == 0 && i.negative > self.form.m => self.correction.increase(settings),
                 _ => self.correction.singular(settings, self.mu),
