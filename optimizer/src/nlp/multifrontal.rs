@@ -306,6 +306,8 @@ fn factor_front(front: &Front, values: &[f64], before: &[Factor], base: usize, o
             }
         }
     }
+    // The kernel writes the subdiagonal of pairs only.
+    own.subdiagonal.fill(0.0);
     lblt::cholesky_in_place(
         MatMut::from_column_major_slice_mut(&mut own.panel, height, p).subrows_mut(0, p),
         DiagMut::from_slice_mut(&mut own.subdiagonal),

@@ -100,6 +100,8 @@ impl KktSolver for Supernodal {
         }
         let size = self.subdiagonal.len();
         let matrix = SparseColMatRef::new(self.pattern.as_ref(), values);
+        // The kernel writes the subdiagonal of pairs only.
+        self.subdiagonal.fill(0.0);
         self.symbolic.factorize_numeric_intranode_lblt(
             &mut self.factor,
             &mut self.subdiagonal,
