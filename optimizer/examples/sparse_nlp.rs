@@ -15,7 +15,8 @@ fn main() {
     for (linear_solver, threads) in
         [(LinearSolver::Supernodal, 1), (LinearSolver::Multifrontal, 1), (LinearSolver::Multifrontal, 2), (LinearSolver::Auto, 1)]
     {
-        let settings = NlpSettings { linear_solver, threads, ..NlpSettings::default() };
+        let limit = std::env::args().nth(3).and_then(|a| a.parse().ok()).unwrap_or(5);
+        let settings = NlpSettings { linear_solver, threads, short_step_limit: limit, ..NlpSettings::default() };
         let mut show = |it: &NlpIteration| {
             if verbose {
                 println!(

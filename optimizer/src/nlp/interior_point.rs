@@ -79,6 +79,9 @@ struct FreeMu {
     recent: Vec<f64>,
 }
 
+/// Primal steps below this are short (see `NlpSettings::short_step_limit`).
+const SHORT_STEP: f64 = 0.05;
+
 impl<'p> Run<'p> {
     /// Takes a point strictly inside its bounds; evaluates nothing yet.
     pub(super) fn new(form: Formulation<'p>, point: PrimalDual, mu: f64) -> Self {
@@ -264,7 +267,6 @@ impl<'p> Run<'p> {
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, dw, dc);
-            if std::env::var_os("DBG").is_some() { eprintln!("   dw {dw:.1e} dc {dc:.1e} {inertia:?} m {}", self.form.m); }
             let go_on = match inertia {
                 Some(i) if i.zero == 0 && i.negative == self.form.m => {
                     let ratio = session.newton.solve(
@@ -275,8 +277,7 @@ impl<'p> Run<'p> {
                         &self.rhs,
                         &mut self.direction,
                     );
-                    if std::env::var_os("DBG").is_some() { eprintln!("   ratio {ratio:.1e}"); }
-                    if ratio <= settings.residual_limit {
+                            if ratio <= settings.residual_limit {
                         self.correction.accept();
                         return true;
                     }
@@ -353,6 +354,7 @@ impl<'p> Run<'p> {
         let settings = session.settings;
         let mut tiny_steps = 0usize;
         let mut rescues = 0usize;
+        let mut short_steps = 0usize;
         let mut elastic_resets = 0usize;
         loop {
             let now = self.current_optimality();
@@ -391,8 +393,17 @@ impl<'p> Run<'p> {
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
                     return Ending::Left;
                 }
-                continue;
+                short_steps = if session.last_step.alpha_primal < SHORT_STEP { short_steps + 1 } else { 0 };
+                let crawls = settings.short_step_limit > 0
+                    && short_steps >= settings.short_step_limit
+                    && self.phase() == Phase::Regular
+                    && largest(&self.c) > settings.tolerance.sqrt()
+                    && session.counts.feasibility_phases < settings.max_feasibility_phases;
+                if !crawls {
+                    continue;
+                }
             }
+            short_steps = 0;
             session.last_step = StepRecord::default();
             match self.phase() {
                 Phase::Feasibility => {

@@ -141,6 +141,9 @@ pub struct NlpSettings {
     /// The feasibility phase ends when the violation has fallen to this share of its first value and the filter
     /// accepts. Default 0.9 (WB06 kappa_resto).
     pub required_reduction: f64,
+    /// Steps below 0.05 in a row after which the feasibility phase is entered without waiting for the line search to
+    /// fail: a point pressed against its bounds with growing multipliers rarely recovers by itself. Default 5; 0: never.
+    pub short_step_limit: usize,
     /// Feasibility phases before the solve is called stalled. Default 50.
     pub max_feasibility_phases: usize,
 
@@ -189,6 +192,7 @@ impl Default for NlpSettings {
             watchdog_trials: 3,
             elastic_weight: 1000.0,
             required_reduction: 0.9,
+            short_step_limit: 5,
             max_feasibility_phases: 50,
             linear_solver: LinearSolver::default(),
             threads: 1,
