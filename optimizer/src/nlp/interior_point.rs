@@ -201,6 +201,13 @@ impl<'p> Run<'p> {
         self.optimality(0.0)
     }
 
+    /// Sum of the parts of the primal-dual error at the present mu.
+    pub(super) fn primal_dual_error(&mut self) -> f64 {
+        self.update_lagrangian();
+        let now = self.optimality(self.mu);
+        now.violation + now.dual + now.complementarity
+    }
+
     fn is_converged(&self, settings: &NlpSettings, now: &Optimality) -> bool {
         let scale = self.form.objective_scale;
         now.error() <= settings.tolerance
@@ -212,7 +219,6 @@ impl<'p> Run<'p> {
     fn set_mu(&mut self, mu: f64) {
         self.mu = mu;
         self.filter.clear();
-        self.search.forget();
         if let Goal::Feasibility { zeta, .. } = &mut self.form.goal {
             *zeta = mu.sqrt();
             self.objective = self.form.objective(&self.point.w);
@@ -277,7 +283,7 @@ impl<'p> Run<'p> {
                         &self.rhs,
                         &mut self.direction,
                     );
-                            if ratio <= settings.residual_limit {
+                    if ratio <= settings.residual_limit {
                         self.correction.accept();
                         return true;
                     }
@@ -355,6 +361,7 @@ impl<'p> Run<'p> {
         let mut tiny_steps = 0usize;
         let mut rescues = 0usize;
         let mut short_steps = 0usize;
+        let mut soft_steps = 0usize;
         let mut elastic_resets = 0usize;
         loop {
             let now = self.current_optimality();
@@ -390,6 +397,7 @@ impl<'p> Run<'p> {
             if found && self.line_search(session, tiny) {
                 rescues = 0;
                 elastic_resets = 0;
+                soft_steps = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
                     return Ending::Left;
                 }
@@ -402,8 +410,12 @@ impl<'p> Run<'p> {
                 if !crawls {
                     continue;
                 }
+            } else if found && soft_steps < settings.max_soft_steps && self.soft_step(session) {
+                soft_steps += 1;
+                continue;
             }
             short_steps = 0;
+            soft_steps = 0;
             session.last_step = StepRecord::default();
             match self.phase() {
                 Phase::Feasibility => {
@@ -431,7 +443,6 @@ impl<'p> Run<'p> {
     /// Forgets filter and multipliers: z = mu / slack, y by least squares.
     pub(super) fn recentre(&mut self, session: &mut Session) {
         self.filter.clear();
-        self.search.forget();
         for j in 0..self.form.length() {
             self.point.zl[j] = if self.at.slack_lower[j].is_finite() { self.mu / self.at.slack_lower[j] } else { 0.0 };
             self.point.zu[j] = if self.at.slack_upper[j].is_finite() { self.mu / self.at.slack_upper[j] } else { 0.0 };

@@ -131,10 +131,9 @@ pub struct NlpSettings {
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
-    /// Shortened steps in a row that start the watchdog. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
-    pub watchdog_trigger: usize,
-    /// Trial iterations of the watchdog. Default 3.
-    pub watchdog_trials: usize,
+    /// Steps in a row that may be taken for a lower primal-dual error alone when the line search fails, before the
+    /// feasibility phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
+    pub max_soft_steps: usize,
 
     /// Weight of the l1 violation in the feasibility phase. Default 1000 (WB06 rho).
     pub elastic_weight: f64,
@@ -149,7 +148,8 @@ pub struct NlpSettings {
 
     /// Factorisation. Default auto.
     pub linear_solver: LinearSolver,
-    /// Threads of the multifrontal factorisation, 1 to 16; the result does not depend on it. Default 1.
+    /// Threads of the multifrontal factorisation, 1 to 16; the result does not depend on it, and small matrices use one
+    /// whatever it says. Default 1.
     pub threads: usize,
 }
 
@@ -188,8 +188,7 @@ impl Default for NlpSettings {
             residual_limit: 1e-5,
             max_refinements: 10,
             max_second_order_corrections: 4,
-            watchdog_trigger: 10,
-            watchdog_trials: 3,
+            max_soft_steps: 10,
             elastic_weight: 1000.0,
             required_reduction: 0.9,
             short_step_limit: 5,
@@ -242,7 +241,6 @@ impl NlpSettings {
         in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
         in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
         in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;
-        in_range("watchdog_trials", self.watchdog_trials as f64, 1.0, 100.0)?;
         positive("elastic_weight", self.elastic_weight)?;
         in_range("required_reduction", self.required_reduction, 0.0, 0.999_999)?;
         in_range("threads", self.threads as f64, 1.0, 16.0)
