@@ -353,3 +353,21 @@ fn nlp_linear_objective_without_curvature() {
     assert_eq!(r.status, NlpStatus::Converged, "{r:?}");
     assert!((r.x[0] - 0.01).abs() < 1e-6);
 }
+
+#[test]
+fn nlp_separable_problems_have_a_diagonal_matrix() {
+    let n = 300;
+    let objective = (0..n).map(|k| Term::new(vec![k], move |x| square(x[0] - f64::from(k as u32 % 7)))).collect();
+    let mut problem = Sparse::new(vec![1.0; n], objective, vec![], vec![]);
+    problem.upper.fill(5.0);
+    let r = run(&problem, &problem.start, &NlpSettings::default());
+    assert_eq!(r.status, NlpStatus::Converged, "{r:?}");
+    assert!((r.objective - 42.0).abs() < 1e-4, "{}", r.objective);
+}
+
+#[test]
+fn nlp_an_empty_problem_is_solved() {
+    let problem = Small::new("empty", &[], &[], &[], |_| (Dual::constant(3.0), vec![]));
+    let r = cold(&problem);
+    assert_eq!((r.status, r.objective), (NlpStatus::Converged, 3.0));
+}

@@ -79,6 +79,9 @@ struct FreeMu {
     recent: Vec<f64>,
 }
 
+/// Whether a feasibility phase may end at this w.
+pub(super) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
+
 /// Primal steps below this are short (see `NlpSettings::short_step_limit`).
 const SHORT_STEP: f64 = 0.05;
 
@@ -351,11 +354,7 @@ impl<'p> Run<'p> {
     }
 
     /// Iterates until an ending. `leave` is asked after each step of a feasibility phase.
-    pub(super) fn iterate(
-        &mut self,
-        session: &mut Session,
-        mut leave: Option<&mut dyn FnMut(&[f64]) -> bool>,
-    ) -> Ending {
+    pub(super) fn iterate(&mut self, session: &mut Session, mut leave: Option<Leave>) -> Ending {
         session.newton.fit(&self.form);
         let settings = session.settings;
         let mut tiny_steps = 0usize;

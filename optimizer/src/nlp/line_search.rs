@@ -102,13 +102,13 @@ impl Run<'_> {
                     self.finish(session, &reference, kind, alpha, tau, trials);
                     return true;
                 }
-                if trials == 1 && theta >= reference.theta {
-                    if let Some((kind, alpha, extra)) =
+                if trials == 1
+                    && theta >= reference.theta
+                    && let Some((kind, alpha, extra)) =
                         self.second_order_correction(session, &reference, alpha, tau, theta)
-                    {
-                        self.finish(session, &reference, kind, alpha, tau, trials + extra);
-                        return true;
-                    }
+                {
+                    self.finish(session, &reference, kind, alpha, tau, trials + extra);
+                    return true;
                 }
             }
             alpha *= 0.5;

@@ -48,7 +48,7 @@ pub enum LinearSolver {
     /// The multifrontal factorisation, with the supernodal one as its fallback.
     #[default]
     Auto,
-    /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes.
+    /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes (a matrix of order up to 120: one dense front).
     Supernodal,
     /// Static multifrontal LBL^T over the elimination blocks, with Bunch-Kaufman pivoting inside fronts.
     Multifrontal,
