@@ -18,7 +18,10 @@ fn main() {
     let variants = [
         ("default", d()),
         ("adaptive", NlpSettings { barrier_strategy: BarrierStrategy::Adaptive, ..d() }),
-        ("mu 1e-4, centred", NlpSettings { mu_initial: 1e-4, bound_multiplier_start: BoundMultiplierStart::Centred, ..d() }),
+        (
+            "mu 1e-4, centred",
+            NlpSettings { mu_initial: 1e-4, bound_multiplier_start: BoundMultiplierStart::Centred, ..d() },
+        ),
         ("mu 1e-4, one", NlpSettings { mu_initial: 1e-4, ..d() }),
         ("dc when singular", NlpSettings { dual_regularisation: DualRegularisation::WhenSingular, ..d() }),
         ("no short-step rule", NlpSettings { short_step_limit: 0, ..d() }),
