@@ -2,7 +2,8 @@
 
 use crate::bounds::TunedBounds;
 use crate::settings::GaitSettings;
-use crate::subject::{Device, Subject};
+use crate::device::Device;
+use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 
 /// A gait: eight domains over one stride from right heel strike.
