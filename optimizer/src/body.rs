@@ -12,7 +12,7 @@ pub mod dynamics;
 pub mod point;
 
 pub use anthropometry::{Body, LegGeometry, WalkerModel};
-pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, to_generalised, relative_angles};
+pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, relative_angles, to_generalised};
 pub use dynamics::{InverseDynamics, PointState};
 pub use point::{Chain, ContactPoint};
 

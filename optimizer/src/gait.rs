@@ -1,8 +1,8 @@
 //! The result: an optimised walking trajectory over one stride, in SI units and radians.
 
 use crate::bounds::TunedBounds;
-use crate::settings::GaitSettings;
 use crate::device::Device;
+use crate::settings::GaitSettings;
 use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 

@@ -8,6 +8,7 @@ pub mod body;
 pub mod bounds;
 pub mod device;
 pub mod gait;
+pub mod gait_problem;
 pub mod metrics;
 pub mod muscle;
 pub mod nlp;
@@ -15,6 +16,7 @@ pub mod reference;
 pub mod settings;
 pub mod solve;
 pub mod subject;
+pub mod walking;
 
 pub use bounds::TunedBounds;
 pub use device::Device;

@@ -4,4 +4,4 @@ pub mod curves;
 pub mod unit;
 
 pub use curves::{CurveValue, force_length, force_velocity, tendon_force};
-pub use unit::{Attachment, MUSCLES, MUSCLE_COUNT, Muscle};
+pub use unit::{Attachment, MUSCLE_COUNT, MUSCLES, Muscle};

@@ -1,10 +1,10 @@
 //! The public face: one gait problem in, one honest outcome out.
 
 use crate::bounds::TunedBounds;
+use crate::device::Device;
 use crate::gait::Gait;
 use crate::reference::ReferenceGait;
 use crate::settings::GaitSettings;
-use crate::device::Device;
 use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -42,15 +42,7 @@ pub fn to_generalised(p: &[f64; LINKS]) -> [f64; LINKS] {
 /// Inverse of [`link_angles`]: relative angles from absolute link angles.
 #[inline]
 pub fn relative_angles(psi: &[f64; LINKS]) -> [f64; LINKS] {
-    [
-        -psi[0],
-        psi[1] - psi[0],
-        psi[1] - psi[2],
-        psi[3] - psi[2],
-        psi[4] - psi[0],
-        psi[4] - psi[5],
-        psi[6] - psi[5],
-    ]
+    [-psi[0], psi[1] - psi[0], psi[1] - psi[2], psi[3] - psi[2], psi[4] - psi[0], psi[4] - psi[5], psi[6] - psi[5]]
 }
 
 /// `A^T H A` for a link-space matrix H (not necessarily symmetric), both sides seven angles.

@@ -233,8 +233,7 @@ impl<'a> InverseDynamics<'a> {
             link_mass[i][j] += p;
             link_mass[j][i] += p;
         }
-        let mut result =
-            DynamicsJacobian { angle: [[0.0; LINKS]; 9], rate: [[0.0; LINKS]; 9], mass: [[0.0; 9]; 9] };
+        let mut result = DynamicsJacobian { angle: [[0.0; LINKS]; 9], rate: [[0.0; LINKS]; 9], mass: [[0.0; 9]; 9] };
         for axis in 0..2 {
             result.angle[axis] = to_generalised(&base_angle[axis]);
             result.rate[axis] = to_generalised(&base_rate[axis]);
