@@ -6,8 +6,6 @@ use super::settings::{DualRegularisation, NlpSettings};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct InertiaCorrection {
     last: f64,
-    /// First delta_w of the next iteration: zero unless the line search had to shorten steps a lot.
-    damping: f64,
     /// Current delta_w.
     pub delta_w: f64,
     /// Current delta_c.
@@ -17,7 +15,7 @@ pub(super) struct InertiaCorrection {
 impl InertiaCorrection {
     /// First trial of an iteration.
     pub(super) fn begin(&mut self, settings: &NlpSettings, mu: f64) {
-        self.delta_w = self.damping;
+        self.delta_w = 0.0;
         self.delta_c = match settings.dual_regularisation {
             DualRegularisation::Always => Self::dual(settings, mu),
             DualRegularisation::WhenSingular => 0.0,
@@ -28,23 +26,6 @@ impl InertiaCorrection {
     pub(super) fn accept(&mut self) {
         if self.delta_w > 0.0 {
             self.last = self.delta_w;
-        }
-    }
-
-    /// Learns from the line search. Many backtracking trials mean that the step was too long for its model, as along
-    /// directions in which the objective is flat: the next Hessian is damped (Levenberg-Marquardt) until steps are
-    /// accepted at once again.
-    pub(super) fn observe(&mut self, settings: &NlpSettings, trials: usize) {
-        if settings.damping_trials == 0 {
-            return;
-        }
-        if trials >= settings.damping_trials {
-            self.damping = (INCREASE * self.delta_w).clamp(settings.hessian_regularisation_first, LARGEST_DAMPING);
-        } else if trials <= 2 {
-            self.damping *= DAMPING_DECAY;
-            if self.damping < SMALLEST_DAMPING {
-                self.damping = 0.0;
-            }
         }
     }
 
@@ -84,7 +65,3 @@ const DECREASE: f64 = 1.0 / 3.0;
 const INCREASE: f64 = 8.0;
 /// WB06 kappa_w^+ bar, while nothing is remembered.
 const FIRST_INCREASE: f64 = 100.0;
-/// Limits of the damping that follows backtracking, and its decay after an accepted step.
-const LARGEST_DAMPING: f64 = 1e2;
-const SMALLEST_DAMPING: f64 = 1e-7;
-const DAMPING_DECAY: f64 = 0.125;

@@ -117,9 +117,6 @@ pub struct NlpSettings {
     pub hessian_regularisation_min: f64,
     /// Regularisation of the Hessian that counts as failure. Default 1e20.
     pub hessian_regularisation_max: f64,
-    /// Trial points of one line search from which on the next Hessian is damped (Levenberg-Marquardt): backtracking that
-    /// often says that the step was too long for its model. Default 5; 0: never.
-    pub damping_trials: usize,
     /// When delta_c > 0. Default always.
     pub dual_regularisation: DualRegularisation,
     /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c).
@@ -190,7 +187,6 @@ impl Default for NlpSettings {
             hessian_regularisation_first: 1e-4,
             hessian_regularisation_min: 1e-20,
             hessian_regularisation_max: 1e20,
-            damping_trials: 5,
             dual_regularisation: DualRegularisation::default(),
             dual_regularisation_value: 1e-8,
             residual_target: 1e-10,
