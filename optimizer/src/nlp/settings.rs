@@ -131,6 +131,11 @@ pub struct NlpSettings {
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
+    /// Shortened steps in a row that start the watchdog, which takes full steps without asking and goes back if none of
+    /// them is acceptable. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
+    pub watchdog_trigger: usize,
+    /// Full steps the watchdog may try. Default 3 (IPOPT `watchdog_trial_iter_max`).
+    pub watchdog_trials: usize,
     /// Steps in a row that may be taken for a lower primal-dual error alone when the line search fails, before the
     /// feasibility phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
     pub max_soft_steps: usize,
@@ -188,6 +193,8 @@ impl Default for NlpSettings {
             residual_limit: 1e-5,
             max_refinements: 10,
             max_second_order_corrections: 4,
+            watchdog_trigger: 10,
+            watchdog_trials: 3,
             max_soft_steps: 10,
             elastic_weight: 1000.0,
             required_reduction: 0.9,
