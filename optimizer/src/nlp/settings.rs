@@ -117,6 +117,8 @@ pub struct NlpSettings {
     pub hessian_regularisation_min: f64,
     /// Regularisation of the Hessian that counts as failure. Default 1e20.
     pub hessian_regularisation_max: f64,
+    /// First weight of the proximal term that follows steps cut by the line search; 0: none. Default 1e-4.
+    pub proximal_first: f64,
     /// When delta_c > 0. Default always.
     pub dual_regularisation: DualRegularisation,
     /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c).
@@ -187,6 +189,7 @@ impl Default for NlpSettings {
             hessian_regularisation_first: 1e-4,
             hessian_regularisation_min: 1e-20,
             hessian_regularisation_max: 1e20,
+            proximal_first: 1e-4,
             dual_regularisation: DualRegularisation::default(),
             dual_regularisation_value: 1e-8,
             residual_target: 1e-10,
@@ -245,6 +248,7 @@ impl NlpSettings {
             self.hessian_regularisation_first,
             f64::MAX,
         )?;
+        in_range("proximal_first", self.proximal_first, 0.0, 1e4)?;
         in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
         in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
         in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;
