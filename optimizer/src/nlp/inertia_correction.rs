@@ -32,8 +32,8 @@ impl InertiaCorrection {
             return;
         }
         if trials >= PROXIMAL_TRIGGER {
-            self.proximal = (self.proximal * INCREASE).max(settings.proximal_first).min(PROXIMAL_MAX);
-        } else if trials <= 1 {
+            self.proximal = (INCREASE * self.delta_w).max(settings.proximal_first).min(PROXIMAL_MAX);
+        } else if trials <= 2 {
             self.proximal *= PROXIMAL_DECREASE;
             if self.proximal < PROXIMAL_VANISHES * settings.proximal_first {
                 self.proximal = 0.0;
@@ -44,7 +44,7 @@ impl InertiaCorrection {
     /// The matrix was accepted.
     pub(super) fn accept(&mut self) {
         if self.delta_w > 0.0 {
-            self.last = self.delta_w.max(self.proximal);
+            self.last = self.delta_w;
         }
     }
 
@@ -85,10 +85,10 @@ const INCREASE: f64 = 8.0;
 /// WB06 kappa_w^+ bar, while nothing is remembered.
 const FIRST_INCREASE: f64 = 100.0;
 /// Line-search trials that start or strengthen the proximal term.
-const PROXIMAL_TRIGGER: usize = 4;
-/// Fading of the proximal term after a step without a cut.
-const PROXIMAL_DECREASE: f64 = 0.2;
+const PROXIMAL_TRIGGER: usize = 5;
+/// Fading of the proximal term after a step cut at most once.
+const PROXIMAL_DECREASE: f64 = 0.125;
 /// Share of `proximal_first` below which the term is dropped.
-const PROXIMAL_VANISHES: f64 = 0.01;
+const PROXIMAL_VANISHES: f64 = 1e-3;
 /// Largest proximal weight.
-const PROXIMAL_MAX: f64 = 1e4;
+const PROXIMAL_MAX: f64 = 1e2;

@@ -395,7 +395,6 @@ impl<'p> Run<'p> {
             let tiny = found && self.relative_step() < 10.0 * f64::EPSILON && self.theta() < 1e-4;
             tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
             if found && self.line_search(session, tiny) {
-                self.correction.observe(settings, session.last_step.trials);
                 rescues = 0;
                 elastic_resets = 0;
                 soft_steps = 0;

@@ -149,6 +149,7 @@ impl Run<'_> {
             if finite {
                 if let Some(kind) = self.judge(&reference, alpha, theta, phi) {
                     self.search.shortened = if trials > 1 { self.search.shortened + 1 } else { 0 };
+                    self.correction.observe(settings, trials);
                     self.finish(session, &reference, kind, alpha, tau, trials);
                     return true;
                 }
@@ -159,6 +160,7 @@ impl Run<'_> {
                         self.second_order_correction(session, &reference, alpha, tau, theta)
                 {
                     self.search.shortened = 0;
+                    self.correction.observe(settings, 1);
                     self.finish(session, &reference, kind, alpha, tau, trials + extra);
                     return true;
                 }
