@@ -1,0 +1,3 @@
+//! Ways to choose the next action.
+
+pub(crate) mod line;
