@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::feedback::FeedbackLog;
-use crate::posterior::posterior;
+use crate::posterior::Learner;
 use crate::settings::{LearnerSettings, Method};
 use crate::space::{ActionIndex, SearchSpace};
 
@@ -42,26 +42,40 @@ pub fn comparisons_to_ask(
     action: ActionIndex,
     settings: &LearnerSettings,
 ) -> Result<Vec<Question>> {
-    space.check(action)?;
-    settings.validate()?;
-    log.validate(space, settings.categories())?;
-    let end = log.visited.iter().position(|&a| a == action).unwrap_or(log.visited.len());
-    let earlier = &log.visited[..end];
-    if settings.method == Method::LineCoSpar {
+    Learner::default().comparisons_to_ask(space, log, action, settings)
+}
+
+impl Learner {
+    /// As [`comparisons_to_ask`].
+    ///
+    /// # Errors
+    /// As [`comparisons_to_ask`].
+    pub fn comparisons_to_ask(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        action: ActionIndex,
+        settings: &LearnerSettings,
+    ) -> Result<Vec<Question>> {
+        space.check(action)?;
+        settings.validate()?;
+        log.validate(space, settings.categories())?;
+        let end = log.visited.iter().position(|&a| a == action).unwrap_or(log.visited.len());
+        let earlier = &log.visited[..end];
         let mut questions: Vec<Question> = Vec::new();
-        for &against in earlier.iter().rev().take(settings.buffer) {
-            if against != action && !questions.iter().any(|q| q.against == against) {
-                questions.push(Question { action, against, reason: QuestionReason::Previous });
+        if settings.method == Method::LineCoSpar {
+            for &against in earlier.iter().rev().take(settings.buffer) {
+                if against != action && !questions.iter().any(|q| q.against == against) {
+                    questions.push(Question { action, against, reason: QuestionReason::Previous });
+                }
             }
+        } else if !earlier.is_empty() {
+            let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
+            let best = self.posterior(space, &before, settings)?.best();
+            questions.extend(best.map(|against| Question { action, against, reason: QuestionReason::Incumbent }));
         }
-        return Ok(questions);
+        Ok(questions)
     }
-    let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
-    Ok(posterior(space, &before, settings)?
-        .best()
-        .map(|against| Question { action, against, reason: QuestionReason::Incumbent })
-        .into_iter()
-        .collect())
 }
 
 /// The next comparison worth asking about the actions already tried, if any: the last action against its partners of

@@ -12,10 +12,12 @@
 
 mod acquisition;
 mod ask;
+mod belief;
 mod error;
 mod feedback;
+mod grid;
+mod inference;
 mod kernel;
-mod laplace;
 mod likelihood;
 mod linalg;
 mod math;
@@ -29,7 +31,7 @@ mod space;
 pub use ask::{Question, QuestionReason, comparisons_to_ask, what_to_ask};
 pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
-pub use posterior::{Posterior, Prediction, posterior};
+pub use posterior::{Learner, Posterior, Prediction, posterior};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch};
-pub use settings::{Inference, LearnerSettings, Link, Method};
+pub use settings::{Inference, Labels, LearnerSettings, Link, Method};
 pub use space::{ActionIndex, Dimension, SearchSpace};

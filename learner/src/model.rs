@@ -1,11 +1,11 @@
-//! The log as the posterior sees it: points of the grid and what was said about them.
+//! Answers about points of the grid, as a Gaussian process sees them.
 
 use std::collections::HashMap;
 
 use crate::error::Result;
-use crate::feedback::{Feedback, FeedbackLog};
+use crate::kernel::Kernel;
 use crate::likelihood::Interval;
-use crate::settings::LearnerSettings;
+use crate::linalg::Cholesky;
 use crate::space::{ActionIndex, SearchSpace};
 
 /// An answer about the utility of one point or the difference of two.
@@ -25,53 +25,50 @@ impl Site {
     }
 }
 
-/// Points in the order in which answers first speak of them, and the answers.
+/// Points in the order in which answers first speak of them, the factor of their prior covariance, and the answers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Model {
     pub(crate) points: Vec<ActionIndex>,
     pub(crate) levels: Vec<Vec<usize>>,
+    pub(crate) prior: Cholesky,
     pub(crate) sites: Vec<Site>,
     slots: HashMap<ActionIndex, usize>,
 }
 
 impl Model {
-    pub(crate) fn of_log(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) -> Result<Self> {
-        log.validate(space, settings.categories())?;
-        let mut model = Self::default();
-        for &feedback in &log.feedback {
-            model.add(space, feedback, settings);
-        }
-        Ok(model)
-    }
-
     /// Position of an action among the points.
     pub(crate) fn slot(&self, action: ActionIndex) -> Option<usize> {
         self.slots.get(&action).copied()
     }
 
-    fn point(&mut self, space: &SearchSpace, action: ActionIndex) -> usize {
-        *self.slots.entry(action).or_insert_with(|| {
-            self.points.push(action);
-            self.levels.push(space.levels(action));
-            self.points.len() - 1
-        })
+    /// The point of an action, added if it is new.
+    fn point(&mut self, space: &SearchSpace, kernel: &Kernel, action: ActionIndex) -> Result<usize> {
+        if let Some(slot) = self.slot(action) {
+            return Ok(slot);
+        }
+        let levels = space.levels(action);
+        let mut row = kernel.column(&levels, &self.levels);
+        row.push(kernel.covariance(&levels, &levels) + kernel.nugget);
+        self.prior.append(&row)?;
+        let slot = self.points.len();
+        self.points.push(action);
+        self.levels.push(levels);
+        self.slots.insert(action, slot);
+        Ok(slot)
     }
 
-    /// Adds a validated answer.
-    fn add(&mut self, space: &SearchSpace, feedback: Feedback, settings: &LearnerSettings) {
-        let (first, second) = feedback.actions();
-        let plus = self.point(space, first);
-        let minus = second.map(|action| self.point(space, action));
-        let (low, high, noise) = match feedback {
-            Feedback::Label { category, .. } => {
-                let bounds = &settings.ordinal_thresholds;
-                let low = if category == 0 { f64::NEG_INFINITY } else { bounds[category - 1] };
-                (low, bounds.get(category).copied().unwrap_or(f64::INFINITY), settings.ordinal_noise)
-            }
-            Feedback::Preference { .. } => (0.0, f64::INFINITY, settings.preference_noise),
-            Feedback::Tie { .. } => (-settings.tie_width, settings.tie_width, settings.tie_noise),
-            Feedback::Suggestion { .. } => (0.0, f64::INFINITY, settings.coactive_noise),
-        };
-        self.sites.push(Site { plus, minus, interval: Interval { low, high, noise } });
+    /// Adds an answer about one action or the difference of two.
+    pub(crate) fn add(
+        &mut self,
+        space: &SearchSpace,
+        kernel: &Kernel,
+        plus: ActionIndex,
+        minus: Option<ActionIndex>,
+        interval: Interval,
+    ) -> Result<()> {
+        let plus = self.point(space, kernel, plus)?;
+        let minus = minus.map(|action| self.point(space, kernel, action)).transpose()?;
+        self.sites.push(Site { plus, minus, interval });
+        Ok(())
     }
 }

@@ -4,11 +4,10 @@ use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::acquisition::line;
+use crate::acquisition::{eubo, line};
 use crate::error::{LearnerError, Result};
 use crate::feedback::FeedbackLog;
-use crate::math;
-use crate::posterior::{Posterior, posterior};
+use crate::posterior::{Learner, Posterior};
 use crate::random::Random;
 use crate::settings::{LearnerSettings, Method};
 use crate::space::{ActionIndex, SearchSpace};
@@ -56,8 +55,24 @@ pub fn propose(
     settings: &LearnerSettings,
     seed: u64,
 ) -> Result<Proposal> {
-    let belief = posterior(space, log, settings)?;
-    propose_from(&belief, pending, seed)
+    Learner::default().propose(space, log, pending, settings, seed)
+}
+
+impl Learner {
+    /// As [`propose`].
+    ///
+    /// # Errors
+    /// As [`propose`].
+    pub fn propose(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        pending: &[ActionIndex],
+        settings: &LearnerSettings,
+        seed: u64,
+    ) -> Result<Proposal> {
+        propose_from(&self.posterior(space, log, settings)?, pending, seed)
+    }
 }
 
 /// Proposes `settings.samples_per_iteration` different actions for as many workers, fewer when fewer are left.
@@ -71,7 +86,7 @@ pub fn propose_batch(
     settings: &LearnerSettings,
     seed: u64,
 ) -> Result<Vec<Proposal>> {
-    let belief = posterior(space, log, settings)?;
+    let belief = Learner::default().posterior(space, log, settings)?;
     let mut pending = pending.to_vec();
     let mut proposals = Vec::new();
     for _ in 0..settings.samples_per_iteration {
@@ -103,7 +118,10 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
     };
     let (action, reason) = match belief.settings().method {
         Method::LineCoSpar => line_cospar(belief, best, &taken, &mut random)?,
-        Method::Eubo => (eubo(belief, best, &taken), ProposalReason::ExpectedBestUtility),
+        Method::Eubo => match eubo::against(belief, best, &taken) {
+            Some(action) => (action, ProposalReason::ExpectedBestUtility),
+            None => return Err(LearnerError::Exhausted { actions: space.len() }),
+        },
         Method::Random => (random_untried(space, &taken, &mut random), ProposalReason::RandomAction),
     };
     Ok(Proposal { action, reason, best: Some(best) })
@@ -129,7 +147,8 @@ fn line_cospar(
     random: &mut Random,
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
-    let suggested: Vec<ActionIndex> = belief.points().iter().copied().filter(|a| !taken.contains(a)).collect();
+    let suggested: Vec<ActionIndex> =
+        belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
     for _ in 0..MAX_LINES {
         let mut candidates = suggested.clone();
         for action in line::through(space, best, random) {
@@ -148,19 +167,6 @@ fn line_cospar(
         return Ok((chosen, ProposalReason::ThompsonOnLine));
     }
     Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted))
-}
-
-fn eubo(belief: &Posterior, best: ActionIndex, taken: &HashSet<ActionIndex>) -> ActionIndex {
-    let mut top = (best, f64::NEG_INFINITY);
-    for action in (0..belief.space().len()).map(ActionIndex).filter(|a| !taken.contains(a)) {
-        let (mean, variance) = belief.difference(action, best);
-        let sd = variance.sqrt().max(1e-9);
-        let gain = mean * math::normal_cdf(mean / sd) + sd * math::normal_density(mean / sd);
-        if gain > top.1 {
-            top = (action, gain);
-        }
-    }
-    top.0
 }
 
 #[cfg(test)]
@@ -204,7 +210,7 @@ mod tests {
                 log.visited.push(proposal.action);
             }
             assert!(matches!(propose(&space, &log, &[], &settings, 5), Err(LearnerError::Exhausted { .. })));
-            let best = posterior(&space, &log, &settings).unwrap().best().unwrap();
+            let best = crate::posterior::posterior(&space, &log, &settings).unwrap().best().unwrap();
             assert_eq!(space.levels(best), [1, 2, 0], "{method:?}");
         }
     }

@@ -38,6 +38,17 @@ pub enum Link {
     Probit,
 }
 
+/// Where labels enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Labels {
+    /// Labels are about the utility itself, as in the literature.
+    InUtility,
+    /// Labels are about a second function of the action; a comparison that the labels alone decide (one action in
+    /// the lowest category, the other not) says nothing more about the utility.
+    Separate,
+}
+
 /// Everything that decides how a log is read and what is proposed next.
 ///
 /// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors.
@@ -56,6 +67,15 @@ pub struct LearnerSettings {
     pub nugget: f64,
     /// Multiplies every dimension's lengthscale.
     pub lengthscale_factor: f64,
+    /// Share of the prior variance given to functions of one quantity each.
+    pub additive_share: f64,
+    /// Share of the prior variance given to functions of two quantities each. What is left of 1 goes to the
+    /// literature's product kernel.
+    pub pairwise_share: f64,
+    /// Lengthscale of the additive and pairwise parts, as a share of each dimension's range.
+    pub broad_lengthscale: f64,
+    /// Where labels enter.
+    pub labels: Labels,
     /// Scale of the noise of a preference, in units of utility.
     pub preference_noise: f64,
     /// Scale of the noise of a label.
@@ -84,6 +104,10 @@ impl Default for LearnerSettings {
             signal_variance: 1.0,
             nugget: 1e-5,
             lengthscale_factor: 1.0,
+            additive_share: 0.0,
+            pairwise_share: 0.0,
+            broad_lengthscale: 1.0,
+            labels: Labels::InUtility,
             preference_noise: 0.02,
             ordinal_noise: 0.1,
             ordinal_thresholds: vec![0.0],
@@ -120,6 +144,9 @@ impl LearnerSettings {
             ("signal_variance", self.signal_variance, 1e-8, 1e8),
             ("nugget", self.nugget, 1e-10 * self.signal_variance, self.signal_variance),
             ("lengthscale_factor", self.lengthscale_factor, 1e-3, 1e3),
+            ("additive_share", self.additive_share, 0.0, 1.0),
+            ("pairwise_share", self.pairwise_share, 0.0, 1.0),
+            ("broad_lengthscale", self.broad_lengthscale, 1e-2, 1e3),
             ("preference_noise", self.preference_noise, 1e-4, 1e4),
             ("ordinal_noise", self.ordinal_noise, 1e-4, 1e4),
             ("coactive_noise", self.coactive_noise, 1e-4, 1e4),
@@ -129,6 +156,12 @@ impl LearnerSettings {
             if !(value >= low && value <= high) {
                 return refuse(setting, format!("{value} is not between {low} and {high}"));
             }
+        }
+        if self.additive_share + self.pairwise_share > 1.0 {
+            return refuse("pairwise_share", "additive and pairwise shares together exceed 1".into());
+        }
+        if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
+            return refuse("link", "expectation propagation needs the probit link".into());
         }
         if self.ordinal_thresholds.iter().any(|t| t.is_nan() || t.abs() > 1e4) {
             return refuse("ordinal_thresholds", "thresholds must be numbers between -10000 and 10000".into());

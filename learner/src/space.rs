@@ -45,6 +45,12 @@ impl Dimension {
         Ok(())
     }
 
+    /// Distance between the first and the last level; the lengthscale where there is only one level.
+    pub(crate) fn range(&self) -> f64 {
+        let range = self.values.last().unwrap_or(&0.0) - self.values.first().unwrap_or(&0.0);
+        if range > 0.0 { range } else { self.lengthscale }
+    }
+
     /// Mean distance between neighbouring levels; the lengthscale itself where there is only one level.
     pub(crate) fn mean_step(&self) -> f64 {
         match (self.values.first(), self.values.last()) {
