@@ -125,7 +125,9 @@ impl LearnerSettings {
     pub fn of(method: Method) -> Self {
         match method {
             Method::LineCoSpar | Method::Random => Self { method, ..Self::default() },
-            Method::Eubo => Self { method, inference: Inference::Laplace, link: Link::Probit, ..Self::default() },
+            Method::Eubo => {
+                Self { method, inference: Inference::ExpectationPropagation, link: Link::Probit, ..Self::default() }
+            }
         }
     }
 

@@ -90,3 +90,57 @@ pub(crate) fn against(belief: &Posterior, best: ActionIndex, taken: &HashSet<Act
     }
     top.map(|(_, x)| ActionIndex(x as u64))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feedback::{Feedback, FeedbackLog};
+    use crate::posterior::posterior;
+    use crate::random::Random;
+    use crate::settings::{LearnerSettings, Method};
+    use crate::space::{Dimension, SearchSpace};
+
+    #[test]
+    fn the_pruned_search_finds_the_maximiser() {
+        let dimensions = [3, 4, 3, 5]
+            .iter()
+            .enumerate()
+            .map(|(d, &n)| Dimension { name: d.to_string(), values: (0..n).map(f64::from).collect(), lengthscale: 1.3 })
+            .collect();
+        let space = SearchSpace::new(dimensions).unwrap();
+        for (shares, seed) in [((0.0, 0.0), 1), ((0.3, 0.3), 2), ((0.0, 0.0), 3), ((0.5, 0.0), 4)] {
+            let settings = LearnerSettings {
+                additive_share: shares.0,
+                pairwise_share: shares.1,
+                ..LearnerSettings::of(Method::Eubo)
+            };
+            let mut random = Random::new(seed, 0);
+            let mut log = FeedbackLog::default();
+            while log.visited.len() < 25 {
+                let action = ActionIndex(random.below(space.len()));
+                if let Some(&other) = log.visited.last()
+                    && other != action
+                {
+                    let (winner, loser) = if random.uniform() < 0.5 { (action, other) } else { (other, action) };
+                    log.feedback.push(Feedback::Preference { winner, loser });
+                }
+                log.feedback.push(Feedback::Label { action, category: usize::from(random.uniform() < 0.7) });
+                log.visited.push(action);
+            }
+            let belief = posterior(&space, &log, &settings).unwrap();
+            let best = belief.best().unwrap();
+            let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
+            let incumbent = belief.utility.view(best, space.levels(best));
+            let mut top = (0.0, ActionIndex(0));
+            for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(a)) {
+                let (mean, variance) =
+                    belief.utility.difference(&belief.utility.view(action, space.levels(action)), &incumbent);
+                let gain = expected_gain(mean, variance);
+                if gain > top.0 {
+                    top = (gain, action);
+                }
+            }
+            assert_eq!(against(&belief, best, &taken), Some(top.1));
+        }
+    }
+}

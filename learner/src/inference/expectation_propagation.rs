@@ -231,3 +231,52 @@ pub(crate) fn evidence(model: &Model, approximation: &Approximation) -> Result<f
     let h = shifts(model.points.len(), &model.sites, &working.factors);
     Ok(total - 0.5 * precision.ln_determinant() + 0.5 * dot(&h, &working.mean))
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::feedback::{Feedback, FeedbackLog};
+    use crate::posterior::posterior;
+    use crate::settings::{LearnerSettings, Method};
+    use crate::space::{ActionIndex, Dimension, SearchSpace};
+
+    /// Two actions, a preference and a label: moments by brute-force summation over a fine net.
+    #[test]
+    fn moments_of_two_answers_match_quadrature() {
+        let space =
+            SearchSpace::new(vec![Dimension { name: "x".into(), values: vec![0.0, 1.0], lengthscale: 1.0 }]).unwrap();
+        let settings =
+            LearnerSettings { preference_noise: 0.3, ordinal_noise: 0.4, ..LearnerSettings::of(Method::Eubo) };
+        let (a, b) = (ActionIndex(0), ActionIndex(1));
+        let log = FeedbackLog {
+            visited: vec![a, b],
+            feedback: vec![
+                Feedback::Preference { winner: a, loser: b },
+                Feedback::Label { action: b, category: 1 },
+                Feedback::Preference { winner: a, loser: b },
+            ],
+        };
+        let (r, n) = ((-0.5_f64).exp(), 1.0 + 1e-5);
+        let det = n * n - r * r;
+        let (mut mass, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
+        for i in -300..300 {
+            for j in -300..300 {
+                let (x, y) = (f64::from(i) / 50.0, f64::from(j) / 50.0);
+                let prior = (-0.5 * (n * x * x - 2.0 * r * x * y + n * y * y) / det).exp();
+                let p = crate::math::normal_cdf((x - y) / 0.3);
+                let w = prior * p * p * crate::math::normal_cdf(y / 0.4);
+                mass += w;
+                for (k, f) in [x, y].into_iter().enumerate() {
+                    first[k] += w * f;
+                    second[k] += w * f * f;
+                }
+            }
+        }
+        let belief = posterior(&space, &log, &settings).unwrap();
+        for (k, action) in [a, b].into_iter().enumerate() {
+            let (mean, sd) = (first[k] / mass, (second[k] / mass - (first[k] / mass).powi(2)).sqrt());
+            let got = belief.predict(action).unwrap();
+            assert!((got.mean - mean).abs() < 0.02, "{action}: {got:?} against {mean} {sd}");
+            assert!((got.standard_deviation - sd).abs() < 0.02, "{action}: {got:?} against {mean} {sd}");
+        }
+    }
+}
