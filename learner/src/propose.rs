@@ -117,7 +117,7 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
         return Ok(Proposal { action, reason: ProposalReason::FirstAction, best: None });
     };
     let (action, reason) = match belief.settings().method {
-        Method::LineCoSpar => line_cospar(belief, best, &taken, &mut random)?,
+        Method::LineCoSpar => line_cospar(belief, best, pending, &taken, &mut random)?,
         Method::Eubo => match eubo::against(belief, best, &taken) {
             Some(action) => (action, ProposalReason::ExpectedBestUtility),
             None => return Err(LearnerError::Exhausted { actions: space.len() }),
@@ -143,10 +143,14 @@ fn random_untried(space: &SearchSpace, taken: &HashSet<ActionIndex>, random: &mu
 fn line_cospar(
     belief: &Posterior,
     best: ActionIndex,
+    pending: &[ActionIndex],
     taken: &HashSet<ActionIndex>,
     random: &mut Random,
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
+    if belief.settings().repeats {
+        return line_with_repeats(belief, best, pending, random);
+    }
     let suggested: Vec<ActionIndex> =
         belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
     for _ in 0..MAX_LINES {
@@ -167,6 +171,32 @@ fn line_cospar(
         return Ok((chosen, ProposalReason::ThompsonOnLine));
     }
     Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted))
+}
+
+/// The published draw over visited actions and line, repeated until it avoids the buffered and pending ones.
+fn line_with_repeats(
+    belief: &Posterior,
+    best: ActionIndex,
+    pending: &[ActionIndex],
+    random: &mut Random,
+) -> Result<(ActionIndex, ProposalReason)> {
+    let space = belief.space();
+    let model = belief.utility.model();
+    let line: Vec<ActionIndex> =
+        line::through(space, best, random).into_iter().filter(|&a| model.slot(a).is_none()).collect();
+    let levels: Vec<Vec<usize>> = line.iter().map(|&a| space.levels(a)).collect();
+    let buffered: Vec<ActionIndex> =
+        belief.visited().iter().rev().take(belief.settings().buffer).chain(pending).copied().collect();
+    let mut chosen = best;
+    for _ in 0..50 {
+        let (points, others) = belief.utility.draw(&levels, random)?;
+        let all = model.points.iter().zip(&points).chain(line.iter().zip(&others));
+        chosen = all.fold((best, f64::NEG_INFINITY), |top, (&a, &f)| if f > top.1 { (a, f) } else { top }).0;
+        if !buffered.contains(&chosen) {
+            break;
+        }
+    }
+    Ok((chosen, ProposalReason::ThompsonOnLine))
 }
 
 #[cfg(test)]

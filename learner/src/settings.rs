@@ -91,6 +91,8 @@ pub struct LearnerSettings {
     pub tie_width: f64,
     /// Number `n` of actions proposed at a time.
     pub samples_per_iteration: usize,
+    /// Whether LineCoSpar may propose again an action that was tried before the buffered ones, as published.
+    pub repeats: bool,
     /// Number `b` of earlier actions with which a new one is compared.
     pub buffer: usize,
 }
@@ -115,6 +117,7 @@ impl Default for LearnerSettings {
             tie_noise: 0.02,
             tie_width: 0.02,
             samples_per_iteration: 1,
+            repeats: false,
             buffer: 1,
         }
     }
