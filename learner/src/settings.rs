@@ -49,6 +49,18 @@ pub enum Labels {
     Separate,
 }
 
+/// Which earlier actions a new one is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Partner {
+    /// The last ones tried, as many as the buffer holds: what a person on the device remembers.
+    Previous,
+    /// The best one so far.
+    Incumbent,
+    /// Every one: free where the answer is computed.
+    Every,
+}
+
 /// Everything that decides how a log is read and what is proposed next.
 ///
 /// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors.
@@ -93,6 +105,8 @@ pub struct LearnerSettings {
     pub samples_per_iteration: usize,
     /// Whether LineCoSpar may propose again an action that was tried before the buffered ones, as published.
     pub repeats: bool,
+    /// Which earlier actions a new one is compared with.
+    pub partner: Partner,
     /// Number `b` of earlier actions with which a new one is compared.
     pub buffer: usize,
 }
@@ -117,7 +131,8 @@ impl Default for LearnerSettings {
             tie_noise: 0.02,
             tie_width: 0.02,
             samples_per_iteration: 1,
-            repeats: false,
+            repeats: true,
+            partner: Partner::Previous,
             buffer: 1,
         }
     }
