@@ -143,9 +143,13 @@ impl LearnerSettings {
     pub fn of(method: Method) -> Self {
         match method {
             Method::LineCoSpar | Method::Random => Self { method, ..Self::default() },
-            Method::Eubo => {
-                Self { method, inference: Inference::ExpectationPropagation, link: Link::Probit, ..Self::default() }
-            }
+            Method::Eubo => Self {
+                method,
+                inference: Inference::ExpectationPropagation,
+                link: Link::Probit,
+                partner: Partner::Incumbent,
+                ..Self::default()
+            },
         }
     }
 
