@@ -54,7 +54,12 @@ impl GainBound {
 
 /// The action outside `taken` with the highest expected utility of the better of it and `best`, times its
 /// probability of being feasible where that is a function of its own.
-pub(crate) fn against(belief: &Posterior, best: ActionIndex, taken: &HashSet<ActionIndex>) -> Option<ActionIndex> {
+pub(crate) fn against(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    among: Option<&[ActionIndex]>,
+) -> Option<ActionIndex> {
     let space = belief.space();
     let utility = &belief.utility;
     let grid = Grid::new(space, utility);
@@ -86,7 +91,12 @@ pub(crate) fn against(belief: &Posterior, best: ActionIndex, taken: &HashSet<Act
         });
         gain * chance
     };
-    let mut free = vec![true; means.len()];
+    let mut free = vec![among.is_none(); means.len()];
+    for action in among.unwrap_or_default() {
+        if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
+            *free = true;
+        }
+    }
     for action in taken {
         if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
             *free = false;
@@ -189,7 +199,7 @@ mod tests {
                     top = (gain, action);
                 }
             }
-            assert_eq!(against(&belief, best, &taken), Some(top.1));
+            assert_eq!(against(&belief, best, &taken, None), Some(top.1));
         }
     }
 }
