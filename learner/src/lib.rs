@@ -11,6 +11,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod acquisition;
+mod answers;
 mod ask;
 mod belief;
 mod error;
@@ -28,6 +29,7 @@ mod random;
 mod settings;
 mod space;
 
+pub use answers::{Agreement, BestProbability, Marginal, Slice};
 pub use ask::{Question, QuestionReason, comparisons_to_ask, what_to_ask};
 pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};

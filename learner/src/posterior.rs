@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use crate::belief::{Answer, Belief, Chain, Process};
-use crate::error::Result;
+use crate::error::{LearnerError, Result};
 use crate::feedback::{Feedback, FeedbackLog};
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
 use crate::kernel::{Kernel, KernelShape};
@@ -12,7 +12,7 @@ use crate::likelihood::Interval;
 use crate::linalg::{Cholesky, Square};
 use crate::random::Random;
 use crate::settings::{Inference, Labels, LearnerSettings};
-use crate::space::{ActionIndex, SearchSpace};
+use crate::space::{ActionIndex, Dimension, SearchSpace};
 
 /// Mean and standard deviation of the utility of an action.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -29,6 +29,7 @@ pub struct Posterior {
     space: SearchSpace,
     settings: LearnerSettings,
     visited: Vec<ActionIndex>,
+    feedback: Vec<Feedback>,
     pub(crate) utility: Belief,
     /// Present when labels are about a function of their own.
     pub(crate) feasibility: Option<Belief>,
@@ -152,6 +153,7 @@ impl Learner {
             space: space.clone(),
             settings: settings.clone(),
             visited: log.visited.clone(),
+            feedback: log.feedback.clone(),
             utility,
             feasibility,
             infeasible,
@@ -210,15 +212,39 @@ impl Posterior {
         best.map(|(action, _)| action)
     }
 
-    /// One joint draw of the utilities of a few distinct actions.
-    pub(crate) fn draw(&self, actions: &[ActionIndex], random: &mut Random) -> Result<Vec<f64>> {
+    /// Answers given, in order.
+    pub(crate) fn feedback(&self) -> &[Feedback] {
+        &self.feedback
+    }
+
+    /// A dimension of the space by its number.
+    pub(crate) fn dimension(&self, dimension: usize) -> Result<&Dimension> {
+        self.space.dimensions().get(dimension).ok_or_else(|| LearnerError::WrongDimensionCount {
+            given: dimension + 1,
+            expected: self.space.dimensions().len(),
+        })
+    }
+
+    /// What joint draws of the utilities of a few distinct actions need.
+    pub(crate) fn sampler(&self, actions: &[ActionIndex]) -> Result<Sampler> {
         let belief = &self.utility;
         let views: Vec<_> = actions.iter().map(|&a| belief.view(a, self.space.levels(a))).collect();
         let covariance = Square::from_fn(actions.len(), |i, j| {
             belief.covariance(&views[i], &views[j]) + if i == j { belief.kernel.nugget } else { 0.0 }
         });
-        let factor = Cholesky::new(&covariance)?;
-        let noise: Vec<f64> = actions.iter().map(|_| random.normal()).collect();
-        Ok(views.iter().zip(factor.multiply(&noise)).map(|(view, spread)| view.mean + spread).collect())
+        Ok(Sampler { mean: views.iter().map(|v| v.mean).collect(), factor: Cholesky::new(&covariance)? })
+    }
+}
+
+/// Joint draws of the utilities of a few actions.
+pub(crate) struct Sampler {
+    mean: Vec<f64>,
+    factor: Cholesky,
+}
+
+impl Sampler {
+    pub(crate) fn draw(&self, random: &mut Random) -> Vec<f64> {
+        let noise: Vec<f64> = self.mean.iter().map(|_| random.normal()).collect();
+        self.factor.multiply(&noise).iter().zip(&self.mean).map(|(spread, mean)| mean + spread).collect()
     }
 }

@@ -263,7 +263,7 @@ fn line_cospar(
         if candidates.is_empty() {
             continue;
         }
-        let draw = belief.draw(&candidates, random)?;
+        let draw = belief.sampler(&candidates)?.draw(random);
         let (chosen, _) = candidates
             .iter()
             .zip(&draw)
