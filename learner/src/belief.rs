@@ -205,26 +205,19 @@ impl Belief {
         Ok((points, others))
     }
 
-    /// Weights `c` with `Cov(f(x), f(point)) = k(x, points) . c` for every `x` that is not a point.
-    pub(crate) fn covariance_weights(&self, slot: usize) -> Vec<f64> {
+    /// Weights `c` with `Cov(f(x), f(y)) = k(x, y) + k(x, points) . c` for a view of `y` and every other `x`.
+    pub(crate) fn covariance_weights(&self, view: &View) -> Vec<f64> {
         let prior = &self.model().prior;
-        let mut unit = vec![0.0; self.model().points.len()];
-        unit[slot] = 1.0;
-        // K^-1 Sigma e: through the projections of the point itself.
-        let mut row = prior.row(slot).to_vec();
-        row.resize(unit.len(), 0.0);
+        let mut kept = view.right.clone();
         match &self.approximation().spread {
-            Spread::Covariance(covariance) => {
-                let mut column = covariance.row(slot).to_vec();
-                prior.solve(&mut column);
-                column
-            }
             Spread::Precision(factor) => {
-                // Sigma e = L B^-1 L' e, hence K^-1 Sigma e = L'^-1 B^-1 L' e.
-                factor.solve(&mut row);
-                prior.solve_upper(&mut row);
-                row
+                factor.solve_upper(&mut kept);
+                prior.solve_upper(&mut kept);
             }
+            Spread::Covariance(_) => prior.solve(&mut kept),
         }
+        let mut removed = view.prior.clone();
+        prior.solve_upper(&mut removed);
+        kept.iter().zip(removed).map(|(kept, removed)| kept - removed).collect()
     }
 }
