@@ -110,7 +110,7 @@ impl Posterior {
         }
         let view = |action| self.utility.view(action, self.space().levels(action));
         let (mean, variance) = self.utility.difference(&view(a), &view(b));
-        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.settings().preference_noise };
+        let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.preference_noise };
         Ok(self.probability(better, mean, variance))
     }
 

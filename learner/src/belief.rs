@@ -90,6 +90,16 @@ impl Chain {
     }
 }
 
+/// Logarithm of the approximate probability of the answers, all taken at once.
+pub(crate) fn evidence(process: &Process<'_>, answers: &[Answer]) -> Result<f64> {
+    let mut model = Model::default();
+    for answer in answers {
+        model.add(process.space, process.kernel, answer.plus, answer.minus, answer.interval)?;
+    }
+    let approximation = process.method.advance(&model, process.link, None)?;
+    process.method.evidence(&model, process.link, &approximation)
+}
+
 impl State {
     /// No answers.
     fn prior() -> Self {
@@ -101,7 +111,6 @@ impl State {
                 whitened: Vec::new(),
                 factors: Vec::new(),
                 spread: Spread::Covariance(Square::zeros(0)),
-                evidence: 0.0,
             },
         }
     }

@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::belief::{Answer, Belief, Chain, Process};
+use crate::belief::{Answer, Belief, Chain, Process, evidence};
 use crate::error::{LearnerError, Result};
 use crate::feedback::{Feedback, FeedbackLog};
+use crate::hyperparameters::Hyperparameters;
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
 use crate::kernel::{Kernel, KernelShape};
 use crate::likelihood::Interval;
@@ -28,6 +29,8 @@ pub struct Prediction {
 pub struct Posterior {
     space: SearchSpace,
     settings: LearnerSettings,
+    /// The setting, or what was learned in its place.
+    pub(crate) preference_noise: f64,
     visited: Vec<ActionIndex>,
     feedback: Vec<Feedback>,
     pub(crate) utility: Belief,
@@ -45,6 +48,10 @@ pub struct Learner {
     of: Option<(SearchSpace, LearnerSettings)>,
     utility: Chain,
     feasibility: Chain,
+    /// What the chain of the utility was made with.
+    used: Option<Hyperparameters>,
+    /// Learned from these answers.
+    hyperparameters: Option<(Vec<Answer>, Hyperparameters)>,
 }
 
 /// The belief about the utility after the log.
@@ -56,7 +63,12 @@ pub fn posterior(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSetti
 }
 
 /// Answers about the utility and, when labels are separate, about feasibility.
-fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<ActionIndex>) -> [Vec<Answer>; 2] {
+fn answers(
+    log: &FeedbackLog,
+    settings: &LearnerSettings,
+    preference_noise: f64,
+    infeasible: &HashSet<ActionIndex>,
+) -> [Vec<Answer>; 2] {
     let above = |noise| Interval { low: 0.0, high: f64::INFINITY, noise };
     let mut split = [Vec::new(), Vec::new()];
     for &feedback in &log.feedback {
@@ -66,7 +78,7 @@ fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<A
                 let about = usize::from(settings.labels == Labels::Separate);
                 (about, settings.label_interval(category))
             }
-            Feedback::Preference { .. } => (0, above(settings.preference_noise)),
+            Feedback::Preference { .. } => (0, above(preference_noise)),
             Feedback::Suggestion { .. } => (0, above(settings.coactive_noise)),
             Feedback::Tie { .. } => {
                 (0, Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise })
@@ -81,7 +93,7 @@ fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<A
     split
 }
 
-fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape {
+fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings, factors: &[f64]) -> KernelShape {
     let dimensions = space.dimensions();
     KernelShape {
         variance: settings.signal_variance,
@@ -89,7 +101,11 @@ fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape 
         product: 1.0 - settings.additive_share - settings.pairwise_share,
         additive: settings.additive_share,
         pairwise: settings.pairwise_share,
-        lengthscales: dimensions.iter().map(|d| d.lengthscale * settings.lengthscale_factor).collect(),
+        lengthscales: dimensions
+            .iter()
+            .zip(factors)
+            .map(|(d, factor)| d.lengthscale * settings.lengthscale_factor * factor)
+            .collect(),
         broad_lengthscales: dimensions.iter().map(|d| d.range() * settings.broad_lengthscale).collect(),
         relevance: vec![1.0; dimensions.len()],
     }
@@ -102,7 +118,7 @@ fn feasibility_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelS
         additive: settings.feasibility_additive_share,
         pairwise: 0.0,
         lengthscales: space.dimensions().iter().map(|d| d.lengthscale * factor).collect(),
-        ..kernel_shape(space, settings)
+        ..kernel_shape(space, settings, &vec![1.0; space.dimensions().len()])
     }
 }
 
@@ -132,13 +148,19 @@ impl Learner {
                 }
             }
         }
-        let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings)));
         let method: &dyn Approximate = match settings.inference {
             Inference::Laplace => &Laplace,
             Inference::ExpectationPropagation => &ExpectationPropagation::default(),
         };
+        let learned = self.learned(space, log, settings, method, &infeasible)?;
+        if self.used.as_ref() != Some(&learned) {
+            self.utility = Chain::default();
+            self.used = Some(learned.clone());
+        }
+        let preference_noise = settings.preference_noise * learned.preference_noise;
+        let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings, &learned.lengthscales)));
         let process = Process { space, kernel: &kernel, link: settings.link, method };
-        let [about_utility, about_feasibility] = answers(log, settings, &infeasible);
+        let [about_utility, about_feasibility] = answers(log, settings, preference_noise, &infeasible);
         let utility = Belief { kernel: Arc::clone(&kernel), state: self.utility.advance(&process, &about_utility)? };
         let feasibility = match settings.labels {
             Labels::InUtility => None,
@@ -150,6 +172,7 @@ impl Learner {
             }
         };
         Ok(Posterior {
+            preference_noise,
             space: space.clone(),
             settings: settings.clone(),
             visited: log.visited.clone(),
@@ -158,6 +181,45 @@ impl Learner {
             feasibility,
             infeasible,
         })
+    }
+}
+
+impl Learner {
+    /// Factors on lengthscales and noise after the log.
+    fn learned(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        settings: &LearnerSettings,
+        method: &dyn Approximate,
+        infeasible: &HashSet<ActionIndex>,
+    ) -> Result<Hyperparameters> {
+        let tried = settings.learn_every.map_or(0, |every| log.visited.len() / every * every);
+        if tried == 0 {
+            return Ok(Hyperparameters::neutral(space));
+        }
+        let known: HashSet<ActionIndex> = log.visited[..tried].iter().copied().collect();
+        let about_known = |feedback: &&Feedback| {
+            let (first, second) = feedback.actions();
+            known.contains(&first) && second.is_none_or(|second| known.contains(&second))
+        };
+        let feedback = log.feedback.iter().filter(about_known).copied().collect();
+        let log = FeedbackLog { visited: log.visited[..tried].to_vec(), feedback };
+        let [current, _] = answers(&log, settings, settings.preference_noise, infeasible);
+        if let Some((answers, learned)) = &self.hyperparameters
+            && *answers == current
+        {
+            return Ok(learned.clone());
+        }
+        let learned = Hyperparameters::learn(space, |candidate| {
+            let kernel = Kernel::new(space, &kernel_shape(space, settings, &candidate.lengthscales));
+            let process = Process { space, kernel: &kernel, link: settings.link, method };
+            let noise = settings.preference_noise * candidate.preference_noise;
+            let [about_utility, _] = answers(&log, settings, noise, infeasible);
+            evidence(&process, &about_utility)
+        })?;
+        self.hyperparameters = Some((current, learned.clone()));
+        Ok(learned)
     }
 }
 

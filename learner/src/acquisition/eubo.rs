@@ -205,8 +205,12 @@ pub(crate) fn against(
             *free = value;
         }
     };
-    among.unwrap_or_default().iter().for_each(|action| mark(action, true));
-    taken.iter().for_each(|action| mark(action, false));
+    for action in among.unwrap_or_default() {
+        mark(action, true);
+    }
+    for action in taken {
+        mark(action, false);
+    }
     let mut ranked: Vec<(f64, usize)> = (0..free.len()).filter(|&x| free[x]).map(|x| (bound(x), x)).collect();
     let order = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     let mut top: Option<(f64, usize)> = None;

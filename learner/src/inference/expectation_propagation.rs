@@ -198,32 +198,31 @@ impl Approximate for ExpectationPropagation {
             whitened,
             factors: working.factors,
             spread: Spread::Covariance(working.covariance),
-            evidence: f64::NAN,
         })
     }
-}
 
-/// Logarithm of the approximate probability of the answers.
-pub(crate) fn evidence(model: &Model, approximation: &Approximation) -> Result<f64> {
-    let Spread::Covariance(covariance) = &approximation.spread else { return Ok(approximation.evidence) };
-    let working = Working {
-        covariance: covariance.clone(),
-        mean: approximation.mean.clone(),
-        factors: approximation.factors.clone(),
-    };
-    let mut total = 0.0;
-    for (site, &factor) in model.sites.iter().zip(&working.factors) {
-        if let Some(t) = working.tilt(site, factor) {
-            let q = t.cavity_mean * t.cavity_precision + factor.shift;
-            total += t.ln_mass + 0.5 * math::ln_1p(factor.precision / t.cavity_precision)
-                - 0.5
-                    * (q * q / (t.cavity_precision + factor.precision)
-                        - t.cavity_mean * t.cavity_mean * t.cavity_precision);
+    fn evidence(&self, model: &Model, _link: Link, approximation: &Approximation) -> Result<f64> {
+        let Spread::Covariance(covariance) = &approximation.spread else { return Ok(f64::NEG_INFINITY) };
+        let working = Working {
+            covariance: covariance.clone(),
+            mean: approximation.mean.clone(),
+            factors: approximation.factors.clone(),
+        };
+        let mut total = 0.0;
+        for (site, &factor) in model.sites.iter().zip(&working.factors) {
+            if let Some(t) = working.tilt(site, factor) {
+                // The answer's share: its mass under the cavity, less what its normal factor would give.
+                let q = t.cavity_mean * t.cavity_precision + factor.shift;
+                total += t.ln_mass + 0.5 * math::ln_1p(factor.precision / t.cavity_precision)
+                    - 0.5
+                        * (q * q / (t.cavity_precision + factor.precision)
+                            - t.cavity_mean * t.cavity_mean * t.cavity_precision);
+            }
         }
+        let precision = whitened_precision(&model.prior, &model.sites, &working.factors)?;
+        let h = shifts(model.points.len(), &model.sites, &working.factors);
+        Ok(total - 0.5 * precision.ln_determinant() + 0.5 * dot(&h, &working.mean))
     }
-    let precision = whitened_precision(&model.prior, &model.sites, &working.factors)?;
-    let h = shifts(model.points.len(), &model.sites, &working.factors);
-    Ok(total - 0.5 * precision.ln_determinant() + 0.5 * dot(&h, &working.mean))
 }
 
 #[cfg(test)]

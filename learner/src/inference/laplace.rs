@@ -62,18 +62,26 @@ impl Approximate for Laplace {
                 }
                 length *= 0.5;
             }
-            match moved {
-                Some(next) => (v, f, value) = next,
+            let Some(next) = moved else {
                 // At the mode, or no representable decrease is left.
-                None => {
-                    let mut weights = v.clone();
-                    prior.solve_upper(&mut weights);
-                    let evidence = -value - 0.5 * precision.ln_determinant();
-                    let spread = Spread::Precision(precision);
-                    return Ok(Approximation { mean: f, weights, whitened: v, factors, spread, evidence });
-                }
-            }
+                let mut weights = v.clone();
+                prior.solve_upper(&mut weights);
+                return Ok(Approximation {
+                    mean: f,
+                    weights,
+                    whitened: v,
+                    factors,
+                    spread: Spread::Precision(precision),
+                });
+            };
+            (v, f, value) = next;
         }
         Err(LearnerError::Numerical(format!("the posterior's mode was not found in {MAX_STEPS} Newton steps")))
+    }
+
+    fn evidence(&self, model: &Model, link: Link, approximation: &Approximation) -> Result<f64> {
+        let v = &approximation.whitened;
+        let precision = whitened_precision(&model.prior, &model.sites, &approximation.factors)?;
+        Ok(log_likelihood(&model.sites, link, &approximation.mean) - 0.5 * dot(v, v) - 0.5 * precision.ln_determinant())
     }
 }

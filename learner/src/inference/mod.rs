@@ -32,8 +32,6 @@ pub(crate) struct Approximation {
     pub(crate) whitened: Vec<f64>,
     pub(crate) factors: Vec<Factor>,
     pub(crate) spread: Spread,
-    /// Logarithm of the approximate probability of all answers.
-    pub(crate) evidence: f64,
 }
 
 /// The covariance of the approximation, in the form its method has at hand.
@@ -51,6 +49,9 @@ pub(crate) trait Approximate {
     ///
     /// The result is a function of the arguments alone.
     fn advance(&self, model: &Model, link: Link, previous: Option<&Approximation>) -> Result<Approximation>;
+
+    /// Logarithm of the approximate probability of all answers.
+    fn evidence(&self, model: &Model, link: Link, approximation: &Approximation) -> Result<f64>;
 }
 
 impl Spread {
