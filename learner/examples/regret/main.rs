@@ -106,7 +106,7 @@ impl Person<'_> {
 /// Regret after 0, 1, ... comparisons.
 fn run(options: &Options, settings: Option<&LearnerSettings>, seed: u64) -> Result<Vec<f64>, Box<dyn Error>> {
     let problem = Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?;
-    let mut person = Person { problem: &problem, noise: options.noise, random: SplitMix64(seed ^ 0x5EED_0F_A17E) };
+    let mut person = Person { problem: &problem, noise: options.noise, random: SplitMix64(seed ^ 0x005E_ED0F_A17E) };
     let Some(settings) = settings else { return Ok(champion(&problem, &mut person, options.comparisons, seed)) };
     let labelled = problem.converged.iter().any(|c| !c);
     let mut learner = Learner::default();
