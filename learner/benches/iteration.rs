@@ -85,27 +85,27 @@ fn warm(bencher: Bencher, settings: &LearnerSettings, comparisons: usize) {
         .bench_local_refs(|learner| black_box(learner.propose(&space, &log, &[], settings, 7).expect("valid").action));
 }
 
-#[divan::bench(args = [50, 100, 200, 1000], max_time = 5)]
+#[divan::bench(args = [50, 100, 200, 1000], max_time = 2)]
 fn linecospar_warm(bencher: Bencher, comparisons: usize) {
     warm(bencher, &LearnerSettings::of(Method::LineCoSpar), comparisons);
 }
 
-#[divan::bench(args = [50, 100, 200, 1000], max_time = 5)]
+#[divan::bench(args = [50, 100, 200], max_time = 2)]
 fn eubo_published_warm(bencher: Bencher, comparisons: usize) {
     warm(bencher, &LearnerSettings::published(Method::Eubo), comparisons);
 }
 
-#[divan::bench(args = [50, 100, 200, 1000], max_time = 5)]
+#[divan::bench(args = [50, 100, 200, 1000], max_time = 2)]
 fn eubo_warm(bencher: Bencher, comparisons: usize) {
     warm(bencher, &LearnerSettings::of(Method::Eubo), comparisons);
 }
 
-#[divan::bench(args = [50, 200], max_time = 5)]
+#[divan::bench(args = [50, 200], max_time = 2)]
 fn thompson_warm(bencher: Bencher, comparisons: usize) {
     warm(bencher, &LearnerSettings::of(Method::Thompson), comparisons);
 }
 
-#[divan::bench(args = [50, 200], max_time = 5)]
+#[divan::bench(args = [50, 200], max_time = 2)]
 fn eubo_cold(bencher: Bencher, comparisons: usize) {
     let space = space();
     let log = study(&space, comparisons);
@@ -113,7 +113,7 @@ fn eubo_cold(bencher: Bencher, comparisons: usize) {
     bencher.bench_local(|| black_box(gait_learner::propose(&space, &log, &[], &settings, 7).expect("valid").action));
 }
 
-#[divan::bench(args = [50, 200], max_time = 5)]
+#[divan::bench(args = [50, 200], max_time = 2)]
 fn page_of_answers(bencher: Bencher, comparisons: usize) {
     let space = space();
     let log = study(&space, comparisons);

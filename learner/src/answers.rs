@@ -173,7 +173,7 @@ impl Posterior {
                     model.levels.iter().map(|point| belief.kernel.average_with(&profile, point)).collect();
                 let mean = dot(&column, &belief.approximation().weights);
                 model.prior.solve_lower(&mut column);
-                let (left, right) = belief.approximation().spread.project(&model.prior, &column);
+                let (left, right) = belief.approximation().project(&model.prior, &column);
                 let variance = belief.kernel.average_variance(&profile) - dot(&column, &column) + dot(&left, &right);
                 Ok(Marginal {
                     value: chosen.values[level],

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::inference::{Approximate, Approximation, Spread};
+use crate::inference::{Approximate, Approximation};
 use crate::kernel::Kernel;
 use crate::likelihood::Interval;
 use crate::linalg::{Cholesky, Square, dot};
@@ -110,7 +110,7 @@ impl State {
                 weights: Vec::new(),
                 whitened: Vec::new(),
                 factors: Vec::new(),
-                spread: Spread::Covariance(Square::zeros(0)),
+                covariance: Square::zeros(0),
             },
         }
     }
@@ -160,7 +160,7 @@ impl Belief {
         let mean =
             slot.map_or_else(|| dot(&prior, &self.approximation().weights), |slot| self.approximation().mean[slot]);
         model.prior.solve_lower(&mut prior);
-        let (left, right) = self.approximation().spread.project(&model.prior, &prior);
+        let (left, right) = self.approximation().project(&model.prior, &prior);
         View { levels, slot, prior, left, right, mean }
     }
 
@@ -183,16 +183,10 @@ impl Belief {
     /// A joint draw of the utilities of all points, and of some actions that are not points.
     pub(crate) fn draw(&self, others: &[Vec<usize>], random: &mut Random) -> Result<(Vec<f64>, Vec<f64>)> {
         let model = self.model();
-        let mut noise: Vec<f64> = model.points.iter().map(|_| random.normal()).collect();
-        let spread = match &self.approximation().spread {
-            Spread::Precision(factor) => {
-                factor.solve_upper(&mut noise);
-                model.prior.multiply(&noise)
-            }
-            Spread::Covariance(covariance) => {
-                Cholesky::new(&covariance.ridged(1e-9 * self.kernel.variance))?.multiply(&noise)
-            }
-        };
+        let noise: Vec<f64> = model.points.iter().map(|_| random.normal()).collect();
+        // Rounding may leave the covariance a hair short of positive.
+        let covariance = self.approximation().covariance.ridged(1e-9 * self.kernel.variance);
+        let spread = Cholesky::new(&covariance)?.multiply(&noise);
         let points: Vec<f64> = self.approximation().mean.iter().zip(spread).map(|(m, s)| m + s).collect();
         let mut whitened_draw = points.clone();
         model.prior.solve_lower(&mut whitened_draw);
@@ -218,13 +212,7 @@ impl Belief {
     pub(crate) fn covariance_weights(&self, view: &View) -> Vec<f64> {
         let prior = &self.model().prior;
         let mut kept = view.right.clone();
-        match &self.approximation().spread {
-            Spread::Precision(factor) => {
-                factor.solve_upper(&mut kept);
-                prior.solve_upper(&mut kept);
-            }
-            Spread::Covariance(_) => prior.solve(&mut kept),
-        }
+        prior.solve(&mut kept);
         let mut removed = view.prior.clone();
         prior.solve_upper(&mut removed);
         kept.iter().zip(removed).map(|(kept, removed)| kept - removed).collect()

@@ -152,7 +152,7 @@ impl<'a> Grid<'a> {
             }
             model.prior.solve_lower_block(&mut block);
             let explained = crate::linalg::block_dots(&block, &block);
-            let kept = self.belief.approximation().spread.block_variances(&model.prior, block);
+            let kept = self.belief.approximation().block_variances(&model.prior, block);
             variances.extend((0..chunk.len()).map(|lane| (total - explained[lane] + kept[lane]).max(0.0)));
         }
         variances

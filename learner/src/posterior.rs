@@ -93,7 +93,7 @@ fn answers(
     split
 }
 
-fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings, factors: &[f64]) -> KernelShape {
+pub(crate) fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings, factors: &[f64]) -> KernelShape {
     let dimensions = space.dimensions();
     KernelShape {
         variance: settings.signal_variance,
