@@ -257,7 +257,7 @@ mod tests {
     use crate::feedback::{Feedback, FeedbackLog};
     use crate::posterior::posterior;
     use crate::random::Random;
-    use crate::settings::{LearnerSettings, Method};
+    use crate::settings::{Labels, LearnerSettings, Method};
     use crate::space::Dimension;
 
     #[test]
@@ -268,11 +268,12 @@ mod tests {
             .map(|(d, &n)| Dimension { name: d.to_string(), values: (0..n).map(f64::from).collect(), lengthscale: 1.3 })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();
-        for (shares, seed) in [((0.0, 0.0), 1), ((0.3, 0.3), 2), ((0.0, 0.0), 3), ((0.5, 0.0), 4)] {
+        for (shares, seed) in [((0.0, 0.0), 1), ((0.3, 0.3), 2), ((0.0, 0.0), 3), ((0.5, 0.0), 4), ((0.3, 0.2), 5)] {
             let settings = LearnerSettings {
                 additive_share: shares.0,
                 pairwise_share: shares.1,
-                ..LearnerSettings::of(Method::Eubo)
+                labels: if seed % 2 == 1 { Labels::Separate } else { Labels::InUtility },
+                ..LearnerSettings::published(Method::Eubo)
             };
             let mut random = Random::new(seed, 0);
             let mut log = FeedbackLog::default();
@@ -295,7 +296,11 @@ mod tests {
             for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(a)) {
                 let (mean, variance) =
                     belief.utility.difference(&belief.utility.view(action, space.levels(action)), &incumbent);
-                let gain = expected_gain(mean, variance);
+                let chance = belief.feasibility.as_ref().map_or(1.0, |feasibility| {
+                    let view = feasibility.view(action, space.levels(action));
+                    math::normal_cdf(view.mean / feasibility.variance(&view).sqrt())
+                });
+                let gain = expected_gain(mean, variance) * chance;
                 if gain > top.0 {
                     top = (gain, action);
                 }

@@ -60,11 +60,7 @@ impl Approximate for ExpectationPropagation {
     }
 
     fn evidence(&self, model: &Model, _link: Link, approximation: &Approximation) -> Result<f64> {
-        let working = Working {
-            covariance: approximation.covariance.clone(),
-            mean: approximation.mean.clone(),
-            factors: approximation.factors.clone(),
-        };
+        let working = Working::of(approximation);
         let mut total = 0.0;
         for (site, &factor) in model.sites.iter().zip(&working.factors) {
             if let Some(cavity) = working.cavity(site, factor) {
@@ -95,7 +91,7 @@ mod tests {
         let space =
             SearchSpace::new(vec![Dimension { name: "x".into(), values: vec![0.0, 1.0], lengthscale: 1.0 }]).unwrap();
         let settings =
-            LearnerSettings { preference_noise: 0.3, ordinal_noise: 0.4, ..LearnerSettings::of(Method::Eubo) };
+            LearnerSettings { preference_noise: 0.3, ordinal_noise: 0.4, ..LearnerSettings::published(Method::Eubo) };
         let (a, b) = (ActionIndex(0), ActionIndex(1));
         let log = FeedbackLog {
             visited: vec![a, b],

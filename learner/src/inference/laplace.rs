@@ -21,7 +21,7 @@ const MAX_STEPS: usize = 200;
 /// Squared Newton decrement (the squared distance to the mode in posterior standard deviations) that is accepted.
 const DECREMENT: f64 = 1e-10;
 /// Change of a factor, in posterior standard deviations and relative variances, that is left undone.
-const TOLERANCE: f64 = 1e-4;
+const TOLERANCE: f64 = 1e-3;
 /// Passes over the answers before Newton's method takes over.
 const SWEEPS: usize = 20;
 
@@ -30,7 +30,7 @@ struct ModeAlong(Link);
 
 impl Match for ModeAlong {
     fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor> {
-        let at = |d: f64| site.interval.log_likelihood(self.0, d);
+        let at = |d: f64| site.interval.derivatives(self.0, d);
         // The slope of the log likelihood falls with d, so the mode lies between the cavity's mean and one full step.
         let reach = cavity.mean + at(cavity.mean).slope / cavity.precision;
         let (mut low, mut high) = (cavity.mean.min(reach), cavity.mean.max(reach));
@@ -57,7 +57,7 @@ impl Match for ModeAlong {
     }
 
     fn settled(&self, site: &Site, present: Factor, mean: f64, variance: f64) -> bool {
-        let here = site.interval.log_likelihood(self.0, mean);
+        let here = site.interval.derivatives(self.0, mean);
         let force = present.shift - present.precision * mean - here.slope;
         (force * variance.sqrt()).abs() < 0.5 * TOLERANCE
             && ((present.precision - here.curvature) * variance).abs() < 0.5 * TOLERANCE
@@ -190,7 +190,7 @@ mod tests {
                     largest[1] = largest[1].max(difference.abs());
                 }
             }
-            assert!(largest[0] < 1e-3 && largest[1] < 1e-3, "{link:?} {noise}: {largest:?}");
+            assert!(largest[0] < 5e-3 && largest[1] < 5e-3, "{link:?} {noise}: {largest:?}");
         }
     }
 }

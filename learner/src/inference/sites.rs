@@ -30,27 +30,68 @@ pub(super) trait Match {
 /// Cavities with less than this share of the marginal's precision are left alone.
 const MIN_CAVITY: f64 = 1e-10;
 
+/// Changes of the covariance that are applied in one pass over it.
+const DELAYED: usize = 16;
+
 /// The normal distribution being improved.
 pub(super) struct Working {
-    pub(super) covariance: Square,
+    /// The covariance, less the changes not applied yet.
+    covariance: Square,
+    /// Changes `a x x'` not applied yet: while they are few, adding them to what is read costs less.
+    delayed: Vec<(f64, Vec<f64>)>,
     pub(super) mean: Vec<f64>,
     pub(super) factors: Vec<Factor>,
 }
 
-fn variance(site: &Site, covariance: &Square) -> f64 {
-    let at = covariance.at(site.plus, site.plus);
-    site.minus.map_or(at, |m| at + covariance.at(m, m) - 2.0 * covariance.at(site.plus, m))
-}
-
 impl Working {
+    /// The distribution of an approximation.
+    pub(super) fn of(approximation: &Approximation) -> Self {
+        Self {
+            covariance: approximation.covariance.clone(),
+            delayed: Vec::new(),
+            mean: approximation.mean.clone(),
+            factors: approximation.factors.clone(),
+        }
+    }
+
+    fn variance(&self, site: &Site) -> f64 {
+        let c = &self.covariance;
+        let at = c.at(site.plus, site.plus);
+        let applied = site.minus.map_or(at, |m| at + c.at(m, m) - 2.0 * c.at(site.plus, m));
+        self.delayed.iter().fold(applied, |sum, (a, x)| {
+            let along = site.of(x);
+            sum + a * along * along
+        })
+    }
+
+    /// Covariances of a site's functional with the points.
+    fn column(&self, site: &Site) -> Vec<f64> {
+        let mut column = self.covariance.row(site.plus).to_vec();
+        if let Some(minus) = site.minus {
+            add_scaled(&mut column, -1.0, self.covariance.row(minus));
+        }
+        for (a, x) in &self.delayed {
+            add_scaled(&mut column, a * site.of(x), x);
+        }
+        column
+    }
+
+    fn apply_delayed(&mut self) {
+        self.covariance.add_rank_ones(&self.delayed);
+        self.delayed.clear();
+    }
+
     /// The previous distribution with the new points added, each given the others; new answers have no factor yet.
     pub(super) fn extend(model: &Model, previous: Option<&Approximation>) -> Self {
         let n = model.prior.order();
         let mut working = match previous {
-            Some(Approximation { mean, factors, covariance, .. }) => {
-                Self { covariance: covariance.grown(n - mean.len()), mean: mean.clone(), factors: factors.clone() }
-            }
-            None => Self { covariance: Square::zeros(n), mean: Vec::new(), factors: Vec::new() },
+            Some(Approximation { mean, factors, covariance, .. }) => Self {
+                covariance: covariance.grown(n - mean.len()),
+                delayed: Vec::new(),
+                mean: mean.clone(),
+                factors: factors.clone(),
+            },
+            None => Self { covariance: Square::zeros(n), delayed: Vec::new(), mean: Vec::new(), factors: Vec::new() },
         };
         let old = working.mean.len();
         working.mean.resize(n, 0.0);
@@ -73,7 +114,7 @@ impl Working {
     }
 
     pub(super) fn cavity(&self, site: &Site, factor: Factor) -> Option<Cavity> {
-        let variance = variance(site, &self.covariance);
+        let variance = self.variance(site);
         if variance.is_nan() || variance < 1e-14 {
             return None;
         }
@@ -85,7 +126,7 @@ impl Working {
     /// Replaces one factor if the change is worth it: in posterior standard deviations and relative variance.
     fn replace(&mut self, index: usize, site: &Site, method: &dyn Match, tolerance: f64) -> bool {
         let old = self.factors[index];
-        let (mean, spread) = (site.of(&self.mean), variance(site, &self.covariance));
+        let (mean, spread) = (site.of(&self.mean), self.variance(site));
         if tolerance > 0.0 && method.settled(site, old, mean, spread) {
             return false;
         }
@@ -96,12 +137,12 @@ impl Working {
         if (move_by * spread.sqrt()).abs() < tolerance && (more_precision * spread * gain).abs() < tolerance {
             return false;
         }
-        let mut column = self.covariance.row(site.plus).to_vec();
-        if let Some(minus) = site.minus {
-            add_scaled(&mut column, -1.0, self.covariance.row(minus));
-        }
+        let column = self.column(site);
         add_scaled(&mut self.mean, move_by, &column);
-        self.covariance.add_rank_one(-more_precision * gain, &column);
+        self.delayed.push((-more_precision * gain, column));
+        if self.delayed.len() == DELAYED {
+            self.apply_delayed();
+        }
         self.factors[index] = new;
         true
     }
@@ -118,22 +159,25 @@ impl Working {
         for (index, site) in sites.iter().enumerate().skip(first_new) {
             self.replace(index, site, method, 0.0);
         }
+        let mut settled = false;
         for _ in 0..sweeps {
-            let mut changed = false;
+            settled = true;
             for (index, site) in sites.iter().enumerate() {
-                changed |= self.replace(index, site, method, tolerance);
+                settled &= !self.replace(index, site, method, tolerance);
             }
-            if !changed {
-                return true;
+            if settled {
+                break;
             }
         }
-        false
+        self.apply_delayed();
+        settled
     }
 
     /// Computes covariance and mean from the factors.
     pub(super) fn refresh(&mut self, prior: &Cholesky, sites: &[Site]) -> Result<()> {
         let precision = whitened_precision(prior, sites, &self.factors)?;
         self.covariance = covariance(prior, &precision);
+        self.delayed.clear();
         self.mean = self.covariance.multiply(&shifts(prior.order(), sites, &self.factors));
         Ok(())
     }
