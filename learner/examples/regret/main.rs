@@ -1,0 +1,183 @@
+//! Simple regret of a method over seeded benchmark problems.
+//!
+//! ```text
+//! cargo run --release -p gait-learner --example regret -- --problem table1|hart3|hart6 --seeds A..B --method NAME
+//!     --comparisons N [--noise S] [--lengthscale L] [--set '{"setting": value}'] --out FILE.csv
+//! ```
+//!
+//! Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the
+//! quartiles. `--noise S` answers with logistic noise of scale `S` on the utility. `--set` changes settings of the
+//! method. Regret is 1 minus the utility of the recommended action.
+
+#![allow(clippy::expect_used, unreachable_pub, missing_docs)]
+
+mod problems;
+
+use std::error::Error;
+use std::io::Write;
+use std::time::Instant;
+
+use gait_learner::{ActionIndex, Feedback, FeedbackLog, Learner, LearnerSettings};
+use problems::{Problem, SplitMix64};
+
+struct Options {
+    problem: String,
+    seeds: std::ops::Range<u64>,
+    method: String,
+    comparisons: usize,
+    noise: f64,
+    lengthscale: Option<f64>,
+    set: serde_json::Map<String, serde_json::Value>,
+    out: Option<String>,
+}
+
+fn options() -> Result<Options, Box<dyn Error>> {
+    let mut options = Options {
+        problem: "table1".into(),
+        seeds: 200..400,
+        method: "linecospar".into(),
+        comparisons: 50,
+        noise: 0.0,
+        lengthscale: None,
+        set: serde_json::Map::new(),
+        out: None,
+    };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        let value = arguments.next().ok_or_else(|| format!("{name} needs a value"))?;
+        match name.as_str() {
+            "--problem" => options.problem = value,
+            "--seeds" => {
+                let (from, to) = value.split_once("..").ok_or("--seeds needs A..B")?;
+                options.seeds = from.parse()?..to.parse()?;
+            }
+            "--method" => options.method = value,
+            "--comparisons" => options.comparisons = value.parse()?,
+            "--noise" => options.noise = value.parse()?,
+            "--lengthscale" => options.lengthscale = Some(value.parse()?),
+            "--set" => options.set = serde_json::from_str(&value)?,
+            "--out" => options.out = Some(value),
+            _ => return Err(format!("unknown option {name}").into()),
+        }
+    }
+    Ok(options)
+}
+
+/// The settings of a method with the changes asked for.
+fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
+    let method = serde_json::from_value(options.method.clone().into())?;
+    let serde_json::Value::Object(mut document) = serde_json::to_value(LearnerSettings::of(method))? else {
+        return Err("settings are an object".into());
+    };
+    document.extend(options.set.clone());
+    Ok(serde_json::from_value(document.into())?)
+}
+
+/// Somebody who knows the utility and answers with noise.
+struct Person<'a> {
+    problem: &'a Problem,
+    noise: f64,
+    random: SplitMix64,
+}
+
+impl Person<'_> {
+    /// Which of two is better; nothing when neither converges or they are equal.
+    fn compare(&mut self, a: ActionIndex, b: ActionIndex) -> Option<Feedback> {
+        let ((ua, ca), (ub, cb)) = (self.problem.of(a), self.problem.of(b));
+        let first = match (ca, cb) {
+            (false, false) => return None,
+            (true, false) => true,
+            (false, true) => false,
+            (true, true) if self.noise > 0.0 => self.random.unit() < 1.0 / (1.0 + (-(ua - ub) / self.noise).exp()),
+            (true, true) if ua == ub => return None,
+            (true, true) => ua > ub,
+        };
+        let (winner, loser) = if first { (a, b) } else { (b, a) };
+        Some(Feedback::Preference { winner, loser })
+    }
+}
+
+/// Regret after 0, 1, ... comparisons.
+fn run(options: &Options, settings: Option<&LearnerSettings>, seed: u64) -> Result<Vec<f64>, Box<dyn Error>> {
+    let problem = Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?;
+    let mut person = Person { problem: &problem, noise: options.noise, random: SplitMix64(seed ^ 0x5EED_0F_A17E) };
+    let Some(settings) = settings else { return Ok(champion(&problem, &mut person, options.comparisons, seed)) };
+    let labelled = problem.converged.iter().any(|c| !c);
+    let mut learner = Learner::default();
+    let mut log = FeedbackLog::default();
+    let mut regrets = Vec::new();
+    while regrets.len() <= options.comparisons {
+        let proposal = learner.propose(&problem.space, &log, &[], settings, seed)?;
+        let action = proposal.action;
+        let questions = learner.comparisons_to_ask(&problem.space, &log, action, settings)?;
+        if labelled {
+            log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
+        }
+        log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
+        log.visited.push(action);
+        let best = learner.posterior(&problem.space, &log, settings)?.best().ok_or("nothing was tried")?;
+        regrets.push(1.0 - problem.of(best).0);
+    }
+    Ok(regrets)
+}
+
+/// Random search: the winner stays.
+fn champion(problem: &Problem, person: &mut Person<'_>, comparisons: usize, seed: u64) -> Vec<f64> {
+    let mut random = SplitMix64(seed.wrapping_mul(31).wrapping_add(7));
+    let mut draw = || ActionIndex(random.below(problem.utility.len()) as u64);
+    let mut champion = draw();
+    let mut regrets = vec![1.0 - problem.of(champion).0];
+    for _ in 0..comparisons {
+        let challenger = draw();
+        match person.compare(challenger, champion) {
+            Some(Feedback::Preference { winner, .. }) => champion = winner,
+            _ if !problem.of(champion).1 => champion = challenger,
+            _ => {}
+        }
+        regrets.push(1.0 - problem.of(champion).0);
+    }
+    regrets
+}
+
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let at = share * (sorted.len() - 1) as f64;
+    let (below, weight) = (at.floor(), at.fract());
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let i = below as usize;
+    sorted[i] + weight * (sorted[(i + 1).min(sorted.len() - 1)] - sorted[i])
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = options()?;
+    let settings = if options.method == "random" { None } else { Some(settings(&options)?) };
+    let mut out = options.out.as_ref().map(std::fs::File::create).transpose()?;
+    if let Some(out) = &mut out {
+        writeln!(out, "method,seed,k,regret")?;
+    }
+    let start = Instant::now();
+    let mut curves = Vec::new();
+    for seed in options.seeds.clone() {
+        let regrets = run(&options, settings.as_ref(), seed)?;
+        if let Some(out) = &mut out {
+            for (k, regret) in regrets.iter().enumerate() {
+                writeln!(out, "{},{seed},{k},{regret:.6}", options.method)?;
+            }
+        }
+        curves.push(regrets);
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    for k in [10, 20, 30, 50, 75, 100].into_iter().filter(|&k| k <= options.comparisons) {
+        let mut at: Vec<f64> = curves.iter().map(|c| c[k]).collect();
+        at.sort_by(f64::total_cmp);
+        let mean = at.iter().sum::<f64>() / at.len() as f64;
+        print!(
+            "k={k}: {:.3} [{:.3}, {:.3}] mean {mean:.3}   ",
+            quantile(&at, 0.5),
+            quantile(&at, 0.25),
+            quantile(&at, 0.75)
+        );
+    }
+    let trials = curves.len() * (options.comparisons + 1);
+    println!("{} runs, {:.2} ms a trial", curves.len(), 1e3 * seconds / trials.max(1) as f64);
+    Ok(())
+}

@@ -1,0 +1,195 @@
+//! One Gaussian process after its answers, and the chain of approximations that leads to it.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::inference::{Approximate, Approximation};
+use crate::kernel::Kernel;
+use crate::likelihood::Interval;
+use crate::linalg::dot;
+use crate::model::Model;
+use crate::settings::Link;
+use crate::space::{ActionIndex, SearchSpace};
+
+/// An answer before it is attached to points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Answer {
+    pub(crate) plus: ActionIndex,
+    pub(crate) minus: Option<ActionIndex>,
+    pub(crate) interval: Interval,
+}
+
+/// Points, answers and their approximation.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub(crate) model: Model,
+    pub(crate) approximation: Approximation,
+}
+
+/// How a process is approximated.
+pub(crate) struct Process<'a> {
+    pub(crate) space: &'a SearchSpace,
+    pub(crate) kernel: &'a Kernel,
+    pub(crate) link: Link,
+    pub(crate) method: &'a dyn Approximate,
+}
+
+/// The two newest links of a chain: what the next answer will start from.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Chain {
+    answers: Vec<Answer>,
+    base: Option<(usize, Arc<State>)>,
+    tip: Option<(usize, Arc<State>)>,
+}
+
+impl Chain {
+    /// The state after the answers.
+    ///
+    /// It is defined by a chain: the answers are cut into groups, a group beginning with each answer that speaks of a
+    /// new action, and each group is approximated from the group before it. What an earlier call left behind only
+    /// shortens the chain: the links are the same.
+    pub(crate) fn advance(&mut self, process: &Process<'_>, answers: &[Answer]) -> Result<Arc<State>> {
+        let same = answers.iter().zip(&self.answers).take_while(|(a, b)| a == b).count();
+        let opens = |state: &State, at: usize| {
+            answers.get(at).is_none_or(|answer| {
+                state.model.slot(answer.plus).is_none()
+                    || answer.minus.is_some_and(|minus| state.model.slot(minus).is_none())
+            })
+        };
+        let usable =
+            |link: &Option<(usize, Arc<State>)>| link.clone().filter(|(end, state)| *end <= same && opens(state, *end));
+        let (mut end, mut state) = match usable(&self.tip).or_else(|| usable(&self.base)) {
+            Some((end, state)) => (end, Some(state)),
+            None => (0, None),
+        };
+        self.answers = answers.to_vec();
+        let mut before = self.base.take().filter(|(base, _)| *base < end);
+        while end < answers.len() || state.is_none() {
+            let mut model = state.as_ref().map_or_else(Model::default, |s| s.model.clone());
+            let mut next = end;
+            while let Some(answer) = answers.get(next) {
+                let new =
+                    model.slot(answer.plus).is_none() || answer.minus.is_some_and(|minus| model.slot(minus).is_none());
+                if next > end && new {
+                    break;
+                }
+                model.add(process.space, process.kernel, answer.plus, answer.minus, answer.interval)?;
+                next += 1;
+            }
+            let previous = state.as_ref().map(|s| &s.approximation);
+            let approximation = process.method.advance(&model, process.link, previous)?;
+            before = state.map(|state| (end, state));
+            state = Some(Arc::new(State { model, approximation }));
+            end = next;
+        }
+        let state = state.unwrap_or_else(|| Arc::new(State::prior()));
+        self.base = before;
+        self.tip = Some((end, Arc::clone(&state)));
+        Ok(state)
+    }
+}
+
+impl State {
+    /// No answers.
+    fn prior() -> Self {
+        Self {
+            model: Model::default(),
+            approximation: Approximation {
+                mean: Vec::new(),
+                weights: Vec::new(),
+                whitened: Vec::new(),
+                factors: Vec::new(),
+                spread: crate::inference::Spread::Covariance(crate::linalg::Square::zeros(0)),
+                evidence: 0.0,
+            },
+        }
+    }
+}
+
+/// A normal belief about a function of the actions.
+#[derive(Debug, Clone)]
+pub(crate) struct Belief {
+    pub(crate) kernel: Arc<Kernel>,
+    pub(crate) state: Arc<State>,
+}
+
+/// An action seen from the points.
+pub(crate) struct View {
+    levels: Vec<usize>,
+    slot: Option<usize>,
+    /// Whitened prior covariances with the points.
+    prior: Vec<f64>,
+    left: Vec<f64>,
+    right: Vec<f64>,
+    pub(crate) mean: f64,
+}
+
+impl Belief {
+    pub(crate) fn model(&self) -> &Model {
+        &self.state.model
+    }
+
+    pub(crate) fn approximation(&self) -> &Approximation {
+        &self.state.approximation
+    }
+
+    pub(crate) fn mean(&self, action: ActionIndex, levels: &[usize]) -> f64 {
+        match self.model().slot(action) {
+            Some(slot) => self.approximation().mean[slot],
+            None => dot(&self.kernel.column(levels, &self.model().levels), &self.approximation().weights),
+        }
+    }
+
+    pub(crate) fn view(&self, action: ActionIndex, levels: Vec<usize>) -> View {
+        let model = self.model();
+        let slot = model.slot(action);
+        let mut prior = self.kernel.column(&levels, &model.levels);
+        if let Some(slot) = slot {
+            prior[slot] += self.kernel.nugget;
+        }
+        let mean =
+            slot.map_or_else(|| dot(&prior, &self.approximation().weights), |slot| self.approximation().mean[slot]);
+        model.prior.solve_lower(&mut prior);
+        let (left, right) = self.approximation().spread.project(&model.prior, &prior);
+        View { levels, slot, prior, left, right, mean }
+    }
+
+    pub(crate) fn covariance(&self, a: &View, b: &View) -> f64 {
+        let same = a.slot.is_some() && a.slot == b.slot;
+        let prior = self.kernel.covariance(&a.levels, &b.levels) + if same { self.kernel.nugget } else { 0.0 };
+        prior - dot(&a.prior, &b.prior) + dot(&a.left, &b.right)
+    }
+
+    pub(crate) fn variance(&self, a: &View) -> f64 {
+        self.covariance(a, a).max(0.0)
+    }
+
+    /// Mean and variance of the difference of two actions.
+    pub(crate) fn difference(&self, a: &View, b: &View) -> (f64, f64) {
+        let variance = self.covariance(a, a) + self.covariance(b, b) - 2.0 * self.covariance(a, b);
+        (a.mean - b.mean, variance.max(0.0))
+    }
+
+    /// Weights `c` with `Cov(f(x), f(point)) = k(x, points) . c` for every `x` that is not a point.
+    pub(crate) fn covariance_weights(&self, slot: usize) -> Vec<f64> {
+        let prior = &self.model().prior;
+        let mut unit = vec![0.0; self.model().points.len()];
+        unit[slot] = 1.0;
+        // K^-1 Sigma e: through the projections of the point itself.
+        let mut row = prior.row(slot).to_vec();
+        row.resize(unit.len(), 0.0);
+        match &self.approximation().spread {
+            crate::inference::Spread::Covariance(covariance) => {
+                let mut column = covariance.row(slot).to_vec();
+                prior.solve(&mut column);
+                column
+            }
+            crate::inference::Spread::Precision(factor) => {
+                // Sigma e = L B^-1 L' e, hence K^-1 Sigma e = L'^-1 B^-1 L' e.
+                factor.solve(&mut row);
+                prior.solve_upper(&mut row);
+                row
+            }
+        }
+    }
+}

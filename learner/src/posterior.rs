@@ -1,0 +1,214 @@
+//! The belief about the utility after a log, and the questions it answers.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use crate::belief::{Answer, Belief, Chain, Process};
+use crate::error::Result;
+use crate::feedback::{Feedback, FeedbackLog};
+use crate::inference::{Approximate, ExpectationPropagation, Laplace};
+use crate::kernel::{Kernel, KernelShape};
+use crate::likelihood::Interval;
+use crate::linalg::{Cholesky, Square};
+use crate::random::Random;
+use crate::settings::{Inference, Labels, LearnerSettings};
+use crate::space::{ActionIndex, SearchSpace};
+
+/// Mean and standard deviation of the utility of an action.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Prediction {
+    /// Posterior mean.
+    pub mean: f64,
+    /// Posterior standard deviation.
+    pub standard_deviation: f64,
+}
+
+/// A normal belief about the utility of every action.
+#[derive(Debug, Clone)]
+pub struct Posterior {
+    space: SearchSpace,
+    settings: LearnerSettings,
+    visited: Vec<ActionIndex>,
+    pub(crate) utility: Belief,
+    /// Present when labels are about a function of their own.
+    pub(crate) feasibility: Option<Belief>,
+    /// Actions whose last label is the lowest category.
+    pub(crate) infeasible: HashSet<ActionIndex>,
+}
+
+/// Remembers the last posterior of a study, so that the next one costs an update instead of a new start.
+///
+/// It never changes a result: every call gives bit for bit what [`posterior`] gives.
+#[derive(Debug, Clone, Default)]
+pub struct Learner {
+    of: Option<(SearchSpace, LearnerSettings)>,
+    utility: Chain,
+    feasibility: Chain,
+}
+
+/// The belief about the utility after the log.
+///
+/// # Errors
+/// When a setting is out of range or the log does not fit the space.
+pub fn posterior(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) -> Result<Posterior> {
+    Learner::default().posterior(space, log, settings)
+}
+
+/// Answers about the utility and, when labels are separate, about feasibility.
+fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<ActionIndex>) -> [Vec<Answer>; 2] {
+    let above = |noise| Interval { low: 0.0, high: f64::INFINITY, noise };
+    let mut split = [Vec::new(), Vec::new()];
+    for &feedback in &log.feedback {
+        let (plus, minus) = feedback.actions();
+        let (about, interval) = match feedback {
+            Feedback::Label { category, .. } => {
+                let bounds = &settings.ordinal_thresholds;
+                let low = if category == 0 { f64::NEG_INFINITY } else { bounds[category - 1] };
+                let high = bounds.get(category).copied().unwrap_or(f64::INFINITY);
+                let about = usize::from(settings.labels == Labels::Separate);
+                (about, Interval { low, high, noise: settings.ordinal_noise })
+            }
+            Feedback::Preference { .. } => (0, above(settings.preference_noise)),
+            Feedback::Suggestion { .. } => (0, above(settings.coactive_noise)),
+            Feedback::Tie { .. } => {
+                (0, Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise })
+            }
+        };
+        let decided = settings.labels == Labels::Separate
+            && minus.is_some_and(|minus| infeasible.contains(&plus) != infeasible.contains(&minus));
+        if !decided {
+            split[about].push(Answer { plus, minus, interval });
+        }
+    }
+    split
+}
+
+fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape {
+    let dimensions = space.dimensions();
+    KernelShape {
+        variance: settings.signal_variance,
+        nugget: settings.nugget,
+        product: 1.0 - settings.additive_share - settings.pairwise_share,
+        additive: settings.additive_share,
+        pairwise: settings.pairwise_share,
+        lengthscales: dimensions.iter().map(|d| d.lengthscale * settings.lengthscale_factor).collect(),
+        broad_lengthscales: dimensions.iter().map(|d| d.range() * settings.broad_lengthscale).collect(),
+        relevance: vec![1.0; dimensions.len()],
+    }
+}
+
+impl Learner {
+    /// As [`posterior`].
+    ///
+    /// # Errors
+    /// As [`posterior`].
+    pub fn posterior(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        settings: &LearnerSettings,
+    ) -> Result<Posterior> {
+        settings.validate()?;
+        log.validate(space, settings.categories())?;
+        if !self.of.as_ref().is_some_and(|(s, t)| s == space && t == settings) {
+            *self = Self { of: Some((space.clone(), settings.clone())), ..Self::default() };
+        }
+        let mut infeasible = HashSet::new();
+        for &feedback in &log.feedback {
+            if let Feedback::Label { action, category } = feedback {
+                if category == 0 && settings.categories() > 1 {
+                    infeasible.insert(action);
+                } else {
+                    infeasible.remove(&action);
+                }
+            }
+        }
+        let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings)));
+        let method: &dyn Approximate = match settings.inference {
+            Inference::Laplace => &Laplace,
+            Inference::ExpectationPropagation => &ExpectationPropagation::default(),
+        };
+        let process = Process { space, kernel: &kernel, link: settings.link, method };
+        let [about_utility, about_feasibility] = answers(log, settings, &infeasible);
+        let utility = Belief { kernel: Arc::clone(&kernel), state: self.utility.advance(&process, &about_utility)? };
+        let feasibility = match settings.labels {
+            Labels::InUtility => None,
+            Labels::Separate => Some(Belief {
+                kernel: Arc::clone(&kernel),
+                state: self.feasibility.advance(&process, &about_feasibility)?,
+            }),
+        };
+        Ok(Posterior {
+            space: space.clone(),
+            settings: settings.clone(),
+            visited: log.visited.clone(),
+            utility,
+            feasibility,
+            infeasible,
+        })
+    }
+}
+
+impl Posterior {
+    /// The space believed about.
+    pub fn space(&self) -> &SearchSpace {
+        &self.space
+    }
+
+    /// The settings used.
+    pub fn settings(&self) -> &LearnerSettings {
+        &self.settings
+    }
+
+    /// Actions tried, in order.
+    pub fn visited(&self) -> &[ActionIndex] {
+        &self.visited
+    }
+
+    /// Posterior mean of an action.
+    ///
+    /// # Errors
+    /// When the action is not in the space.
+    pub fn mean(&self, action: ActionIndex) -> Result<f64> {
+        self.space.check(action)?;
+        Ok(self.utility.mean(action, &self.space.levels(action)))
+    }
+
+    /// Mean and standard deviation of an action.
+    ///
+    /// # Errors
+    /// When the action is not in the space.
+    pub fn predict(&self, action: ActionIndex) -> Result<Prediction> {
+        self.space.check(action)?;
+        let view = self.utility.view(action, self.space.levels(action));
+        Ok(Prediction { mean: view.mean, standard_deviation: self.utility.variance(&view).sqrt() })
+    }
+
+    /// The recommendation: of the actions tried, the one with the highest mean. Of equals, the earliest.
+    ///
+    /// When labels are about a function of their own, actions in the lowest category come last.
+    pub fn best(&self) -> Option<ActionIndex> {
+        let separate = self.feasibility.is_some();
+        let mut best: Option<(ActionIndex, (bool, f64))> = None;
+        for &action in &self.visited {
+            let feasible = !(separate && self.infeasible.contains(&action));
+            let rank = (feasible, self.utility.mean(action, &self.space.levels(action)));
+            if best.is_none_or(|(_, highest)| rank > highest) {
+                best = Some((action, rank));
+            }
+        }
+        best.map(|(action, _)| action)
+    }
+
+    /// One joint draw of the utilities of a few distinct actions.
+    pub(crate) fn draw(&self, actions: &[ActionIndex], random: &mut Random) -> Result<Vec<f64>> {
+        let belief = &self.utility;
+        let views: Vec<_> = actions.iter().map(|&a| belief.view(a, self.space.levels(a))).collect();
+        let covariance = Square::from_fn(actions.len(), |i, j| {
+            belief.covariance(&views[i], &views[j]) + if i == j { belief.kernel.nugget } else { 0.0 }
+        });
+        let factor = Cholesky::new(&covariance)?;
+        let noise: Vec<f64> = actions.iter().map(|_| random.normal()).collect();
+        Ok(views.iter().zip(factor.multiply(&noise)).map(|(view, spread)| view.mean + spread).collect())
+    }
+}

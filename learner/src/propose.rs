@@ -1,0 +1,242 @@
+//! What to try next.
+
+use std::collections::HashSet;
+
+use serde::{Deserialize, Serialize};
+
+use crate::acquisition::{eubo, line};
+use crate::error::{LearnerError, Result};
+use crate::feedback::FeedbackLog;
+use crate::posterior::{Learner, Posterior};
+use crate::random::Random;
+use crate::settings::{LearnerSettings, Method};
+use crate::space::{ActionIndex, SearchSpace};
+
+/// Why an action is proposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ProposalReason {
+    /// Nothing was tried yet: a uniformly random action.
+    FirstAction,
+    /// The method draws at random.
+    RandomAction,
+    /// Highest of a Thompson draw over the untried actions of a line through the best one.
+    ThompsonOnLine,
+    /// Highest expected utility of the better of it and the best action so far.
+    ExpectedBestUtility,
+    /// No line through the best action held an untried one: a uniformly random untried action.
+    LinesExhausted,
+}
+
+/// An action to try.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Proposal {
+    /// What to try.
+    pub action: ActionIndex,
+    /// Why.
+    pub reason: ProposalReason,
+    /// The best action so far, if any was tried.
+    pub best: Option<ActionIndex>,
+}
+
+/// Lines drawn before a random action is taken instead.
+const MAX_LINES: usize = 200;
+
+/// Proposes one action that was neither tried nor is pending.
+///
+/// # Errors
+/// When a setting is out of range, the log does not fit the space, or no untried action is left
+/// ([`LearnerError::Exhausted`]).
+pub fn propose(
+    space: &SearchSpace,
+    log: &FeedbackLog,
+    pending: &[ActionIndex],
+    settings: &LearnerSettings,
+    seed: u64,
+) -> Result<Proposal> {
+    Learner::default().propose(space, log, pending, settings, seed)
+}
+
+impl Learner {
+    /// As [`propose`].
+    ///
+    /// # Errors
+    /// As [`propose`].
+    pub fn propose(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        pending: &[ActionIndex],
+        settings: &LearnerSettings,
+        seed: u64,
+    ) -> Result<Proposal> {
+        propose_from(&self.posterior(space, log, settings)?, pending, seed)
+    }
+}
+
+/// Proposes `settings.samples_per_iteration` different actions for as many workers, fewer when fewer are left.
+///
+/// # Errors
+/// As [`propose`].
+pub fn propose_batch(
+    space: &SearchSpace,
+    log: &FeedbackLog,
+    pending: &[ActionIndex],
+    settings: &LearnerSettings,
+    seed: u64,
+) -> Result<Vec<Proposal>> {
+    let belief = Learner::default().posterior(space, log, settings)?;
+    let mut pending = pending.to_vec();
+    let mut proposals = Vec::new();
+    for _ in 0..settings.samples_per_iteration {
+        match propose_from(&belief, &pending, seed) {
+            Ok(proposal) => {
+                pending.push(proposal.action);
+                proposals.push(proposal);
+            }
+            Err(LearnerError::Exhausted { .. }) if !proposals.is_empty() => break,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(proposals)
+}
+
+fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Result<Proposal> {
+    let space = belief.space();
+    for &action in pending {
+        space.check(action)?;
+    }
+    let taken: HashSet<ActionIndex> = belief.visited().iter().chain(pending).copied().collect();
+    if taken.len() as u64 >= space.len() {
+        return Err(LearnerError::Exhausted { actions: space.len() });
+    }
+    let mut random = Random::new(seed, (belief.visited().len() + pending.len()) as u64);
+    let Some(best) = belief.best() else {
+        let action = random_untried(space, &taken, &mut random);
+        return Ok(Proposal { action, reason: ProposalReason::FirstAction, best: None });
+    };
+    let (action, reason) = match belief.settings().method {
+        Method::LineCoSpar => line_cospar(belief, best, &taken, &mut random)?,
+        Method::Eubo => match eubo::against(belief, best, &taken) {
+            Some(action) => (action, ProposalReason::ExpectedBestUtility),
+            None => return Err(LearnerError::Exhausted { actions: space.len() }),
+        },
+        Method::Random => (random_untried(space, &taken, &mut random), ProposalReason::RandomAction),
+    };
+    Ok(Proposal { action, reason, best: Some(best) })
+}
+
+/// A uniformly random action outside `taken`, which must not hold the whole space.
+fn random_untried(space: &SearchSpace, taken: &HashSet<ActionIndex>, random: &mut Random) -> ActionIndex {
+    let mut sorted: Vec<u64> = taken.iter().map(|a| a.0).collect();
+    sorted.sort_unstable();
+    let mut index = random.below(space.len() - sorted.len() as u64);
+    for taken in sorted {
+        if taken <= index {
+            index += 1;
+        }
+    }
+    ActionIndex(index)
+}
+
+fn line_cospar(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> Result<(ActionIndex, ProposalReason)> {
+    let space = belief.space();
+    let suggested: Vec<ActionIndex> =
+        belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
+    for _ in 0..MAX_LINES {
+        let mut candidates = suggested.clone();
+        for action in line::through(space, best, random) {
+            if !taken.contains(&action) && !candidates.contains(&action) {
+                candidates.push(action);
+            }
+        }
+        if candidates.is_empty() {
+            continue;
+        }
+        let draw = belief.draw(&candidates, random)?;
+        let (chosen, _) = candidates
+            .iter()
+            .zip(&draw)
+            .fold((candidates[0], f64::NEG_INFINITY), |top, (&a, &f)| if f > top.1 { (a, f) } else { top });
+        return Ok((chosen, ProposalReason::ThompsonOnLine));
+    }
+    Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feedback::Feedback;
+    use crate::space::Dimension;
+
+    fn grid() -> SearchSpace {
+        let dimensions = [3, 4, 3]
+            .iter()
+            .enumerate()
+            .map(|(d, &n)| Dimension { name: d.to_string(), values: (0..n).map(f64::from).collect(), lengthscale: 1.0 })
+            .collect();
+        SearchSpace::new(dimensions).unwrap()
+    }
+
+    #[test]
+    fn every_action_is_proposed_once_and_the_best_is_found() {
+        let space = grid();
+        let utility = |a: ActionIndex| {
+            let levels = space.levels(a);
+            -(levels[0] as f64 - 1.0).powi(2) - (levels[1] as f64 - 2.0).powi(2) - (levels[2] as f64).powi(2)
+        };
+        for method in [Method::LineCoSpar, Method::Eubo, Method::Random] {
+            let settings = LearnerSettings::of(method);
+            let mut log = FeedbackLog::default();
+            for trial in 0..space.len() {
+                let proposal = propose(&space, &log, &[], &settings, 5).unwrap();
+                assert_eq!(proposal, propose(&space, &log, &[], &settings, 5).unwrap());
+                assert!(!log.visited.contains(&proposal.action), "{method:?} repeats at {trial}");
+                for question in comparisons(&space, &log, proposal.action, &settings) {
+                    let (a, b) = (proposal.action, question);
+                    let (winner, loser) = if utility(a) > utility(b) { (a, b) } else { (b, a) };
+                    if utility(a) == utility(b) {
+                        log.feedback.push(Feedback::Tie { a, b });
+                    } else {
+                        log.feedback.push(Feedback::Preference { winner, loser });
+                    }
+                }
+                log.visited.push(proposal.action);
+            }
+            assert!(matches!(propose(&space, &log, &[], &settings, 5), Err(LearnerError::Exhausted { .. })));
+            let best = crate::posterior::posterior(&space, &log, &settings).unwrap().best().unwrap();
+            assert_eq!(space.levels(best), [1, 2, 0], "{method:?}");
+        }
+    }
+
+    fn comparisons(
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        action: ActionIndex,
+        settings: &LearnerSettings,
+    ) -> Vec<ActionIndex> {
+        let questions = crate::ask::comparisons_to_ask(space, log, action, settings).unwrap();
+        questions.into_iter().map(|q| q.against).collect()
+    }
+
+    #[test]
+    fn batches_hold_different_actions() {
+        let space = grid();
+        let settings = LearnerSettings { samples_per_iteration: 8, ..LearnerSettings::default() };
+        let log = FeedbackLog { visited: vec![ActionIndex(0)], feedback: vec![] };
+        let pending = [ActionIndex(3), ActionIndex(7)];
+        let mut batch: Vec<_> =
+            propose_batch(&space, &log, &pending, &settings, 1).unwrap().into_iter().map(|p| p.action).collect();
+        batch.extend(pending);
+        batch.push(ActionIndex(0));
+        batch.sort_unstable();
+        batch.dedup();
+        assert_eq!(batch.len(), 11);
+    }
+}

@@ -1,0 +1,188 @@
+//! How to learn: the method and the numbers of its model, named as in the literature.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{LearnerError, Result};
+
+/// How the next action is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// LineCoSpar: a Thompson draw on a random line through the best action.
+    #[serde(rename = "linecospar")]
+    LineCoSpar,
+    /// The action with the greatest expected utility of the better of itself and the best action so far, over the
+    /// whole grid.
+    Eubo,
+    /// A uniformly random action that was not visited.
+    Random,
+}
+
+/// How the posterior is approximated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Inference {
+    /// A normal distribution at the posterior's mode.
+    Laplace,
+    /// Expectation propagation. Needs the probit link.
+    ExpectationPropagation,
+}
+
+/// The function that turns a difference of utilities, divided by its noise, into a probability.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Link {
+    /// `1 / (1 + exp(-z))`.
+    Logistic,
+    /// The normal distribution function.
+    Probit,
+}
+
+/// Where labels enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Labels {
+    /// Labels are about the utility itself, as in the literature.
+    InUtility,
+    /// Labels are about a second function of the action; a comparison that the labels alone decide (one action in
+    /// the lowest category, the other not) says nothing more about the utility.
+    Separate,
+}
+
+/// Everything that decides how a log is read and what is proposed next.
+///
+/// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LearnerSettings {
+    /// How the next action is chosen.
+    pub method: Method,
+    /// How the posterior is approximated.
+    pub inference: Inference,
+    /// Shape of the answer noise.
+    pub link: Link,
+    /// Prior variance of the utility.
+    pub signal_variance: f64,
+    /// Variance added on the diagonal of the prior covariance of visited actions (the literature's "GP noise").
+    pub nugget: f64,
+    /// Multiplies every dimension's lengthscale.
+    pub lengthscale_factor: f64,
+    /// Share of the prior variance given to functions of one quantity each.
+    pub additive_share: f64,
+    /// Share of the prior variance given to functions of two quantities each. What is left of 1 goes to the
+    /// literature's product kernel.
+    pub pairwise_share: f64,
+    /// Lengthscale of the additive and pairwise parts, as a share of each dimension's range.
+    pub broad_lengthscale: f64,
+    /// Where labels enter.
+    pub labels: Labels,
+    /// Scale of the noise of a preference, in units of utility.
+    pub preference_noise: f64,
+    /// Scale of the noise of a label.
+    pub ordinal_noise: f64,
+    /// Boundaries between the categories of labels, strictly increasing: one less than there are categories. The
+    /// default single 0 gives two categories, 0 not converged and 1 converged.
+    pub ordinal_thresholds: Vec<f64>,
+    /// Scale of the noise of a suggestion.
+    pub coactive_noise: f64,
+    /// Scale of the noise of a tie.
+    pub tie_noise: f64,
+    /// Utilities closer than this are felt as equal.
+    pub tie_width: f64,
+    /// Number `n` of actions proposed at a time.
+    pub samples_per_iteration: usize,
+    /// Number `b` of earlier actions with which a new one is compared.
+    pub buffer: usize,
+}
+
+impl Default for LearnerSettings {
+    fn default() -> Self {
+        Self {
+            method: Method::LineCoSpar,
+            inference: Inference::Laplace,
+            link: Link::Logistic,
+            signal_variance: 1.0,
+            nugget: 1e-5,
+            lengthscale_factor: 1.0,
+            additive_share: 0.0,
+            pairwise_share: 0.0,
+            broad_lengthscale: 1.0,
+            labels: Labels::InUtility,
+            preference_noise: 0.02,
+            ordinal_noise: 0.1,
+            ordinal_thresholds: vec![0.0],
+            coactive_noise: 0.02,
+            tie_noise: 0.02,
+            tie_width: 0.02,
+            samples_per_iteration: 1,
+            buffer: 1,
+        }
+    }
+}
+
+impl LearnerSettings {
+    /// The recommended settings of a method.
+    pub fn of(method: Method) -> Self {
+        match method {
+            Method::LineCoSpar | Method::Random => Self { method, ..Self::default() },
+            Method::Eubo => {
+                Self { method, inference: Inference::ExpectationPropagation, link: Link::Probit, ..Self::default() }
+            }
+        }
+    }
+
+    /// Number of categories of labels.
+    pub fn categories(&self) -> usize {
+        self.ordinal_thresholds.len() + 1
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// At the first setting outside its range.
+    pub fn validate(&self) -> Result<()> {
+        let refuse = |setting, reason: String| Err(LearnerError::InvalidSetting { setting, reason });
+        for (setting, value, low, high) in [
+            ("signal_variance", self.signal_variance, 1e-8, 1e8),
+            ("nugget", self.nugget, 1e-10 * self.signal_variance, self.signal_variance),
+            ("lengthscale_factor", self.lengthscale_factor, 1e-3, 1e3),
+            ("additive_share", self.additive_share, 0.0, 1.0),
+            ("pairwise_share", self.pairwise_share, 0.0, 1.0),
+            ("broad_lengthscale", self.broad_lengthscale, 1e-2, 1e3),
+            ("preference_noise", self.preference_noise, 1e-4, 1e4),
+            ("ordinal_noise", self.ordinal_noise, 1e-4, 1e4),
+            ("coactive_noise", self.coactive_noise, 1e-4, 1e4),
+            ("tie_noise", self.tie_noise, 1e-4, 1e4),
+            ("tie_width", self.tie_width, 1e-4, 1e4),
+        ] {
+            if !(value >= low && value <= high) {
+                return refuse(setting, format!("{value} is not between {low} and {high}"));
+            }
+        }
+        if self.additive_share + self.pairwise_share > 1.0 {
+            return refuse("pairwise_share", "additive and pairwise shares together exceed 1".into());
+        }
+        if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
+            return refuse("link", "expectation propagation needs the probit link".into());
+        }
+        if self.ordinal_thresholds.iter().any(|t| t.is_nan() || t.abs() > 1e4) {
+            return refuse("ordinal_thresholds", "thresholds must be numbers between -10000 and 10000".into());
+        }
+        if self.ordinal_thresholds.windows(2).any(|pair| pair[1] - pair[0] < 1e-4) {
+            return refuse("ordinal_thresholds", "thresholds must increase by at least 0.0001".into());
+        }
+        if self.ordinal_thresholds.len() > 100 {
+            return refuse("ordinal_thresholds", "at most 100 thresholds are accepted".into());
+        }
+        if !(1..=1024).contains(&self.samples_per_iteration) {
+            return refuse(
+                "samples_per_iteration",
+                format!("{} is not between 1 and 1024", self.samples_per_iteration),
+            );
+        }
+        if self.buffer > 10_000 {
+            return refuse("buffer", format!("{} is more than 10000", self.buffer));
+        }
+        Ok(())
+    }
+}
