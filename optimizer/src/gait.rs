@@ -1,8 +1,9 @@
 //! The result: an optimised walking trajectory over one stride, in SI units and radians.
 
 use crate::bounds::TunedBounds;
+use crate::device::Device;
 use crate::settings::GaitSettings;
-use crate::subject::{Device, Subject};
+use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 
 /// A gait: eight domains over one stride from right heel strike.

@@ -4,16 +4,22 @@
 //! Hill-type muscles of Li, Tucker, Gehlhar, Yue and Ames (RA-L 2022), solved by the crate's own sparse
 //! interior point. The crate knows nothing of learning, storage or HTTP.
 
+pub mod body;
 pub mod bounds;
+pub mod device;
 pub mod gait;
+pub mod gait_problem;
 pub mod metrics;
+pub mod muscle;
 pub mod nlp;
 pub mod reference;
 pub mod settings;
 pub mod solve;
 pub mod subject;
+pub mod walking;
 
 pub use bounds::TunedBounds;
+pub use device::Device;
 pub use gait::{DomainTrajectory, Gait};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
@@ -21,4 +27,4 @@ pub use solve::{
     CancelToken, GaitProblem, IterationRecord, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus,
     Violation, WarmStart, solve,
 };
-pub use subject::{Device, ModelError, Subject};
+pub use subject::{ModelError, Subject};

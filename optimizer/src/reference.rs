@@ -1,9 +1,18 @@
-//! Reference gaits: what Gait RMSE is measured against.
+//! Reference gaits: what Gait RMSE is measured against, and where the cold start begins.
 
+use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
+
+/// The built-in reference (citation, licence and processing in its header).
+const BUILTIN_CSV: &str = include_str!("../data/reference_gait.csv");
+/// Rows of a reference: 0, 1, ..., 100 % of the cycle.
+pub const REFERENCE_ROWS: usize = 101;
+/// Column names after the percentage.
+pub const REFERENCE_COLUMNS: [&str; 5] = ["torso_rad", "hip_L_rad", "knee_L_rad", "ankle_L_rad", "hip_R_rad"];
 
 /// Mean joint angles over one gait cycle from right heel strike, radians, seven-link convention.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ReferenceGait {
     /// Name shown to people.
     pub name: String,
@@ -11,4 +20,90 @@ pub struct ReferenceGait {
     pub provenance: String,
     /// 101 rows (0..=100 % of the cycle) of torso, hip_L, knee_L, ankle_L, hip_R in rad.
     pub angles_rad: Vec<[f64; 5]>,
+}
+
+impl ReferenceGait {
+    /// The built-in reference: one healthy adult of Falisse et al. 2019 (MIT).
+    ///
+    /// # Errors
+    /// Never in practice: a test reads the built-in file.
+    pub fn builtin() -> Result<Self, ModelError> {
+        Self::from_csv("Falisse 2019, subject 1", BUILTIN_CSV)
+    }
+
+    /// Reads `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` with 101 rows; lines before the header
+    /// that start with `#` are the provenance.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with the line and the reason.
+    pub fn from_csv(name: &str, text: &str) -> Result<Self, ModelError> {
+        let malformed = |line: u64, reason: String| ModelError::Malformed {
+            what: format!("reference gait {name:?}, line {line}"),
+            reason,
+        };
+        let comments: Vec<&str> = text.lines().take_while(|l| l.starts_with('#')).collect();
+        let skipped = comments.len() as u64;
+        let provenance = comments.iter().map(|l| l.trim_start_matches('#').trim()).collect::<Vec<_>>().join("\n");
+        let mut reader =
+            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let headers = reader.headers().map_err(|e| malformed(skipped + 1, e.to_string()))?.clone();
+        let mut columns = [0; 5];
+        for (column, wanted) in columns.iter_mut().zip(REFERENCE_COLUMNS) {
+            *column = headers
+                .iter()
+                .position(|h| h == wanted)
+                .ok_or_else(|| malformed(skipped + 1, format!("column {wanted} is missing")))?;
+        }
+        let mut angles_rad = Vec::with_capacity(REFERENCE_ROWS);
+        for record in reader.records() {
+            let record = record.map_err(|e| malformed(e.position().map_or(0, csv::Position::line), e.to_string()))?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let mut row = [0.0; 5];
+            for ((value, &column), wanted) in row.iter_mut().zip(&columns).zip(REFERENCE_COLUMNS) {
+                let cell = record.get(column).unwrap_or("");
+                *value =
+                    cell.parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() <= 4.0).ok_or_else(|| {
+                        malformed(line, format!("{wanted} = {cell:?} is not an angle in [-4, 4] rad"))
+                    })?;
+            }
+            angles_rad.push(row);
+        }
+        let reference = Self { name: name.to_owned(), provenance, angles_rad };
+        reference.validate()?;
+        Ok(reference)
+    }
+
+    /// Checks the number of rows.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`].
+    pub fn validate(&self) -> Result<(), ModelError> {
+        if self.angles_rad.len() == REFERENCE_ROWS && self.angles_rad.iter().flatten().all(|a| a.is_finite()) {
+            Ok(())
+        } else {
+            Err(ModelError::Malformed {
+                what: format!("reference gait {:?}", self.name),
+                reason: format!("{} rows, expected {REFERENCE_ROWS} of finite angles", self.angles_rad.len()),
+            })
+        }
+    }
+
+    /// The five angles at a stride fraction (periodic, linear between rows), rad.
+    pub fn at(&self, fraction: f64) -> [f64; 5] {
+        let intervals = REFERENCE_ROWS - 1;
+        let position = fraction.rem_euclid(1.0) * intervals as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 <= position < 100
+        let low = (position.floor() as usize).min(intervals - 1);
+        let share = position - low as f64;
+        let (a, b) = (&self.angles_rad[low], &self.angles_rad[low + 1]);
+        std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
+    }
+
+    /// All seven joint angles of the walker at a stride fraction; the right knee and ankle, which no reference of an
+    /// intact person has, are the left ones half a stride later.
+    pub fn seven_angles(&self, fraction: f64) -> [f64; 7] {
+        let [torso, hip_l, knee_l, ankle_l, hip_r] = self.at(fraction);
+        let [_, _, knee_r, ankle_r, _] = self.at(fraction + 0.5);
+        [torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]
+    }
 }

@@ -1,5 +1,6 @@
-//! Settings of the gait problem that are not tuned by the learner.
+//! Settings of the gait problem that are not tuned by the learner: mesh, limits, objective weights.
 
+use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Number of mesh intervals per domain type; a domain with N intervals has 2N+1 equidistant points.
@@ -22,10 +23,246 @@ impl Default for Mesh {
     }
 }
 
+impl Mesh {
+    /// Most intervals per domain.
+    pub const MAX_INTERVALS: usize = 100;
+
+    /// Checks that every domain has 1 to [`Self::MAX_INTERVALS`] intervals.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        for (field, value) in
+            [("mesh.ds2", self.ds2), ("mesh.ds3", self.ds3), ("mesh.ss2", self.ss2), ("mesh.ss1", self.ss1)]
+        {
+            ModelError::check_range(field, value as f64, 1.0, Self::MAX_INTERVALS as f64)?;
+        }
+        Ok(())
+    }
+}
+
+/// One number per domain type.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PerDomainKind {
+    /// DS2.
+    pub ds2: f64,
+    /// DS3.
+    pub ds3: f64,
+    /// SS2.
+    pub ss2: f64,
+    /// SS1.
+    pub ss1: f64,
+}
+
+/// Physical and chosen limits of a gait. Defaults are those of the reference problem; where no measured number
+/// exists the value is an assumption.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GaitLimits {
+    /// Friction coefficient of the feet (FROST's planar examples: 0.6).
+    pub friction: f64,
+    /// Friction coefficient of the landing heel's impulse.
+    pub impact_friction: f64,
+    /// Walking-speed band D / sum T, m/s. Minimising cost alone shuffles at 0.26 m/s.
+    pub speed_min_m_s: f64,
+    /// See `speed_min_m_s`.
+    pub speed_max_m_s: f64,
+    /// Bounds of both step lengths, m.
+    pub step_min_m: f64,
+    /// See `step_min_m`.
+    pub step_max_m: f64,
+    /// Shortest duration of each domain type, s.
+    pub duration_min_s: PerDomainKind,
+    /// Longest duration of each domain type, s.
+    pub duration_max_s: PerDomainKind,
+    /// Smallest knee flexion, rad: keeps the knees off the singular straight posture.
+    pub knee_min_rad: f64,
+    /// Largest knee flexion, rad.
+    pub knee_max_rad: f64,
+    /// Anatomical bound on both hip angles beside a7, rad.
+    pub hip_max_rad: f64,
+    /// Human hip torque, N m.
+    pub hip_torque_n_m: f64,
+    /// Human knee torque, N m.
+    pub knee_torque_n_m: f64,
+    /// Human ankle plantarflexion torque, N m.
+    pub ankle_plantarflexion_torque_n_m: f64,
+    /// Human ankle dorsiflexion torque, N m.
+    pub ankle_dorsiflexion_torque_n_m: f64,
+    /// Slowest forward hip velocity in SS1, m/s: keeps the phase monotone.
+    pub phase_rate_min_m_s: f64,
+    /// Half width of the torso band when a6 is smaller, rad: keeps an interior when a6 = 0.
+    pub torso_tolerance_rad: f64,
+    /// Slowest downward toe speed at toe strike, m/s: keeps the guard transversal.
+    pub toe_touchdown_m_s: f64,
+    /// Slowest downward heel speed at heel strike, m/s.
+    pub heel_touchdown_m_s: f64,
+    /// Swing clearance at mid-swing when a5 is smaller, m.
+    pub clearance_min_m: f64,
+    /// Normal force at the start of a domain that ends by unloading, falling linearly to 0, N.
+    pub liftoff_force_n: f64,
+    /// Largest contact force component, N.
+    pub contact_force_max_n: f64,
+    /// Largest impulse component, N s.
+    pub impulse_max_n_s: f64,
+    /// Shortest fibre, optimal lengths.
+    pub fibre_length_min: f64,
+    /// Longest fibre, optimal lengths.
+    pub fibre_length_max: f64,
+}
+
+impl Default for GaitLimits {
+    fn default() -> Self {
+        Self {
+            friction: 0.6,
+            impact_friction: 0.6,
+            speed_min_m_s: 1.0,
+            speed_max_m_s: 1.4,
+            step_min_m: 0.5,
+            step_max_m: 0.85,
+            duration_min_s: PerDomainKind { ds2: 0.03, ds3: 0.02, ss2: 0.08, ss1: 0.08 },
+            duration_max_s: PerDomainKind { ds2: 0.3, ds3: 0.3, ss2: 0.7, ss1: 0.7 },
+            knee_min_rad: 0.02,
+            knee_max_rad: 1.45,
+            hip_max_rad: 1.2,
+            hip_torque_n_m: 200.0,
+            knee_torque_n_m: 200.0,
+            ankle_plantarflexion_torque_n_m: 180.0,
+            ankle_dorsiflexion_torque_n_m: 50.0,
+            phase_rate_min_m_s: 0.1,
+            torso_tolerance_rad: 0.005,
+            toe_touchdown_m_s: 0.1,
+            heel_touchdown_m_s: 0.1,
+            clearance_min_m: 0.005,
+            liftoff_force_n: 20.0,
+            contact_force_max_n: 3000.0,
+            impulse_max_n_s: 500.0,
+            fibre_length_min: 0.3,
+            fibre_length_max: 1.6,
+        }
+    }
+}
+
+impl GaitLimits {
+    /// Checks every limit against its allowed range, and that bands have an interior.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        let checks = [
+            ("friction", self.friction, 0.1, 2.0),
+            ("impact_friction", self.impact_friction, 0.1, 2.0),
+            ("speed_min_m_s", self.speed_min_m_s, 0.1, 2.5),
+            ("speed_max_m_s", self.speed_max_m_s, self.speed_min_m_s + 1e-3, 3.0),
+            ("step_min_m", self.step_min_m, 0.1, 1.2),
+            ("step_max_m", self.step_max_m, self.step_min_m + 1e-3, 1.5),
+            ("knee_min_rad", self.knee_min_rad, 0.0, 0.3),
+            ("knee_max_rad", self.knee_max_rad, 0.5, 2.4),
+            ("hip_max_rad", self.hip_max_rad, 0.2, 2.0),
+            ("hip_torque_n_m", self.hip_torque_n_m, 5.0, 1000.0),
+            ("knee_torque_n_m", self.knee_torque_n_m, 5.0, 1000.0),
+            ("ankle_plantarflexion_torque_n_m", self.ankle_plantarflexion_torque_n_m, 5.0, 1000.0),
+            ("ankle_dorsiflexion_torque_n_m", self.ankle_dorsiflexion_torque_n_m, 5.0, 1000.0),
+            ("phase_rate_min_m_s", self.phase_rate_min_m_s, 0.01, 1.0),
+            ("torso_tolerance_rad", self.torso_tolerance_rad, 1e-4, 0.1),
+            ("toe_touchdown_m_s", self.toe_touchdown_m_s, 0.0, 1.0),
+            ("heel_touchdown_m_s", self.heel_touchdown_m_s, 0.0, 1.0),
+            ("clearance_min_m", self.clearance_min_m, 0.0, 0.1),
+            ("liftoff_force_n", self.liftoff_force_n, 0.0, 200.0),
+            ("contact_force_max_n", self.contact_force_max_n, 500.0, 20000.0),
+            ("impulse_max_n_s", self.impulse_max_n_s, 10.0, 5000.0),
+            ("fibre_length_min", self.fibre_length_min, 0.1, 0.9),
+            ("fibre_length_max", self.fibre_length_max, 1.1, 2.0),
+        ];
+        for (field, value, minimum, maximum) in checks {
+            ModelError::check_range(&format!("limits.{field}"), value, minimum, maximum)?;
+        }
+        let (low, high) = (self.duration_min_s, self.duration_max_s);
+        for (name, minimum, maximum) in [
+            ("ds2", low.ds2, high.ds2),
+            ("ds3", low.ds3, high.ds3),
+            ("ss2", low.ss2, high.ss2),
+            ("ss1", low.ss1, high.ss1),
+        ] {
+            ModelError::check_range(&format!("limits.duration_min_s.{name}"), minimum, 0.005, 1.0)?;
+            ModelError::check_range(&format!("limits.duration_max_s.{name}"), maximum, minimum + 1e-3, 2.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// Regularisation beside the cost of transport. Each weight multiplies the time integral of its square.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Regularisation {
+    /// Smoothing of |P| as `sqrt(P^2 + eps^2) - eps`, W.
+    pub power_smoothing_w: f64,
+    /// |u/100|²: fixes the internal torques of double support.
+    pub torque: f64,
+    /// |qdd/30|².
+    pub acceleration: f64,
+    /// |lambda/500|².
+    pub contact_force: f64,
+    /// |activation|²: without it the ten redundant muscles co-contract.
+    pub activation: f64,
+    /// |v_ce/V|²: without it fibre velocities alternate between points and midpoints.
+    pub fibre_velocity: f64,
+}
+
+impl Default for Regularisation {
+    fn default() -> Self {
+        Self {
+            power_smoothing_w: 1.0,
+            torque: 3e-3,
+            acceleration: 1e-4,
+            contact_force: 1e-4,
+            activation: 3e-3,
+            fibre_velocity: 1e-2,
+        }
+    }
+}
+
+impl Regularisation {
+    /// Checks every weight against its allowed range.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::check_range("regularisation.power_smoothing_w", self.power_smoothing_w, 1e-3, 100.0)?;
+        for (field, value) in [
+            ("torque", self.torque),
+            ("acceleration", self.acceleration),
+            ("contact_force", self.contact_force),
+            ("activation", self.activation),
+            ("fibre_velocity", self.fibre_velocity),
+        ] {
+            ModelError::check_range(&format!("regularisation.{field}"), value, 0.0, 10.0)?;
+        }
+        Ok(())
+    }
+}
+
 /// Everything about the gait problem that is neither subject, device nor tuned bound.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct GaitSettings {
     /// Mesh intervals per domain type.
     pub mesh: Mesh,
+    /// Limits of the gait.
+    pub limits: GaitLimits,
+    /// Regularisation of the objective.
+    pub regularisation: Regularisation,
+}
+
+impl GaitSettings {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        self.mesh.validate()?;
+        self.limits.validate()?;
+        self.regularisation.validate()
+    }
 }

@@ -1,10 +1,11 @@
 //! The public face: one gait problem in, one honest outcome out.
 
 use crate::bounds::TunedBounds;
+use crate::device::Device;
 use crate::gait::Gait;
 use crate::reference::ReferenceGait;
 use crate::settings::GaitSettings;
-use crate::subject::{Device, ModelError, Subject};
+use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

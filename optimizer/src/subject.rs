@@ -109,27 +109,3 @@ impl Subject {
         Ok(())
     }
 }
-
-/// A prosthesis worn on the right leg. Every value of the built-in device carries its source in the data file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Device {
-    /// Name shown to people.
-    pub name: String,
-}
-
-impl Device {
-    /// The AMPRO3 powered knee-ankle prosthesis (values and sources in `data/ampro3.json`).
-    pub fn ampro3() -> Self {
-        Self { name: "AMPRO3".to_owned() }
-    }
-
-    /// Reads a device from JSON.
-    ///
-    /// # Errors
-    /// [`ModelError::Malformed`] with line and column, or [`ModelError::OutOfRange`] naming the field.
-    pub fn from_json(text: &str) -> Result<Self, ModelError> {
-        serde_json::from_str(text)
-            .map_err(|e| ModelError::Malformed { what: "device file".to_owned(), reason: e.to_string() })
-    }
-}

@@ -1,0 +1,20 @@
+//! The planar seven-link human-prosthesis model: bodies, kinematics and inverse dynamics with exact first and
+//! second derivatives, all in absolute link angles.
+//!
+//! Coordinates `q = (px, pz, torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R)`: hip point in m, relative joint
+//! angles in rad (forward lean, flexion and dorsiflexion positive). Absolute link angles
+//! `psi = (torso, thigh_L, shank_L, foot_L, thigh_R, shank_R, foot_R)` are counter-clockwise in the (x forward, z up)
+//! plane; `psi = A q[2..]` with the constant matrix A of [`coordinates`].
+
+pub mod anthropometry;
+pub mod coordinates;
+pub mod dynamics;
+pub mod point;
+
+pub use anthropometry::{Body, LegGeometry, WalkerModel};
+pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, relative_angles, to_generalised};
+pub use dynamics::{InverseDynamics, PointState};
+pub use point::{Chain, ContactPoint};
+
+/// Standard gravity as used by the reference model, m/s².
+pub const GRAVITY: f64 = 9.81;

@@ -1,0 +1,70 @@
+//! Relative joint angles to absolute link angles and back: the constant matrix A and its transpose.
+
+/// Number of generalised coordinates: two of the hip point, seven angles.
+pub const COORDINATES: usize = 9;
+/// Number of links and of absolute link angles.
+pub const LINKS: usize = 7;
+/// Number of actuated joints.
+pub const JOINTS: usize = 6;
+
+/// Link indices.
+pub const TORSO: usize = 0;
+/// First link (thigh) of the left leg; shank and foot follow.
+pub const THIGH_L: usize = 1;
+/// First link (thigh) of the right leg; shank and foot follow.
+pub const THIGH_R: usize = 4;
+
+/// Absolute link quantities of relative angle quantities (angles, rates or accelerations): `A a`.
+///
+/// Input (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R).
+#[inline]
+pub fn link_angles(a: &[f64; LINKS]) -> [f64; LINKS] {
+    let torso = -a[0];
+    let thigh_l = torso + a[1];
+    let shank_l = thigh_l - a[2];
+    let foot_l = shank_l + a[3];
+    let thigh_r = torso + a[4];
+    let shank_r = thigh_r - a[5];
+    let foot_r = shank_r + a[6];
+    [torso, thigh_l, shank_l, foot_l, thigh_r, shank_r, foot_r]
+}
+
+/// Generalised quantities of the seven angles from link quantities: `A^T p`.
+#[inline]
+pub fn to_generalised(p: &[f64; LINKS]) -> [f64; LINKS] {
+    let left_shank = p[2] + p[3];
+    let left = p[1] + left_shank;
+    let right_shank = p[5] + p[6];
+    let right = p[4] + right_shank;
+    [-(p[0] + left + right), left, -left_shank, p[3], right, -right_shank, p[6]]
+}
+
+/// Inverse of [`link_angles`]: relative angles from absolute link angles.
+#[inline]
+pub fn relative_angles(psi: &[f64; LINKS]) -> [f64; LINKS] {
+    [-psi[0], psi[1] - psi[0], psi[1] - psi[2], psi[3] - psi[2], psi[4] - psi[0], psi[4] - psi[5], psi[6] - psi[5]]
+}
+
+/// `A^T H A` for a link-space matrix H (not necessarily symmetric), both sides seven angles.
+#[inline]
+pub fn congruence(h: &[[f64; LINKS]; LINKS]) -> [[f64; LINKS]; LINKS] {
+    // Rows of H transformed from the right: (A^T H_row^T)^T, then columns from the left.
+    let mut right = [[0.0; LINKS]; LINKS];
+    for i in 0..LINKS {
+        right[i] = to_generalised(&h[i]);
+    }
+    transform_rows(&right)
+}
+
+/// `A^T X` for a matrix X with one row per link.
+#[inline]
+pub fn transform_rows<const N: usize>(x: &[[f64; N]; LINKS]) -> [[f64; N]; LINKS] {
+    let mut result = [[0.0; N]; LINKS];
+    for c in 0..N {
+        let column = to_generalised(&[x[0][c], x[1][c], x[2][c], x[3][c], x[4][c], x[5][c], x[6][c]]);
+        for r in 0..LINKS {
+            result[r][c] = column[r];
+        }
+    }
+    result
+}

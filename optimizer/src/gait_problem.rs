@@ -1,0 +1,31 @@
+//! The paper's nonlinear programme: variables, rows C1..C12, objective, bounds, cold start, mesh transfer.
+//!
+//! | constraint | rows here |
+//! |---|---|
+//! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
+//! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`outputs`], [`hip_velocity`], [`transitions`] |
+//! | C3 physical limits: friction, unilateral contact, clearance, touchdown | [`contact_limits`] |
+//! | C4 bounds of the gait: a1..a8, joints, torques, speed, steps | [`limits`], [`stride`] |
+//! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
+//! | C8 fibre kinematics | [`fibres`] |
+//! | C9-C12 joint torques from muscles | [`muscle_forces`] |
+
+pub mod contact_limits;
+pub mod entries;
+pub mod fibres;
+pub mod hip_velocity;
+pub mod layout;
+pub mod limits;
+pub mod mechanics;
+pub mod muscle_forces;
+pub mod objective;
+pub mod outputs;
+pub mod programme;
+pub mod rows;
+pub mod stride;
+pub mod transitions;
+pub mod zero_dynamics;
+
+pub use layout::{Layout, PointVariables};
+pub use programme::{GaitProgramme, ObjectiveWeights};
+pub use rows::{RowKind, RowName, RowTable};

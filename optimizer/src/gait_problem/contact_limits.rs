@@ -1,0 +1,198 @@
+//! C3: friction cones, heights of the feet, swing clearance, touchdown speed, forward hip velocity in SS1.
+
+use super::entries::Entries;
+use super::layout::{FORCE, PointVariables, Q, QD};
+use super::mechanics::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
+use super::programme::{GaitProgramme, PointContext};
+use super::rows::PointRows;
+use crate::body::PointState;
+use crate::body::dynamics::LinkHessian;
+use crate::gait::{Axis, Side};
+use crate::walking::DomainKind;
+
+const FRICTION_SCALE: f64 = 1.0 / 500.0;
+const HEIGHT_SCALE: f64 = 10.0;
+
+/// Side of a foot point (heel_L, toe_L, heel_R, toe_R).
+fn side_of(foot_point: usize) -> Side {
+    if foot_point < 2 { Side::Left } else { Side::Right }
+}
+
+/// The contact rows of each foot on the ground, stance foot first: (is x, index of the force).
+fn feet(context: &PointContext<'_>) -> impl Iterator<Item = (usize, Vec<(bool, usize)>)> {
+    let stance = context.layout.domain.stance;
+    [stance, stance.other()]
+        .into_iter()
+        .map(|side| {
+            context
+                .contacts
+                .iter()
+                .enumerate()
+                .filter(|(_, row)| row.side == side)
+                .map(|(c, row)| (row.axis == Axis::X, c))
+                .collect::<Vec<_>>()
+        })
+        .filter(|rows| !rows.is_empty())
+        .enumerate()
+}
+
+/// Share w of the swing that is over, as `(alpha T_SS2 + beta T_SS1) / (T_SS2 + T_SS1)`, with the two duration
+/// variables.
+struct SwingShare {
+    w: f64,
+    gradient: [f64; 2],
+    hessian: [[f64; 2]; 2],
+    durations: [usize; 2],
+}
+
+fn swing_share(programme: &GaitProgramme, context: &PointContext<'_>, x: &[f64]) -> SwingShare {
+    let sigma = context.layout.sigma(context.k);
+    let (ss2, ss1, alpha, beta) = match context.layout.domain.kind {
+        DomainKind::Ss2 => (context.d, context.d + 1, sigma, 0.0),
+        _ => (context.d - 1, context.d, 1.0, sigma),
+    };
+    let durations = [programme.layout.domains[ss2].duration, programme.layout.domains[ss1].duration];
+    let t2 = programme.layout.value(x, durations[0]);
+    let t1 = programme.layout.value(x, durations[1]);
+    let sum = t2 + t1;
+    let w = (alpha * t2 + beta * t1) / sum;
+    let gradient = [(alpha - w) / sum, (beta - w) / sum];
+    let cross = -(gradient[0] + gradient[1]) / sum;
+    let hessian = [[-2.0 * gradient[0] / sum, cross], [cross, -2.0 * gradient[1] / sum]];
+    SwingShare { w, gradient, hessian, durations }
+}
+
+/// `(4 w (1 - w))^2` and its first two derivatives.
+fn clearance_profile(w: f64) -> [f64; 3] {
+    let bump = 4.0 * w * (1.0 - w);
+    let slope = 4.0 * (1.0 - 2.0 * w);
+    [bump * bump, 2.0 * bump * slope, 2.0 * slope * slope - 16.0 * bump]
+}
+
+/// Values.
+pub(super) fn values(
+    programme: &GaitProgramme,
+    context: &PointContext<'_>,
+    rows: &PointRows,
+    point: &PointVariables,
+    state: &PointState,
+    x: &[f64],
+    g: &mut [f64],
+) {
+    for (foot, forces) in feet(context) {
+        let (mut tangential, mut normal) = (0.0, 0.0);
+        for (is_x, c) in forces {
+            if is_x {
+                tangential += point.force[c];
+            } else {
+                normal += point.force[c];
+            }
+        }
+        let row = rows.friction + 2 * foot;
+        g[row] = FRICTION_SCALE * (programme.limits.friction * normal - tangential);
+        g[row + 1] = FRICTION_SCALE * (programme.limits.friction * normal + tangential);
+    }
+    for height in &rows.heights {
+        let z = state.contact_position(&programme.foot_points[height.foot_point])[1];
+        let mut value = HEIGHT_SCALE * z;
+        if height.clearance {
+            let share = swing_share(programme, context, x);
+            value -= HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[0];
+        }
+        g[height.row] = value;
+    }
+    if let Some(row) = rows.phase_rate {
+        g[row] = programme.hip_phase(context, point)[1];
+    }
+    if let Some((foot_point, row)) = rows.touchdown {
+        g[row] = state.contact_velocity(&programme.foot_points[foot_point])[1];
+    }
+}
+
+/// Jacobian.
+pub(super) fn jacobian(
+    programme: &GaitProgramme,
+    context: &PointContext<'_>,
+    rows: &PointRows,
+    state: &PointState,
+    x: &[f64],
+    p: usize,
+    out: &mut Entries<'_>,
+) {
+    for (foot, forces) in feet(context) {
+        let row = rows.friction + 2 * foot;
+        for (is_x, c) in forces {
+            let variable = p + FORCE + c;
+            if is_x {
+                out.jacobian(row, variable, -FRICTION_SCALE);
+                out.jacobian(row + 1, variable, FRICTION_SCALE);
+            } else {
+                out.jacobian(row, variable, FRICTION_SCALE * programme.limits.friction);
+                out.jacobian(row + 1, variable, FRICTION_SCALE * programme.limits.friction);
+            }
+        }
+    }
+    for height in &rows.heights {
+        let foot = &programme.foot_points[height.foot_point];
+        let gradient = position_gradient(state, foot, Axis::Z);
+        out.jacobian(height.row, p + Q + 1, HEIGHT_SCALE);
+        for i in leg_angles(side_of(height.foot_point)) {
+            out.jacobian(height.row, p + Q + 2 + i, HEIGHT_SCALE * gradient[i]);
+        }
+        if height.clearance {
+            let share = swing_share(programme, context, x);
+            let slope = -HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[1];
+            for i in 0..2 {
+                out.jacobian(height.row, share.durations[i], slope * share.gradient[i]);
+            }
+        }
+    }
+    if let Some(row) = rows.phase_rate {
+        for (angle, coefficient) in context.phase_terms() {
+            out.jacobian(row, p + QD + angle, coefficient);
+        }
+    }
+    if let Some((foot_point, row)) = rows.touchdown {
+        let foot = &programme.foot_points[foot_point];
+        let by_rate = position_gradient(state, foot, Axis::Z);
+        let by_angle = velocity_angle_gradient(state, foot, Axis::Z);
+        out.jacobian(row, p + QD + 1, 1.0);
+        for i in leg_angles(side_of(foot_point)) {
+            out.jacobian(row, p + Q + 2 + i, by_angle[i]);
+            out.jacobian(row, p + QD + 2 + i, by_rate[i]);
+        }
+    }
+}
+
+/// Hessian: link-space part into `link`, durations written directly.
+pub(super) fn hessian(
+    programme: &GaitProgramme,
+    context: &PointContext<'_>,
+    rows: &PointRows,
+    state: &PointState,
+    x: &[f64],
+    multipliers: &[f64],
+    link: &mut LinkHessian,
+    out: &mut Entries<'_>,
+) {
+    for height in &rows.heights {
+        let weight = HEIGHT_SCALE * multipliers[height.row];
+        let foot = &programme.foot_points[height.foot_point];
+        add_contact_hessian(state, foot, [0.0, weight], [0.0; 2], [0.0; 2], link);
+        if height.clearance {
+            let share = swing_share(programme, context, x);
+            let profile = clearance_profile(share.w);
+            let scale = -weight * programme.limits.clearance_m;
+            for i in 0..2 {
+                for j in 0..=i {
+                    let value = profile[2] * share.gradient[i] * share.gradient[j] + profile[1] * share.hessian[i][j];
+                    out.hessian(share.durations[i], share.durations[j], scale * value);
+                }
+            }
+        }
+    }
+    if let Some((foot_point, row)) = rows.touchdown {
+        let foot = &programme.foot_points[foot_point];
+        add_contact_hessian(state, foot, [0.0; 2], [0.0, multipliers[row]], [0.0; 2], link);
+    }
+}

@@ -1,0 +1,297 @@
+//! Where each variable of the programme sits, and its scale.
+//!
+//! All domains' point blocks first (domain-major, point-major), then v_hip (4), (x_L, D), then per domain the duration
+//! T, the phase limits, the Bezier coefficients (column-major) and the impulse. Variables are stored divided by their
+//! scale.
+
+use crate::body::{COORDINATES, JOINTS};
+use crate::muscle::MUSCLE_COUNT;
+use crate::settings::Mesh;
+use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain, DomainKind};
+
+/// Most contact rows of a domain.
+pub const MAX_CONTACTS: usize = 5;
+/// Most outputs of a domain.
+pub const MAX_OUTPUTS: usize = 6;
+
+/// Offsets within a point block.
+pub const Q: usize = 0;
+/// Velocities.
+pub const QD: usize = COORDINATES;
+/// Accelerations.
+pub const QDD: usize = 2 * COORDINATES;
+/// Torques.
+pub const U: usize = 3 * COORDINATES;
+/// Contact forces.
+pub const FORCE: usize = U + JOINTS;
+
+const SCALE_QD: f64 = 3.0;
+const SCALE_QDD: f64 = 30.0;
+const SCALE_U: f64 = 100.0;
+const SCALE_FORCE: f64 = 500.0;
+const SCALE_FIBRE_VELOCITY: f64 = 3.0;
+const SCALE_DURATION: f64 = 0.2;
+const SCALE_IMPULSE: f64 = 20.0;
+
+/// Where the variables of one domain sit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DomainLayout {
+    /// Which domain.
+    pub domain: Domain,
+    /// Mesh intervals N.
+    pub intervals: usize,
+    /// Points K = 2N + 1.
+    pub points: usize,
+    /// First variable of the first point.
+    pub start: usize,
+    /// Variables per point.
+    pub per_point: usize,
+    /// Contact rows nc.
+    pub contacts: usize,
+    /// Outputs (indices into q).
+    pub outputs: Vec<usize>,
+    /// Duration variable.
+    pub duration: usize,
+    /// Phase at the start.
+    pub phase_start: usize,
+    /// Phase at the end (a variable in SS1 only).
+    pub phase_end: Option<usize>,
+    /// First Bezier coefficient; coefficient i of output j is at `bezier + i * outputs.len() + j`.
+    pub bezier: usize,
+    /// First impulse component, in domains opened by an impact.
+    pub impulse: Option<usize>,
+    /// Hip-velocity variable.
+    pub hip_velocity: Option<usize>,
+}
+
+impl DomainLayout {
+    /// First variable of point k.
+    #[inline]
+    pub fn point(&self, k: usize) -> usize {
+        self.start + k * self.per_point
+    }
+    /// Offset of the fibre lengths within a point.
+    #[inline]
+    pub fn fibre_length(&self) -> usize {
+        FORCE + self.contacts
+    }
+    /// Offset of the fibre velocities within a point.
+    #[inline]
+    pub fn fibre_velocity(&self) -> usize {
+        self.fibre_length() + MUSCLE_COUNT
+    }
+    /// Offset of the activations within a point.
+    #[inline]
+    pub fn activation(&self) -> usize {
+        self.fibre_velocity() + MUSCLE_COUNT
+    }
+    /// Variable of Bezier coefficient i of output j.
+    #[inline]
+    pub fn bezier_coefficient(&self, j: usize, i: usize) -> usize {
+        self.bezier + i * self.outputs.len() + j
+    }
+    /// sigma_k = k / (K - 1).
+    #[inline]
+    pub fn sigma(&self, k: usize) -> f64 {
+        k as f64 / (self.points - 1) as f64
+    }
+    /// Composite Simpson weight of point k over the domain (the weights sum to 1).
+    #[inline]
+    pub fn simpson(&self, k: usize) -> f64 {
+        let weight = if k % 2 == 1 {
+            4.0
+        } else if k == 0 || k == self.points - 1 {
+            1.0
+        } else {
+            2.0
+        };
+        weight / (6.0 * self.intervals as f64)
+    }
+    /// Index of the last point.
+    #[inline]
+    pub fn last(&self) -> usize {
+        self.points - 1
+    }
+}
+
+/// Variable layout of the whole programme.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// With muscle variables.
+    pub muscles: bool,
+    /// The eight domains.
+    pub domains: Vec<DomainLayout>,
+    /// First of the four hip velocities.
+    pub hip_velocities: usize,
+    /// Length of the right step x_L; the stride length D follows.
+    pub right_step_length: usize,
+    /// Stride length D.
+    pub stride_length: usize,
+    /// Number of variables.
+    pub variables: usize,
+    /// Physical value = stored value * scale.
+    pub scale: Vec<f64>,
+}
+
+/// The variables of one mesh point in physical units.
+#[derive(Debug, Clone, Copy)]
+pub struct PointVariables {
+    /// Coordinates.
+    pub q: [f64; 9],
+    /// Velocities.
+    pub qd: [f64; 9],
+    /// Accelerations.
+    pub qdd: [f64; 9],
+    /// Torques, N m.
+    pub u: [f64; 6],
+    /// Contact forces, N (unused entries 0).
+    pub force: [f64; MAX_CONTACTS],
+    /// Fibre length / optimal length.
+    pub fibre_length: [f64; MUSCLE_COUNT],
+    /// Fibre velocity, optimal lengths per second.
+    pub fibre_velocity: [f64; MUSCLE_COUNT],
+    /// Activation.
+    pub activation: [f64; MUSCLE_COUNT],
+}
+
+impl Layout {
+    /// Layout for a mesh, with or without muscles.
+    pub fn new(mesh: &Mesh, muscles: bool) -> Self {
+        let mut next = 0;
+        let mut domains: Vec<DomainLayout> = CYCLE
+            .iter()
+            .map(|&domain| {
+                let intervals = match domain.kind {
+                    DomainKind::Ds2 => mesh.ds2,
+                    DomainKind::Ds3 => mesh.ds3,
+                    DomainKind::Ss2 => mesh.ss2,
+                    DomainKind::Ss1 => mesh.ss1,
+                };
+                let contacts = domain.contact_rows().len();
+                let per_point = FORCE + contacts + if muscles { 3 * MUSCLE_COUNT } else { 0 };
+                let points = 2 * intervals + 1;
+                let start = next;
+                next += points * per_point;
+                DomainLayout {
+                    domain,
+                    intervals,
+                    points,
+                    start,
+                    per_point,
+                    contacts,
+                    outputs: domain.outputs(),
+                    duration: 0,
+                    phase_start: 0,
+                    phase_end: None,
+                    bezier: 0,
+                    impulse: None,
+                    hip_velocity: None,
+                }
+            })
+            .collect();
+        let hip_velocities = next;
+        let right_step_length = next + 4;
+        let stride_length = next + 5;
+        next += 6;
+        for layout in &mut domains {
+            layout.duration = next;
+            layout.phase_start = next + 1;
+            next += 2;
+            if layout.domain.kind == DomainKind::Ss1 {
+                layout.phase_end = Some(next);
+                next += 1;
+            }
+            layout.bezier = next;
+            next += layout.outputs.len() * BEZIER_COEFFICIENTS;
+            if layout.domain.opens_with_impact() {
+                layout.impulse = Some(next);
+                next += layout.contacts;
+            }
+            layout.hip_velocity = layout.domain.hip_velocity_index().map(|i| hip_velocities + i);
+        }
+        let mut scale = vec![1.0; next];
+        for layout in &domains {
+            for k in 0..layout.points {
+                let p = layout.point(k);
+                scale[p + QD..p + QDD].fill(SCALE_QD);
+                scale[p + QDD..p + U].fill(SCALE_QDD);
+                scale[p + U..p + FORCE].fill(SCALE_U);
+                scale[p + FORCE..p + FORCE + layout.contacts].fill(SCALE_FORCE);
+                if muscles {
+                    scale[p + layout.fibre_velocity()..p + layout.activation()].fill(SCALE_FIBRE_VELOCITY);
+                }
+            }
+            scale[layout.duration] = SCALE_DURATION;
+            if let Some(impulse) = layout.impulse {
+                scale[impulse..impulse + layout.contacts].fill(SCALE_IMPULSE);
+            }
+        }
+        Self { muscles, domains, hip_velocities, right_step_length, stride_length, variables: next, scale }
+    }
+
+    /// Physical value of variable `index`.
+    #[inline]
+    pub fn value(&self, x: &[f64], index: usize) -> f64 {
+        x[index] * self.scale[index]
+    }
+
+    /// All variables of point k of domain d in physical units.
+    #[inline]
+    pub fn point_variables(&self, x: &[f64], d: usize, k: usize) -> PointVariables {
+        let layout = &self.domains[d];
+        let p = layout.point(k);
+        let mut result = PointVariables {
+            q: [0.0; 9],
+            qd: [0.0; 9],
+            qdd: [0.0; 9],
+            u: [0.0; 6],
+            force: [0.0; MAX_CONTACTS],
+            fibre_length: [0.0; MUSCLE_COUNT],
+            fibre_velocity: [0.0; MUSCLE_COUNT],
+            activation: [0.0; MUSCLE_COUNT],
+        };
+        for i in 0..COORDINATES {
+            result.q[i] = x[p + i];
+            result.qd[i] = x[p + QD + i] * SCALE_QD;
+            result.qdd[i] = x[p + QDD + i] * SCALE_QDD;
+        }
+        for i in 0..JOINTS {
+            result.u[i] = x[p + U + i] * SCALE_U;
+        }
+        for i in 0..layout.contacts {
+            result.force[i] = x[p + FORCE + i] * SCALE_FORCE;
+        }
+        if self.muscles {
+            for m in 0..MUSCLE_COUNT {
+                result.fibre_length[m] = x[p + layout.fibre_length() + m];
+                result.fibre_velocity[m] = x[p + layout.fibre_velocity() + m] * SCALE_FIBRE_VELOCITY;
+                result.activation[m] = x[p + layout.activation() + m];
+            }
+        }
+        result
+    }
+
+    /// Writes the variables of point k of domain d from physical units.
+    pub fn set_point_variables(&self, x: &mut [f64], d: usize, k: usize, point: &PointVariables) {
+        let layout = &self.domains[d];
+        let p = layout.point(k);
+        for i in 0..COORDINATES {
+            x[p + i] = point.q[i];
+            x[p + QD + i] = point.qd[i] / SCALE_QD;
+            x[p + QDD + i] = point.qdd[i] / SCALE_QDD;
+        }
+        for i in 0..JOINTS {
+            x[p + U + i] = point.u[i] / SCALE_U;
+        }
+        for i in 0..layout.contacts {
+            x[p + FORCE + i] = point.force[i] / SCALE_FORCE;
+        }
+        if self.muscles {
+            for m in 0..MUSCLE_COUNT {
+                x[p + layout.fibre_length() + m] = point.fibre_length[m];
+                x[p + layout.fibre_velocity() + m] = point.fibre_velocity[m] / SCALE_FIBRE_VELOCITY;
+                x[p + layout.activation() + m] = point.activation[m];
+            }
+        }
+    }
+}

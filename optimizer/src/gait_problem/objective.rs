@@ -1,0 +1,174 @@
+//! The objective: mechanical cost of transport, regularisation, and (in the cold start) tracking of the reference.
+//!
+//! `f = w_cot E / (m g D) + w_track track + reg`, `E = sum_domains T sum_k w_k sum_i (sqrt(P_i^2 + eps^2) - eps)` over the
+//! six joint powers `P_i = u_i qd_(3+i)`, `reg = sum_domains T sum_k w_k (weighted squares)`,
+//! `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`; w_k composite Simpson weights.
+
+use super::entries::Entries;
+use super::layout::{FORCE, Q, QD, QDD, U};
+use super::programme::GaitProgramme;
+use crate::body::{COORDINATES, GRAVITY, JOINTS};
+use crate::muscle::{MUSCLE_COUNT, MUSCLES};
+
+/// The parts of the objective, before their weights.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ObjectiveParts {
+    /// Mechanical cost of transport E / (m g D).
+    pub cost_of_transport: f64,
+    /// Mechanical energy E of a stride, J.
+    pub energy_j: f64,
+    /// Regularisation, weighted.
+    pub regularisation: f64,
+    /// Tracking.
+    pub tracking: f64,
+}
+
+/// A regularised variable: offset within the point and weight of its square in physical units.
+fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    let layout = &programme.layout.domains[d];
+    let weights = &programme.regularisation;
+    let torque = weights.torque / (100.0 * 100.0);
+    let acceleration = weights.acceleration / (30.0 * 30.0);
+    let force = weights.contact_force / (500.0 * 500.0);
+    let muscles = if programme.layout.muscles { MUSCLE_COUNT } else { 0 };
+    (0..JOINTS)
+        .map(move |i| (U + i, torque))
+        .chain((0..COORDINATES).map(move |i| (QDD + i, acceleration)))
+        .chain((0..layout.contacts).map(move |i| (FORCE + i, force)))
+        .chain((0..muscles).flat_map(move |m| {
+            let v = MUSCLES[m].max_speed;
+            [
+                (layout.activation() + m, weights.activation),
+                (layout.fibre_velocity() + m, weights.fibre_velocity / (v * v)),
+            ]
+        }))
+}
+
+/// `sqrt(P^2 + eps^2) - eps` with first and second derivative.
+fn smooth_power(power: f64, smoothing: f64) -> [f64; 3] {
+    let root = (power * power + smoothing * smoothing).sqrt();
+    [root - smoothing, power / root, smoothing * smoothing / (root * root * root)]
+}
+
+/// The parts.
+pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
+    let layout = &programme.layout;
+    let mut result = ObjectiveParts::default();
+    for (d, domain) in layout.domains.iter().enumerate() {
+        let duration = layout.value(x, domain.duration);
+        let (mut energy, mut regularisation, mut tracking) = (0.0, 0.0, 0.0);
+        for k in 0..domain.points {
+            let p = domain.point(k);
+            let weight = domain.simpson(k);
+            for i in 0..JOINTS {
+                let power = layout.value(x, p + U + i) * layout.value(x, p + QD + 3 + i);
+                energy += weight * smooth_power(power, programme.regularisation.power_smoothing_w)[0];
+            }
+            for (offset, c) in squares(programme, d) {
+                let value = layout.value(x, p + offset);
+                regularisation += weight * c * value * value;
+            }
+            for (i, reference) in programme.reference_angles[d][k].iter().enumerate() {
+                let error = x[p + Q + 2 + i] - reference;
+                tracking += error * error;
+            }
+        }
+        result.energy_j += duration * energy;
+        result.regularisation += duration * regularisation;
+        result.tracking += tracking / domain.points as f64;
+    }
+    let stride = layout.value(x, layout.stride_length);
+    result.cost_of_transport = result.energy_j / (programme.model.total_mass * GRAVITY * stride);
+    result
+}
+
+/// Weighted objective.
+pub(super) fn value(programme: &GaitProgramme, x: &[f64]) -> f64 {
+    let parts = parts(programme, x);
+    let weights = &programme.weights;
+    weights.cost_of_transport * parts.cost_of_transport + weights.tracking * parts.tracking + parts.regularisation
+}
+
+/// Gradient by the stored (scaled) variables.
+pub(super) fn gradient(programme: &GaitProgramme, x: &[f64], out: &mut [f64]) {
+    out.fill(0.0);
+    let layout = &programme.layout;
+    let scale = &layout.scale;
+    let stride = layout.value(x, layout.stride_length);
+    let per_energy = programme.weights.cost_of_transport / (programme.model.total_mass * GRAVITY * stride);
+    let mut total_energy = 0.0;
+    for (d, domain) in layout.domains.iter().enumerate() {
+        let duration = layout.value(x, domain.duration);
+        let (mut energy, mut regularisation) = (0.0, 0.0);
+        for k in 0..domain.points {
+            let p = domain.point(k);
+            let weight = domain.simpson(k);
+            for i in 0..JOINTS {
+                let (iu, iv) = (p + U + i, p + QD + 3 + i);
+                let (u, v) = (layout.value(x, iu), layout.value(x, iv));
+                let power = smooth_power(u * v, programme.regularisation.power_smoothing_w);
+                energy += weight * power[0];
+                let factor = per_energy * duration * weight * power[1];
+                out[iu] += factor * v * scale[iu];
+                out[iv] += factor * u * scale[iv];
+            }
+            for (offset, c) in squares(programme, d) {
+                let index = p + offset;
+                let value = layout.value(x, index);
+                regularisation += weight * c * value * value;
+                out[index] += 2.0 * duration * weight * c * value * scale[index];
+            }
+            let tracking = 2.0 * programme.weights.tracking / domain.points as f64;
+            for (i, reference) in programme.reference_angles[d][k].iter().enumerate() {
+                out[p + Q + 2 + i] += tracking * (x[p + Q + 2 + i] - reference);
+            }
+        }
+        out[domain.duration] += (per_energy * energy + regularisation) * scale[domain.duration];
+        total_energy += duration * energy;
+    }
+    out[layout.stride_length] -= per_energy * total_energy / stride * scale[layout.stride_length];
+}
+
+/// Hessian times sigma.
+pub(super) fn hessian(programme: &GaitProgramme, x: &[f64], sigma: f64, out: &mut Entries<'_>) {
+    let layout = &programme.layout;
+    let d_index = layout.stride_length;
+    let stride = layout.value(x, d_index);
+    let per_energy = sigma * programme.weights.cost_of_transport / (programme.model.total_mass * GRAVITY * stride);
+    let mut total_energy = 0.0;
+    for (d, domain) in layout.domains.iter().enumerate() {
+        let duration = layout.value(x, domain.duration);
+        let mut energy = 0.0;
+        for k in 0..domain.points {
+            let p = domain.point(k);
+            let weight = domain.simpson(k);
+            for i in 0..JOINTS {
+                let (iu, iv) = (p + U + i, p + QD + 3 + i);
+                let (u, v) = (layout.value(x, iu), layout.value(x, iv));
+                let power = smooth_power(u * v, programme.regularisation.power_smoothing_w);
+                energy += weight * power[0];
+                let factor = per_energy * duration * weight;
+                out.hessian(iu, iu, factor * power[2] * v * v);
+                out.hessian(iv, iv, factor * power[2] * u * u);
+                out.hessian(iu, iv, factor * (power[2] * u * v + power[1]));
+                for (index, by) in [(iu, power[1] * v), (iv, power[1] * u)] {
+                    out.hessian(index, domain.duration, per_energy * weight * by);
+                    out.hessian(index, d_index, -factor / stride * by);
+                }
+            }
+            for (offset, c) in squares(programme, d) {
+                let index = p + offset;
+                let slope = 2.0 * sigma * weight * c;
+                out.hessian(index, index, slope * duration);
+                out.hessian(index, domain.duration, slope * layout.value(x, index));
+            }
+            let tracking = 2.0 * sigma * programme.weights.tracking / domain.points as f64;
+            for i in 0..7 {
+                out.hessian(p + Q + 2 + i, p + Q + 2 + i, tracking);
+            }
+        }
+        out.hessian(domain.duration, d_index, -per_energy * energy / stride);
+        total_energy += duration * energy;
+    }
+    out.hessian(d_index, d_index, 2.0 * per_energy * total_energy / (stride * stride));
+}

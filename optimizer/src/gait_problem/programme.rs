@@ -1,0 +1,456 @@
+//! The programme as the solver sees it: traversal of all rows for values, Jacobian and Hessian.
+
+use super::entries::{Compressed, Entries};
+use super::layout::{DomainLayout, Layout, PointVariables};
+use super::limits::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
+use super::objective::ObjectiveParts;
+use super::rows::{RowKind, RowTable};
+use super::zero_dynamics;
+use super::{contact_limits, fibres, hip_velocity, mechanics, muscle_forces, objective, outputs, stride, transitions};
+use crate::body::dynamics::LinkHessian;
+use crate::body::{ContactPoint, PointState, WalkerModel};
+use crate::bounds::TunedBounds;
+use crate::device::Device;
+use crate::gait::{Axis, FootPoint, Side};
+use crate::nlp::{EliminationBlocks, NonlinearProgram, SparsityPattern};
+use crate::reference::ReferenceGait;
+use crate::settings::{GaitSettings, Regularisation};
+use crate::subject::{ModelError, Subject};
+use crate::walking::{CYCLE, ContactRow, phase_gradient};
+use std::sync::Arc;
+
+/// Weights of the objective's parts in a phase of the solve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObjectiveWeights {
+    /// Of the cost of transport.
+    pub cost_of_transport: f64,
+    /// Of the tracking term.
+    pub tracking: f64,
+}
+
+/// Nonzero terms of the phase gradient of a stance side: (index in q, coefficient).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PhaseTerms([(usize, f64); 4]);
+
+impl PhaseTerms {
+    fn new(model: &WalkerModel, stance: Side) -> Self {
+        let gradient = phase_gradient(model, stance);
+        let hip = stance.hip();
+        Self([2, hip, hip + 1, hip + 2].map(|i| (i, gradient[i - 2])))
+    }
+
+    #[inline]
+    pub(super) fn terms(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        self.0.into_iter()
+    }
+
+    #[inline]
+    fn along(&self, a: &[f64; 9]) -> f64 {
+        self.0.iter().map(|&(i, c)| c * a[i]).sum()
+    }
+}
+
+/// What the rows of one domain share.
+pub(super) struct DomainContext<'a> {
+    pub(super) d: usize,
+    pub(super) layout: &'a DomainLayout,
+    pub(super) phase: PhaseTerms,
+    pub(super) duration: f64,
+}
+
+/// What the rows of one point share.
+pub(super) struct PointContext<'a> {
+    pub(super) d: usize,
+    pub(super) k: usize,
+    pub(super) layout: &'a DomainLayout,
+    pub(super) contacts: &'a [ContactRow],
+    /// Target of each contact row: constant + coefficient of x_L + coefficient of D.
+    pub(super) contact_targets: &'a [[f64; 3]],
+    phase: PhaseTerms,
+    pub(super) duration: f64,
+    pub(super) hip_velocity: f64,
+    pub(super) right_step_length: f64,
+    pub(super) stride_length: f64,
+}
+
+impl PointContext<'_> {
+    #[inline]
+    pub(super) fn phase_terms(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        self.phase.terms()
+    }
+}
+
+/// The gait programme of one subject, device, set of bounds and variant.
+#[derive(Debug, Clone)]
+pub struct GaitProgramme {
+    /// The walker.
+    pub model: WalkerModel,
+    /// Variables.
+    pub layout: Layout,
+    /// Rows.
+    pub rows: RowTable,
+    /// Weights of the objective.
+    pub weights: ObjectiveWeights,
+    pub(super) limits: ActiveLimits,
+    pub(super) regularisation: Regularisation,
+    pub(super) foot_points: [ContactPoint; 4],
+    pub(super) contacts: Vec<Vec<ContactRow>>,
+    contact_targets: Vec<Vec<[f64; 3]>>,
+    phases: [PhaseTerms; 2],
+    /// Reference angles q[2..] by domain and point, rad.
+    pub(super) reference_angles: Vec<Vec<[f64; 7]>>,
+    bounds: VariableBounds,
+    settings: GaitSettings,
+    structure: Arc<Structure>,
+}
+
+#[derive(Debug, Default)]
+struct Structure {
+    jacobian: Compressed,
+    hessian: Compressed,
+    blocks: EliminationBlocks,
+}
+
+/// Stride fractions at the domain boundaries of one step, in the cold start's timing.
+pub const STEP_FRACTIONS: [f64; 5] = [0.0, 0.07, 0.12, 0.33, 0.50];
+
+/// Stride fraction of point k of domain d in the cold start's timing.
+pub fn stride_fraction(d: usize, sigma: f64) -> f64 {
+    let (step, kind) = (d / 4, d % 4);
+    0.5 * step as f64 + STEP_FRACTIONS[kind] + sigma * (STEP_FRACTIONS[kind + 1] - STEP_FRACTIONS[kind])
+}
+
+impl GaitProgramme {
+    /// Builds the programme with the weights of the final phase (cost of transport 1, tracking 0).
+    ///
+    /// # Errors
+    /// [`ModelError`] naming what is out of range.
+    pub fn new(
+        subject: &Subject,
+        device: &Device,
+        bounds: &TunedBounds,
+        muscles: bool,
+        settings: &GaitSettings,
+        reference: &ReferenceGait,
+    ) -> Result<Self, ModelError> {
+        bounds.validate()?;
+        settings.validate()?;
+        reference.validate()?;
+        let model = WalkerModel::new(subject, device)?;
+        let layout = Layout::new(&settings.mesh, muscles);
+        let mut rows = RowTable::new(&layout);
+        set_row_bounds(&mut rows, &settings.limits, false);
+        let foot_points = [
+            (FootPoint::Heel, Side::Left),
+            (FootPoint::Toe, Side::Left),
+            (FootPoint::Heel, Side::Right),
+            (FootPoint::Toe, Side::Right),
+        ]
+        .map(|(point, side)| model.contact_point(point, side));
+        let contacts: Vec<Vec<ContactRow>> = CYCLE.iter().map(|d| d.contact_rows()).collect();
+        let contact_targets = CYCLE
+            .iter()
+            .zip(&contacts)
+            .map(|(domain, rows)| rows.iter().map(|row| contact_target(&model, domain.stance, *row)).collect())
+            .collect();
+        let reference_angles = layout
+            .domains
+            .iter()
+            .enumerate()
+            .map(|(d, domain)| {
+                (0..domain.points).map(|k| reference.seven_angles(stride_fraction(d, domain.sigma(k)))).collect()
+            })
+            .collect();
+        let phases = [PhaseTerms::new(&model, Side::Left), PhaseTerms::new(&model, Side::Right)];
+        let mut programme = Self {
+            limits: ActiveLimits::new(&settings.limits, bounds),
+            regularisation: settings.regularisation,
+            bounds: variable_bounds(&layout, bounds, &settings.limits, device),
+            settings: *settings,
+            weights: ObjectiveWeights { cost_of_transport: 1.0, tracking: 0.0 },
+            structure: Arc::new(Structure::default()),
+            model,
+            layout,
+            rows,
+            foot_points,
+            contacts,
+            contact_targets,
+            phases,
+            reference_angles,
+        };
+        programme.structure = Arc::new(programme.record_structure());
+        Ok(programme)
+    }
+
+    /// The same programme in the tracking phase of the cold start: other weights, landing points only have to move
+    /// downwards.
+    #[must_use]
+    pub fn for_tracking(&self, tracking: f64) -> Self {
+        let mut programme = self.clone();
+        programme.weights = ObjectiveWeights { cost_of_transport: 0.0, tracking };
+        set_row_bounds(&mut programme.rows, &self.settings.limits, true);
+        programme
+    }
+
+    /// Parts of the objective at x.
+    pub fn objective_parts(&self, x: &[f64]) -> ObjectiveParts {
+        objective::parts(self, x)
+    }
+
+    /// The settings it was built with.
+    pub fn settings(&self) -> &GaitSettings {
+        &self.settings
+    }
+
+    pub(super) fn contact_point(&self, row: ContactRow) -> &ContactPoint {
+        &self.foot_points[super::rows::foot_point_index(row.point, row.side)]
+    }
+
+    /// dp and its first two derivatives at a point.
+    #[inline]
+    pub(super) fn hip_phase(&self, context: &PointContext<'_>, point: &PointVariables) -> [f64; 3] {
+        self.phase_along(&context.phase, point)
+    }
+
+    #[inline]
+    pub(super) fn phase_along(&self, phase: &PhaseTerms, point: &PointVariables) -> [f64; 3] {
+        [phase.along(&point.q), phase.along(&point.qd), phase.along(&point.qdd)]
+    }
+
+    fn phase_of_stance(&self, stance: Side) -> PhaseTerms {
+        match stance {
+            Side::Left => self.phases[0],
+            Side::Right => self.phases[1],
+        }
+    }
+
+    fn domain_context(&self, x: &[f64], d: usize) -> DomainContext<'_> {
+        let layout = &self.layout.domains[d];
+        DomainContext {
+            d,
+            layout,
+            phase: self.phase_of_stance(layout.domain.stance),
+            duration: self.layout.value(x, layout.duration),
+        }
+    }
+
+    fn point_context(&self, x: &[f64], d: usize, k: usize) -> PointContext<'_> {
+        let layout = &self.layout.domains[d];
+        PointContext {
+            d,
+            k,
+            layout,
+            contacts: &self.contacts[d],
+            contact_targets: &self.contact_targets[d],
+            phase: self.phase_of_stance(layout.domain.stance),
+            duration: self.layout.value(x, layout.duration),
+            hip_velocity: layout.hip_velocity.map_or(0.0, |i| self.layout.value(x, i)),
+            right_step_length: self.layout.value(x, self.layout.right_step_length),
+            stride_length: self.layout.value(x, self.layout.stride_length),
+        }
+    }
+
+    fn write_jacobian(&self, x: &[f64], out: &mut Entries<'_>) {
+        for (d, rows) in self.rows.domains.iter().enumerate() {
+            for (k, point_rows) in rows.points.iter().enumerate() {
+                let context = self.point_context(x, d, k);
+                let point = self.layout.point_variables(x, d, k);
+                let state = PointState::new(&point.q, &point.qd, &point.qdd);
+                let p = context.layout.point(k);
+                mechanics::jacobian(self, &context, point_rows, &point, &state, p, out);
+                outputs::jacobian(self, &context, point_rows, &point, x, p, out);
+                hip_velocity::jacobian(&context, point_rows, p, out);
+                contact_limits::jacobian(self, &context, point_rows, &state, x, p, out);
+                muscle_forces::jacobian(context.layout, point_rows, &point, p, out);
+            }
+            let context = self.domain_context(x, d);
+            zero_dynamics::jacobian(self, &context, rows, x, out);
+            fibres::jacobian(self, &context, rows, x, out);
+            transitions::jacobian(self, d, rows, x, out);
+        }
+        stride::jacobian(self, x, out);
+    }
+
+    fn write_hessian(&self, x: &[f64], sigma: f64, multipliers: &[f64], out: &mut Entries<'_>) {
+        for (d, rows) in self.rows.domains.iter().enumerate() {
+            for (k, point_rows) in rows.points.iter().enumerate() {
+                let context = self.point_context(x, d, k);
+                let point = self.layout.point_variables(x, d, k);
+                let state = PointState::new(&point.q, &point.qd, &point.qdd);
+                let p = context.layout.point(k);
+                let mut link = LinkHessian::default();
+                mechanics::hessian(self, &context, point_rows, &point, &state, p, multipliers, &mut link, out);
+                contact_limits::hessian(self, &context, point_rows, &state, x, multipliers, &mut link, out);
+                mechanics::write_link_hessian(&link, p, out);
+                outputs::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
+                hip_velocity::hessian(&context, point_rows, multipliers, out);
+                muscle_forces::hessian(context.layout, point_rows, &point, p, multipliers, out);
+            }
+            let context = self.domain_context(x, d);
+            zero_dynamics::hessian(&context, rows, multipliers, out);
+            fibres::hessian(&context, rows, multipliers, out);
+            transitions::hessian(self, d, rows, x, multipliers, out);
+        }
+        stride::hessian(self, x, multipliers, out);
+        objective::hessian(self, x, sigma, out);
+    }
+
+    fn record_structure(&self) -> Structure {
+        // Any point with positive durations and phase widths serves: entries do not depend on values.
+        let mut x = vec![0.5; self.layout.variables];
+        for domain in &self.layout.domains {
+            if let Some(end) = domain.phase_end {
+                x[end] = 1.0;
+            }
+        }
+        let (n, m) = (self.layout.variables, self.rows.names.len());
+        let mut entries = Vec::new();
+        self.write_jacobian(&x, &mut Entries::structure(&self.layout.scale, &mut entries));
+        let jacobian = Compressed::new(m, n, &entries);
+        entries.clear();
+        self.write_hessian(&x, 1.0, &vec![1.0; m], &mut Entries::structure(&self.layout.scale, &mut entries));
+        let hessian = Compressed::new(n, n, &entries);
+        Structure { jacobian, hessian, blocks: self.elimination_tree() }
+    }
+
+    /// One block per mesh point under one block per domain (Bezier coefficients, phase limits, integration rows)
+    /// under one root (durations, hip velocities, lengths, impulses, resets). The velocities before an impact and the
+    /// rows that determine them move to the root, because the impact couples them with the next domain.
+    fn elimination_tree(&self) -> EliminationBlocks {
+        let points: usize = self.layout.domains.iter().map(|d| d.points).sum();
+        let root = points + CYCLE.len();
+        let mut blocks = EliminationBlocks {
+            parent: vec![Some(root); root + 1],
+            block_of_variable: vec![root; self.layout.variables],
+            block_of_row: vec![root; self.rows.names.len()],
+        };
+        blocks.parent[root] = None;
+        let mut first_block = vec![0; CYCLE.len()];
+        let mut block = 0;
+        for (d, domain) in self.layout.domains.iter().enumerate() {
+            first_block[d] = block;
+            let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();
+            for k in 0..domain.points {
+                blocks.parent[block] = Some(points + d);
+                let p = domain.point(k);
+                blocks.block_of_variable[p..p + domain.per_point].fill(block);
+                if into_impact && k == domain.last() {
+                    blocks.block_of_variable[p + super::layout::QD..p + super::layout::QDD].fill(root);
+                }
+                block += 1;
+            }
+            let own = points + d;
+            blocks.block_of_variable[domain.phase_start] = own;
+            if let Some(end) = domain.phase_end {
+                blocks.block_of_variable[end] = own;
+            }
+            let coefficients = domain.outputs.len() * crate::walking::BEZIER_COEFFICIENTS;
+            blocks.block_of_variable[domain.bezier..domain.bezier + coefficients].fill(own);
+        }
+        for (row, name) in self.rows.names.iter().enumerate() {
+            let super::rows::Place::Point { domain, point } = name.place else { continue };
+            let (d, k) = (usize::from(domain), usize::from(point));
+            let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();
+            let before_impact = into_impact && k == self.layout.domains[d].last();
+            blocks.block_of_row[row] = match name.kind {
+                RowKind::MidpointPhase
+                | RowKind::EndpointPhase
+                | RowKind::MidpointPhaseRate
+                | RowKind::EndpointPhaseRate
+                | RowKind::MidpointFibre
+                | RowKind::EndpointFibre => points + d,
+                RowKind::ContactVelocity | RowKind::OutputVelocity | RowKind::HipVelocity if before_impact => root,
+                _ => first_block[d] + k,
+            };
+        }
+        blocks
+    }
+}
+
+/// World position of a contact row: (constant, coefficient of x_L, coefficient of D), m.
+fn contact_target(model: &WalkerModel, stance: Side, row: ContactRow) -> [f64; 3] {
+    if row.axis == Axis::Z {
+        return [0.0; 3];
+    }
+    let toe = match (stance, row.side) {
+        (_, Side::Right) => [0.0, 0.0, 0.0],
+        (Side::Right, Side::Left) => [0.0, 1.0, -1.0],
+        (Side::Left, Side::Left) => [0.0, 1.0, 0.0],
+    };
+    let leg = model.leg(row.side);
+    match row.point {
+        FootPoint::Toe => toe,
+        FootPoint::Heel => [toe[0] - leg.heel_behind_m - leg.toe_ahead_m, toe[1], toe[2]],
+    }
+}
+
+impl NonlinearProgram for GaitProgramme {
+    fn variables(&self) -> usize {
+        self.layout.variables
+    }
+
+    fn rows(&self) -> usize {
+        self.rows.names.len()
+    }
+
+    fn variable_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+        lower.copy_from_slice(&self.bounds.lower);
+        upper.copy_from_slice(&self.bounds.upper);
+    }
+
+    fn row_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+        lower.copy_from_slice(&self.rows.lower);
+        upper.copy_from_slice(&self.rows.upper);
+    }
+
+    fn jacobian_pattern(&self) -> &SparsityPattern {
+        &self.structure.jacobian.pattern
+    }
+
+    fn hessian_pattern(&self) -> &SparsityPattern {
+        &self.structure.hessian.pattern
+    }
+
+    fn objective(&self, x: &[f64]) -> f64 {
+        objective::value(self, x)
+    }
+
+    fn gradient(&self, x: &[f64], gradient: &mut [f64]) {
+        objective::gradient(self, x, gradient);
+    }
+
+    fn constraints(&self, x: &[f64], values: &mut [f64]) {
+        for (d, rows) in self.rows.domains.iter().enumerate() {
+            for (k, point_rows) in rows.points.iter().enumerate() {
+                let context = self.point_context(x, d, k);
+                let point = self.layout.point_variables(x, d, k);
+                let state = PointState::new(&point.q, &point.qd, &point.qdd);
+                mechanics::values(self, &context, point_rows, &point, &state, values);
+                outputs::values(self, &context, point_rows, &point, x, values);
+                hip_velocity::values(self, &context, point_rows, &point, x, values);
+                contact_limits::values(self, &context, point_rows, &point, &state, x, values);
+                muscle_forces::values(point_rows, &point, values);
+            }
+            let context = self.domain_context(x, d);
+            zero_dynamics::values(self, &context, rows, x, values);
+            fibres::values(self, &context, rows, x, values);
+            transitions::values(self, d, rows, x, values);
+        }
+        stride::values(self, x, values);
+    }
+
+    fn jacobian(&self, x: &[f64], values: &mut [f64]) {
+        let structure = &self.structure.jacobian;
+        self.write_jacobian(x, &mut Entries::values(&self.layout.scale, &structure.slots, values));
+    }
+
+    fn hessian(&self, x: &[f64], sigma: f64, multipliers: &[f64], values: &mut [f64]) {
+        let structure = &self.structure.hessian;
+        let mut out = Entries::values(&self.layout.scale, &structure.slots, values);
+        self.write_hessian(x, sigma, multipliers, &mut out);
+    }
+
+    fn elimination_blocks(&self) -> Option<&EliminationBlocks> {
+        Some(&self.structure.blocks)
+    }
+}

@@ -1,0 +1,482 @@
+//! The rows of the programme: names, bounds, and where each group of rows starts.
+
+use super::layout::Layout;
+use crate::gait::{Axis, FootPoint, Side};
+use crate::muscle::{MUSCLE_COUNT, MUSCLES};
+use crate::walking::{CYCLE, ContactRow, DomainKind};
+
+/// What a row says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum RowKind {
+    Dynamics,
+    ContactAcceleration,
+    ContactPosition,
+    ContactVelocity,
+    OutputPosition,
+    OutputVelocity,
+    OutputAcceleration,
+    HipPhase,
+    HipVelocity,
+    HipAcceleration,
+    MidpointPhase,
+    EndpointPhase,
+    MidpointPhaseRate,
+    EndpointPhaseRate,
+    PhaseEnd,
+    PhaseRate,
+    Friction,
+    Height,
+    Clearance,
+    TouchdownSpeed,
+    ImpactFriction,
+    PositionReset,
+    VelocityReset,
+    Impact,
+    FibreReset,
+    MuscleForce,
+    MuscleTorque,
+    MidpointFibre,
+    EndpointFibre,
+    StepLength,
+    Speed,
+}
+
+impl RowKind {
+    /// Number of the paper's constraint.
+    pub fn constraint(self, component: u8) -> &'static str {
+        match self {
+            Self::Dynamics
+            | Self::ContactAcceleration
+            | Self::ContactPosition
+            | Self::ContactVelocity
+            | Self::MidpointPhase
+            | Self::EndpointPhase
+            | Self::MidpointPhaseRate
+            | Self::EndpointPhaseRate
+            | Self::PhaseEnd => "C1",
+            Self::OutputPosition
+            | Self::OutputVelocity
+            | Self::OutputAcceleration
+            | Self::HipPhase
+            | Self::HipVelocity
+            | Self::HipAcceleration
+            | Self::PositionReset
+            | Self::VelocityReset
+            | Self::Impact
+            | Self::FibreReset => "C2",
+            Self::Friction
+            | Self::Height
+            | Self::Clearance
+            | Self::TouchdownSpeed
+            | Self::ImpactFriction
+            | Self::PhaseRate => "C3",
+            Self::StepLength | Self::Speed => "C4",
+            Self::MuscleForce => "C5-C7",
+            Self::MidpointFibre | Self::EndpointFibre => "C8",
+            Self::MuscleTorque => ["C9", "C10", "C11", "C12"][usize::from(component).min(3)],
+        }
+    }
+
+    /// (what it is in words, unit of the physical residual, physical residual per unit of the coded row)
+    pub fn description(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::Dynamics => ("equation of motion", "N or N m", 100.0),
+            Self::ContactAcceleration => ("contact acceleration", "m/s²", 10.0),
+            Self::ContactPosition => ("contact position", "m", 1.0),
+            Self::ContactVelocity => ("contact velocity", "m/s", 1.0),
+            Self::OutputPosition => ("virtual constraint", "rad", 1.0),
+            Self::OutputVelocity => ("virtual constraint rate", "rad/s", 1.0),
+            Self::OutputAcceleration => ("virtual constraint acceleration", "rad/s²", 10.0),
+            Self::HipPhase => ("hip phase", "m", 1.0),
+            Self::HipVelocity => ("hip velocity", "m/s", 1.0),
+            Self::HipAcceleration => ("hip acceleration", "m/s²", 10.0),
+            Self::MidpointPhase | Self::EndpointPhase => ("integration of the hip phase", "m", 1.0),
+            Self::MidpointPhaseRate | Self::EndpointPhaseRate => ("integration of the hip velocity", "m/s", 1.0),
+            Self::PhaseEnd => ("phase at the end of the domain", "m", 1.0),
+            Self::PhaseRate => ("forward hip velocity", "m/s", 1.0),
+            Self::Friction => ("friction cone", "N", 500.0),
+            Self::Height => ("height above the ground", "m", 0.1),
+            Self::Clearance => ("swing-foot clearance", "m", 0.1),
+            Self::TouchdownSpeed => ("touchdown speed", "m/s", 1.0),
+            Self::ImpactFriction => ("friction cone of the impact", "N s", 20.0),
+            Self::PositionReset => ("continuity of position", "m or rad", 1.0),
+            Self::VelocityReset => ("continuity of velocity", "m/s or rad/s", 3.0),
+            Self::Impact => ("impact momentum balance", "N s or N m s", 5.0),
+            Self::FibreReset => ("continuity of fibre length", "l_opt", 1.0),
+            Self::MuscleForce => ("muscle-tendon force equilibrium", "F_max", 1.0),
+            Self::MuscleTorque => ("joint torque from muscles", "N m", 100.0),
+            Self::MidpointFibre | Self::EndpointFibre => ("integration of the fibre length", "l_opt", 1.0),
+            Self::StepLength => ("step length", "m", 1.0),
+            Self::Speed => ("walking speed", "m/s", 1.0),
+        }
+    }
+}
+
+/// Where a row belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// Point `point` of domain `domain`.
+    Point {
+        /// 0..8.
+        domain: u8,
+        /// 0..K.
+        point: u16,
+    },
+    /// From the end of `domain` to the start of the next one.
+    Transition {
+        /// 0..8.
+        domain: u8,
+    },
+    /// The whole stride.
+    Stride,
+}
+
+/// Name of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RowName {
+    /// Where.
+    pub place: Place,
+    /// What.
+    pub kind: RowKind,
+    /// Which component (meaning depends on the kind).
+    pub component: u8,
+}
+
+const COORDINATE_NAMES: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+
+fn contact_name(row: ContactRow) -> String {
+    let point = match row.point {
+        FootPoint::Heel => "heel",
+        FootPoint::Toe => "toe",
+    };
+    let side = match row.side {
+        Side::Left => "L",
+        Side::Right => "R",
+    };
+    let axis = match row.axis {
+        Axis::X => "x",
+        Axis::Z => "z",
+    };
+    format!("{point}_{side} {axis}")
+}
+
+impl RowName {
+    /// The component in words: a coordinate, a contact row, a muscle, ...
+    pub fn component_name(&self) -> String {
+        let component = usize::from(self.component);
+        let domain = match self.place {
+            Place::Point { domain, .. } | Place::Transition { domain } => CYCLE.get(usize::from(domain)).copied(),
+            Place::Stride => None,
+        };
+        match self.kind {
+            RowKind::Dynamics | RowKind::PositionReset | RowKind::VelocityReset | RowKind::Impact => {
+                COORDINATE_NAMES[component.min(8)].to_owned()
+            }
+            RowKind::ContactAcceleration | RowKind::ContactPosition | RowKind::ContactVelocity => {
+                domain.and_then(|d| d.contact_rows().get(component).copied()).map_or_else(String::new, contact_name)
+            }
+            RowKind::OutputPosition | RowKind::OutputVelocity | RowKind::OutputAcceleration => domain
+                .and_then(|d| d.outputs().get(component).copied())
+                .map_or_else(String::new, |i| COORDINATE_NAMES[i].to_owned()),
+            RowKind::Friction => format!(
+                "{} foot, {} edge",
+                if component < 2 { "stance" } else { "trailing" },
+                if component % 2 == 0 { "forward" } else { "backward" }
+            ),
+            RowKind::ImpactFriction => {
+                format!("landing heel, {} edge", if component == 0 { "forward" } else { "backward" })
+            }
+            RowKind::Height | RowKind::Clearance | RowKind::TouchdownSpeed => {
+                ["heel_L", "toe_L", "heel_R", "toe_R"][component.min(3)].to_owned()
+            }
+            RowKind::FibreReset | RowKind::MuscleForce | RowKind::MidpointFibre | RowKind::EndpointFibre => {
+                MUSCLES[component.min(MUSCLE_COUNT - 1)].name.to_owned()
+            }
+            RowKind::MuscleTorque => ["hip_L", "knee_L", "ankle_L", "hip_R"][component.min(3)].to_owned(),
+            RowKind::StepLength => ["right step", "left step"][component.min(1)].to_owned(),
+            _ => String::new(),
+        }
+    }
+
+    /// `SS1_R point 3, C3 swing-foot clearance, heel_L`.
+    pub fn label(&self) -> String {
+        let place = match self.place {
+            Place::Point { domain, point } => format!("{} point {point}", CYCLE[usize::from(domain).min(7)].name()),
+            Place::Transition { domain } => {
+                let from = usize::from(domain).min(7);
+                format!("{} to {}", CYCLE[from].name(), CYCLE[(from + 1) % 8].name())
+            }
+            Place::Stride => "stride".to_owned(),
+        };
+        let component = self.component_name();
+        let separator = if component.is_empty() { "" } else { ", " };
+        format!("{place}, {} {}{separator}{component}", self.kind.constraint(self.component), self.kind.description().0)
+    }
+}
+
+/// First row of each group at one mesh point. Groups that a point lacks are `None` or empty.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PointRows {
+    /// 9 rows.
+    pub dynamics: usize,
+    /// One per contact.
+    pub contact_acceleration: usize,
+    /// (contact, row).
+    pub contact_position: Vec<(usize, usize)>,
+    /// One per contact.
+    pub contact_velocity: Option<usize>,
+    /// One per output.
+    pub output_position: usize,
+    /// One per output.
+    pub output_velocity: usize,
+    /// One per output.
+    pub output_acceleration: usize,
+    /// dp = pa + v_hip T sigma (or dp = pa at the first point).
+    pub hip_phase: Option<usize>,
+    /// dp_dot = v_hip.
+    pub hip_velocity: Option<usize>,
+    /// dp_ddot = 0.
+    pub hip_acceleration: Option<usize>,
+    /// 10 rows.
+    pub muscle_force: Option<usize>,
+    /// 4 rows.
+    pub muscle_torque: Option<usize>,
+    /// Two rows per foot on the ground, stance foot first.
+    pub friction: usize,
+    /// Heights of the points in the air.
+    pub heights: Vec<HeightRow>,
+    /// dp_dot >= minimum.
+    pub phase_rate: Option<usize>,
+    /// (foot point, row) of the landing point's vertical velocity.
+    pub touchdown: Option<(usize, usize)>,
+}
+
+/// A height row: foot point (0 heel_L, 1 toe_L, 2 heel_R, 3 toe_R), row, and whether the clearance a5 applies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HeightRow {
+    /// Foot point.
+    pub foot_point: usize,
+    /// Row.
+    pub row: usize,
+    /// With the swing clearance profile.
+    pub clearance: bool,
+}
+
+/// Rows of one domain that are not at a single point, and of the transition out of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DomainRows {
+    /// By point.
+    pub points: Vec<PointRows>,
+    /// Four rows per interval (midpoint phase, endpoint phase, midpoint rate, endpoint rate), SS1.
+    pub zero_dynamics: Option<usize>,
+    /// pb = dp at the last point, SS1.
+    pub phase_end: Option<usize>,
+    /// 20 rows per interval (10 midpoint, 10 endpoint).
+    pub fibres: Option<usize>,
+    /// 9 rows into the next domain.
+    pub position_reset: usize,
+    /// 9 rows into the next domain (impact or continuity).
+    pub velocity_reset: usize,
+    /// 2 rows into the next domain.
+    pub impact_friction: Option<usize>,
+    /// 10 rows into the next domain.
+    pub fibre_reset: Option<usize>,
+}
+
+/// All rows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RowTable {
+    /// Name of each row.
+    pub names: Vec<RowName>,
+    /// Lower bound of each row.
+    pub lower: Vec<f64>,
+    /// Upper bound of each row.
+    pub upper: Vec<f64>,
+    /// By domain.
+    pub domains: Vec<DomainRows>,
+    /// Two rows: x_L, D - x_L.
+    pub step_length: usize,
+    /// One row: D / sum T.
+    pub speed: usize,
+}
+
+/// Index of a foot point: heel_L, toe_L, heel_R, toe_R.
+pub fn foot_point_index(point: FootPoint, side: Side) -> usize {
+    let base = match side {
+        Side::Left => 0,
+        Side::Right => 2,
+    };
+    base + match point {
+        FootPoint::Heel => 0,
+        FootPoint::Toe => 1,
+    }
+}
+
+impl RowTable {
+    fn add(&mut self, place: Place, kind: RowKind, count: usize, lower: f64, upper: f64) -> usize {
+        let first = self.names.len();
+        for component in 0..count {
+            let component = u8::try_from(component).unwrap_or(u8::MAX);
+            self.names.push(RowName { place, kind, component });
+            self.lower.push(lower);
+            self.upper.push(upper);
+        }
+        first
+    }
+
+    fn add_one(&mut self, place: Place, kind: RowKind, component: usize, lower: f64, upper: f64) -> usize {
+        let row = self.add(place, kind, 1, lower, upper);
+        self.names[row].component = u8::try_from(component).unwrap_or(u8::MAX);
+        row
+    }
+
+    /// All rows of a layout. Inequality rows are `>= 0` except where their own limits (speed, steps, touchdown, phase
+    /// rate) are set later by [`super::limits`].
+    pub fn new(layout: &Layout) -> Self {
+        let mut table = Self::default();
+        for (d, domain_layout) in layout.domains.iter().enumerate() {
+            let mut rows = DomainRows::default();
+            for k in 0..domain_layout.points {
+                let point = table.point_rows(layout, d, k);
+                rows.points.push(point);
+            }
+            let domain = u8::try_from(d).unwrap_or(0);
+            let last = Place::Point { domain, point: u16::try_from(domain_layout.last()).unwrap_or(u16::MAX) };
+            let interval_end = |i: usize| Place::Point { domain, point: u16::try_from(2 * i + 2).unwrap_or(u16::MAX) };
+            let interval_mid = |i: usize| Place::Point { domain, point: u16::try_from(2 * i + 1).unwrap_or(u16::MAX) };
+            if domain_layout.domain.kind == DomainKind::Ss1 {
+                rows.zero_dynamics = Some(table.names.len());
+                for i in 0..domain_layout.intervals {
+                    table.add(interval_mid(i), RowKind::MidpointPhase, 1, 0.0, 0.0);
+                    table.add(interval_end(i), RowKind::EndpointPhase, 1, 0.0, 0.0);
+                    table.add(interval_mid(i), RowKind::MidpointPhaseRate, 1, 0.0, 0.0);
+                    table.add(interval_end(i), RowKind::EndpointPhaseRate, 1, 0.0, 0.0);
+                }
+                rows.phase_end = Some(table.add(last, RowKind::PhaseEnd, 1, 0.0, 0.0));
+            }
+            if layout.muscles {
+                rows.fibres = Some(table.names.len());
+                for i in 0..domain_layout.intervals {
+                    table.add(interval_mid(i), RowKind::MidpointFibre, MUSCLE_COUNT, 0.0, 0.0);
+                    table.add(interval_end(i), RowKind::EndpointFibre, MUSCLE_COUNT, 0.0, 0.0);
+                }
+            }
+            let transition = Place::Transition { domain };
+            rows.position_reset = table.add(transition, RowKind::PositionReset, 9, 0.0, 0.0);
+            let next = CYCLE[(d + 1) % CYCLE.len()];
+            if next.opens_with_impact() {
+                rows.velocity_reset = table.add(transition, RowKind::Impact, 9, 0.0, 0.0);
+                if next.kind == DomainKind::Ds2 {
+                    rows.impact_friction = Some(table.add(transition, RowKind::ImpactFriction, 2, 0.0, f64::INFINITY));
+                }
+            } else {
+                rows.velocity_reset = table.add(transition, RowKind::VelocityReset, 9, 0.0, 0.0);
+            }
+            if layout.muscles {
+                rows.fibre_reset = Some(table.add(transition, RowKind::FibreReset, MUSCLE_COUNT, 0.0, 0.0));
+            }
+            table.domains.push(rows);
+        }
+        table.step_length = table.add(Place::Stride, RowKind::StepLength, 2, 0.0, f64::INFINITY);
+        table.speed = table.add(Place::Stride, RowKind::Speed, 1, 0.0, f64::INFINITY);
+        table
+    }
+
+    fn point_rows(&mut self, layout: &Layout, d: usize, k: usize) -> PointRows {
+        let domain_layout = &layout.domains[d];
+        let domain = domain_layout.domain;
+        let (nc, ny) = (domain_layout.contacts, domain_layout.outputs.len());
+        let place = Place::Point { domain: u8::try_from(d).unwrap_or(0), point: u16::try_from(k).unwrap_or(u16::MAX) };
+        let first = k == 0;
+        let mut equality = |kind, count| self.add(place, kind, count, 0.0, 0.0);
+        let mut rows = PointRows {
+            dynamics: equality(RowKind::Dynamics, 9),
+            contact_acceleration: equality(RowKind::ContactAcceleration, nc),
+            output_position: equality(RowKind::OutputPosition, ny),
+            output_velocity: equality(RowKind::OutputVelocity, ny),
+            output_acceleration: equality(RowKind::OutputAcceleration, ny),
+            ..PointRows::default()
+        };
+        if domain.has_hip_velocity() {
+            rows.hip_acceleration = Some(equality(RowKind::HipAcceleration, 1));
+            rows.hip_phase = Some(equality(RowKind::HipPhase, 1));
+            if !first || domain.opens_with_impact() {
+                rows.hip_velocity = Some(equality(RowKind::HipVelocity, 1));
+            }
+        } else if first {
+            rows.hip_phase = Some(equality(RowKind::HipPhase, 1));
+        }
+        if !first || domain.opens_with_impact() {
+            rows.contact_velocity = Some(equality(RowKind::ContactVelocity, nc));
+        }
+        // At the first point only the rows that the reset does not already imply: the guard of the landing point.
+        let positions: Vec<usize> = match (first, domain.kind) {
+            (false, _) => (0..nc).collect(),
+            (true, DomainKind::Ds2) => vec![0, 1],
+            (true, DomainKind::Ds3) => vec![2],
+            (true, DomainKind::Ss2 | DomainKind::Ss1) => Vec::new(),
+        };
+        for contact in positions {
+            let row = self.add_one(place, RowKind::ContactPosition, contact, 0.0, 0.0);
+            rows.contact_position.push((contact, row));
+        }
+        if layout.muscles {
+            rows.muscle_force = Some(self.add(place, RowKind::MuscleForce, MUSCLE_COUNT, 0.0, 0.0));
+            rows.muscle_torque = Some(self.add(place, RowKind::MuscleTorque, 4, 0.0, 0.0));
+        }
+        let feet = if matches!(domain.kind, DomainKind::Ds2 | DomainKind::Ds3) { 2 } else { 1 };
+        rows.friction = self.add(place, RowKind::Friction, 2 * feet, 0.0, f64::INFINITY);
+        self.height_rows(domain_layout, place, k, &mut rows);
+        if domain.kind == DomainKind::Ss1 {
+            rows.phase_rate = Some(self.add(place, RowKind::PhaseRate, 1, 0.0, f64::INFINITY));
+        }
+        if k == domain_layout.last() {
+            let landing = match domain.kind {
+                DomainKind::Ds2 => Some((FootPoint::Toe, domain.stance)),
+                DomainKind::Ss1 => Some((FootPoint::Heel, domain.stance.other())),
+                DomainKind::Ds3 | DomainKind::Ss2 => None,
+            };
+            if let Some((point, side)) = landing {
+                let index = foot_point_index(point, side);
+                let row = self.add_one(place, RowKind::TouchdownSpeed, index, f64::NEG_INFINITY, 0.0);
+                rows.touchdown = Some((index, row));
+            }
+        }
+        rows
+    }
+
+    fn height_rows(
+        &mut self,
+        domain_layout: &super::layout::DomainLayout,
+        place: Place,
+        k: usize,
+        rows: &mut PointRows,
+    ) {
+        let domain = domain_layout.domain;
+        let contacts = domain.contact_rows();
+        let (first, last) = (k == 0, k == domain_layout.last());
+        for side in [domain.stance, domain.stance.other()] {
+            for point in [FootPoint::Heel, FootPoint::Toe] {
+                if contacts.iter().any(|c| c.point == point && c.side == side) {
+                    continue;
+                }
+                let swing = side != domain.stance;
+                // Rows that a contact before, or the guard after, makes zero.
+                let implied = match (domain.kind, swing, point) {
+                    (DomainKind::Ss2, true, FootPoint::Toe) | (DomainKind::Ss1, false, FootPoint::Heel) => first,
+                    (DomainKind::Ss1, true, FootPoint::Heel) | (DomainKind::Ds2, false, FootPoint::Toe) => last,
+                    _ => false,
+                };
+                if implied {
+                    continue;
+                }
+                let clearance = swing && matches!(domain.kind, DomainKind::Ss2 | DomainKind::Ss1);
+                let kind = if clearance { RowKind::Clearance } else { RowKind::Height };
+                let foot_point = foot_point_index(point, side);
+                let row = self.add_one(place, kind, foot_point, 0.0, f64::INFINITY);
+                rows.heights.push(HeightRow { foot_point, row, clearance });
+            }
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! C4 over the whole stride: step lengths x_L and D - x_L (m), walking speed D / sum T (m/s).
+
+use super::entries::Entries;
+use super::programme::GaitProgramme;
+
+fn stride_time(programme: &GaitProgramme, x: &[f64]) -> f64 {
+    programme.layout.domains.iter().map(|d| programme.layout.value(x, d.duration)).sum()
+}
+
+/// Values.
+pub(super) fn values(programme: &GaitProgramme, x: &[f64], g: &mut [f64]) {
+    let layout = &programme.layout;
+    let right_step = layout.value(x, layout.right_step_length);
+    let stride = layout.value(x, layout.stride_length);
+    g[programme.rows.step_length] = right_step;
+    g[programme.rows.step_length + 1] = stride - right_step;
+    g[programme.rows.speed] = stride / stride_time(programme, x);
+}
+
+/// Jacobian.
+pub(super) fn jacobian(programme: &GaitProgramme, x: &[f64], out: &mut Entries<'_>) {
+    let layout = &programme.layout;
+    out.jacobian(programme.rows.step_length, layout.right_step_length, 1.0);
+    out.jacobian(programme.rows.step_length + 1, layout.right_step_length, -1.0);
+    out.jacobian(programme.rows.step_length + 1, layout.stride_length, 1.0);
+    let time = stride_time(programme, x);
+    let stride = layout.value(x, layout.stride_length);
+    out.jacobian(programme.rows.speed, layout.stride_length, 1.0 / time);
+    for domain in &layout.domains {
+        out.jacobian(programme.rows.speed, domain.duration, -stride / (time * time));
+    }
+}
+
+/// Hessian.
+pub(super) fn hessian(programme: &GaitProgramme, x: &[f64], multipliers: &[f64], out: &mut Entries<'_>) {
+    let layout = &programme.layout;
+    let weight = multipliers[programme.rows.speed];
+    let time = stride_time(programme, x);
+    let stride = layout.value(x, layout.stride_length);
+    for (i, domain) in layout.domains.iter().enumerate() {
+        out.hessian(domain.duration, layout.stride_length, -weight / (time * time));
+        for other in &layout.domains[..=i] {
+            out.hessian(domain.duration, other.duration, 2.0 * weight * stride / (time * time * time));
+        }
+    }
+}

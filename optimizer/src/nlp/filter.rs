@@ -1,0 +1,73 @@
+//! The filter: pairs (violation theta, barrier objective phi) that a new iterate must not be dominated by.
+//!
+//! WB06 section 2.3: an iterate is acceptable when for every pair theta < theta_f or phi < phi_f.
+
+/// Filter with its upper limit on theta.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Filter {
+    entries: Vec<(f64, f64)>,
+    /// Largest violation ever acceptable.
+    pub theta_max: f64,
+}
+
+impl Filter {
+    pub(super) fn new(theta_max: f64) -> Self {
+        Self { entries: Vec::new(), theta_max }
+    }
+
+    /// Forgets every pair: the barrier problem has changed.
+    pub(super) fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    /// Whether (theta, phi) is finite, below the limit and dominated by no pair.
+    pub(super) fn accepts(&self, theta: f64, phi: f64) -> bool {
+        theta.is_finite()
+            && phi.is_finite()
+            && theta <= self.theta_max
+            && self.entries.iter().all(|&(t, p)| not_above(theta, t, t) || not_above(phi, p, p))
+    }
+
+    /// Adds the margin of the pair: theta (1 - gamma_theta), phi - gamma_phi theta.
+    pub(super) fn add(&mut self, theta: f64, phi: f64) {
+        let pair = (theta * (1.0 - GAMMA_THETA), phi - GAMMA_PHI * theta);
+        self.entries.retain(|&(t, p)| t < pair.0 || p < pair.1);
+        self.entries.push(pair);
+    }
+}
+
+/// Margin of the filter in theta (WB06 gamma_theta).
+pub(super) const GAMMA_THETA: f64 = 1e-5;
+/// Margin of the filter in phi (IPOPT `gamma_phi`).
+pub(super) const GAMMA_PHI: f64 = 1e-8;
+
+/// a <= b up to ten units of rounding of `scale`.
+pub(super) fn not_above(a: f64, b: f64, scale: f64) -> bool {
+    a - b <= 10.0 * f64::EPSILON * scale.abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dominated_point_is_refused() {
+        let mut filter = Filter::new(10.0);
+        assert!(filter.accepts(1.0, 5.0));
+        filter.add(1.0, 5.0);
+        assert!(!filter.accepts(1.0, 5.0));
+        assert!(!filter.accepts(2.0, 6.0));
+        assert!(filter.accepts(0.5, 6.0));
+        assert!(filter.accepts(2.0, 4.0));
+        assert!(!filter.accepts(11.0, -1.0));
+        assert!(!filter.accepts(f64::NAN, 0.0));
+    }
+
+    #[test]
+    fn a_better_pair_replaces_those_it_dominates() {
+        let mut filter = Filter::new(10.0);
+        filter.add(2.0, 2.0);
+        filter.add(1.0, 1.0);
+        assert_eq!(filter.entries.len(), 1);
+    }
+}

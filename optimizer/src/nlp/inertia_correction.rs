@@ -1,0 +1,67 @@
+//! Regularisation until the KKT matrix has the inertia (n, m, 0) (WB06 algorithm IC), remembering the last delta_w.
+
+use super::settings::{DualRegularisation, NlpSettings};
+
+/// delta_w of the last iteration that needed one, and the current trial.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct InertiaCorrection {
+    last: f64,
+    /// Current delta_w.
+    pub delta_w: f64,
+    /// Current delta_c.
+    pub delta_c: f64,
+}
+
+impl InertiaCorrection {
+    /// First trial of an iteration.
+    pub(super) fn begin(&mut self, settings: &NlpSettings, mu: f64) {
+        self.delta_w = 0.0;
+        self.delta_c = match settings.dual_regularisation {
+            DualRegularisation::Always => Self::dual(settings, mu),
+            DualRegularisation::WhenSingular => 0.0,
+        };
+    }
+
+    /// The matrix was accepted.
+    pub(super) fn accept(&mut self) {
+        if self.delta_w > 0.0 {
+            self.last = self.delta_w;
+        }
+    }
+
+    /// Next trial after a singular matrix, or a solution whose residual was too large; false when out of range.
+    pub(super) fn singular(&mut self, settings: &NlpSettings, mu: f64) -> bool {
+        if self.delta_c == 0.0 {
+            self.delta_c = Self::dual(settings, mu);
+            return true;
+        }
+        self.increase(settings)
+    }
+
+    /// Next trial after too many negative eigenvalues; false when out of range.
+    pub(super) fn increase(&mut self, settings: &NlpSettings) -> bool {
+        self.delta_w = if self.delta_w == 0.0 {
+            if self.last == 0.0 {
+                settings.hessian_regularisation_first
+            } else {
+                (self.last * DECREASE).max(settings.hessian_regularisation_min)
+            }
+        } else if self.last == 0.0 || 1e5 * self.last < self.delta_w {
+            self.delta_w * FIRST_INCREASE
+        } else {
+            self.delta_w * INCREASE
+        };
+        self.delta_w <= settings.hessian_regularisation_max
+    }
+
+    fn dual(settings: &NlpSettings, mu: f64) -> f64 {
+        settings.dual_regularisation_value * mu.powf(0.25)
+    }
+}
+
+/// WB06 kappa_w^-.
+const DECREASE: f64 = 1.0 / 3.0;
+/// WB06 kappa_w^+.
+const INCREASE: f64 = 8.0;
+/// WB06 kappa_w^+ bar, while nothing is remembered.
+const FIRST_INCREASE: f64 = 100.0;

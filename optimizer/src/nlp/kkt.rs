@@ -1,0 +1,101 @@
+//! Assembly of the reduced KKT matrix, order n + m, lower triangle in compressed columns:
+//!
+//! ```text
+//! [ H + diag(d)      J^T     ]
+//! [     J        -diag(e)    ]
+//! ```
+//!
+//! d: barrier terms, objective curvature and delta_w of x; e: what the eliminated attached variables and delta_c
+//! leave in a row, e_i = sum_k a_k^2 / d_k + delta_c.
+
+use super::formulation::{Formulation, RowKind, entries};
+
+/// Pattern, values and where each part goes.
+#[derive(Debug, Clone)]
+pub(super) struct KktMatrix {
+    pub order: usize,
+    pub column_starts: Vec<usize>,
+    pub row_indices: Vec<usize>,
+    pub values: Vec<f64>,
+    hessian_position: Vec<usize>,
+    jacobian_position: Vec<usize>,
+    diagonal_position: Vec<usize>,
+}
+
+impl KktMatrix {
+    /// The pattern: Hessian, Jacobian and the full diagonal.
+    pub(super) fn new(form: &Formulation) -> Self {
+        let (n, order) = (form.n, form.n + form.m);
+        let hessian = form.program.hessian_pattern();
+        let jacobian = form.program.jacobian_pattern();
+        let mut column_starts = vec![0];
+        let mut row_indices = Vec::new();
+        let mut hessian_position = vec![0; hessian.row_indices.len()];
+        let mut jacobian_position = vec![0; jacobian.row_indices.len()];
+        let mut diagonal_position = vec![0; order];
+        for j in 0..n {
+            diagonal_position[j] = row_indices.len();
+            row_indices.push(j);
+            for q in hessian.column_starts[j]..hessian.column_starts[j + 1] {
+                let i = hessian.row_indices[q];
+                if i == j {
+                    hessian_position[q] = diagonal_position[j];
+                } else {
+                    hessian_position[q] = row_indices.len();
+                    row_indices.push(i);
+                }
+            }
+            for q in jacobian.column_starts[j]..jacobian.column_starts[j + 1] {
+                jacobian_position[q] = row_indices.len();
+                row_indices.push(n + jacobian.row_indices[q]);
+            }
+            column_starts.push(row_indices.len());
+        }
+        for i in n..order {
+            diagonal_position[i] = row_indices.len();
+            row_indices.push(i);
+            column_starts.push(row_indices.len());
+        }
+        let values = vec![0.0; row_indices.len()];
+        Self { order, column_starts, row_indices, values, hessian_position, jacobian_position, diagonal_position }
+    }
+
+    /// Fills the values; `diagonal` has the length of w and must be positive on attached variables. Returns whether
+    /// all values are finite.
+    pub(super) fn assemble(
+        &mut self,
+        form: &Formulation,
+        hessian: Option<&[f64]>,
+        jacobian: &[f64],
+        diagonal: &[f64],
+        delta_c: f64,
+    ) -> bool {
+        self.values.fill(0.0);
+        if let Some(hessian) = hessian {
+            for (v, &q) in hessian.iter().zip(&self.hessian_position) {
+                self.values[q] = *v;
+            }
+        }
+        for (v, &q) in jacobian.iter().zip(&self.jacobian_position) {
+            self.values[q] = *v;
+        }
+        for j in 0..form.n {
+            self.values[self.diagonal_position[j]] += if form.fixed[j].is_some() { 1.0 } else { diagonal[j] };
+        }
+        for i in 0..form.m {
+            let e = if form.rows[i] == RowKind::Free { 1.0 } else { delta_c };
+            self.values[self.diagonal_position[form.n + i]] = -e;
+        }
+        for (a, d) in form.attached.iter().zip(&diagonal[form.n..]) {
+            self.values[self.diagonal_position[form.n + a.row]] -= 1.0 / d;
+        }
+        self.values.iter().all(|v| v.is_finite())
+    }
+}
+
+/// Couplings (row, column) of the KKT matrix, for the check of elimination blocks.
+pub(super) fn couplings<'a>(form: &'a Formulation) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let n = form.n;
+    let hessian = entries(form.program.hessian_pattern()).map(|(_, i, j)| (i, j));
+    hessian.chain(entries(form.program.jacobian_pattern()).map(move |(_, i, j)| (n + i, j)))
+}

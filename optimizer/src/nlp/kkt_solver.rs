@@ -1,0 +1,50 @@
+//! What the interior point asks of a factorisation of its KKT matrix.
+
+/// Numbers of positive, negative and (numerically) zero eigenvalues.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Inertia {
+    pub positive: usize,
+    pub negative: usize,
+    pub zero: usize,
+}
+
+impl Inertia {
+    /// Counts a pivot of order one.
+    pub(super) fn count(&mut self, d: f64) {
+        if d > 0.0 {
+            self.positive += 1;
+        } else if d < 0.0 {
+            self.negative += 1;
+        } else {
+            self.zero += 1;
+        }
+    }
+
+    /// Counts a symmetric pivot [a e; e b] of order two.
+    pub(super) fn count_pair(&mut self, a: f64, e: f64, b: f64) {
+        // Divided by e^2: the product of two tiny diagonals must not underflow.
+        let determinant = (a / e) * (b / e) - 1.0;
+        if determinant < 0.0 {
+            self.positive += 1;
+            self.negative += 1;
+        } else if determinant == 0.0 {
+            self.zero += 1;
+            self.count(a + b);
+        } else if a > 0.0 {
+            self.positive += 2;
+        } else {
+            self.negative += 2;
+        }
+    }
+}
+
+/// A symmetric indefinite factorisation, analysed once for a fixed pattern. The residual of a solution is the
+/// caller's business.
+pub(super) trait KktSolver: Send {
+    /// Factorises the matrix with these values (order of the analysed pattern); `None` when it broke down.
+    fn factor(&mut self, values: &[f64]) -> Option<Inertia>;
+    /// Overwrites `rhs` by the solution with the last factorisation.
+    fn solve(&mut self, rhs: &mut [f64]);
+    /// Stored entries of the factor.
+    fn factor_entries(&self) -> usize;
+}

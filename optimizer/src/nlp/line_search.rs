@@ -1,0 +1,261 @@
+//! Backtracking filter line search with second-order corrections (WB06 sections 2.3, 2.4).
+
+use super::barrier::{self, DAMPING};
+use super::filter::{GAMMA_PHI, GAMMA_THETA, not_above};
+use super::formulation::Formulation;
+use super::interior_point::{Run, Session, StepRecord};
+use super::newton::PrimalDual;
+
+/// Work vectors of the search.
+pub(super) struct Search {
+    trial: Vec<f64>,
+    trial_c: Vec<f64>,
+    corrected_c: Vec<f64>,
+    correction: PrimalDual,
+}
+
+impl Search {
+    pub(super) fn new(form: &Formulation) -> Self {
+        Self {
+            trial: vec![0.0; form.length()],
+            trial_c: vec![0.0; form.m],
+            corrected_c: vec![0.0; form.m],
+            correction: PrimalDual::zeros(form),
+        }
+    }
+
+    /// Forgets what belongs to one barrier problem.
+    pub(super) fn forget(&mut self) {}
+}
+
+/// What the search compares with.
+struct Reference {
+    theta: f64,
+    phi: f64,
+    /// Directional derivative of phi.
+    slope: f64,
+}
+
+/// A trial point that was accepted.
+#[derive(Clone, Copy)]
+enum Accepted {
+    /// Armijo decrease of phi under the switching condition: the filter stays.
+    Objective,
+    /// Any other acceptable point: the filter grows.
+    Filter,
+}
+
+const DELTA: f64 = 1.0;
+const S_THETA: f64 = 1.1;
+const S_PHI: f64 = 2.3;
+const ETA: f64 = 1e-8;
+const GAMMA_ALPHA: f64 = 0.05;
+const KAPPA_SOC: f64 = 0.99;
+/// Largest increase of phi, in powers of ten (IPOPT `obj_max_inc`).
+const MAX_PHI_INCREASE: f64 = 5.0;
+
+impl Reference {
+    /// m(alpha) < 0 and alpha (-slope)^s_phi > delta theta^s_theta (WB06 eq. 19).
+    fn switches(&self, alpha: f64) -> bool {
+        self.slope < 0.0 && alpha * (-self.slope).powf(S_PHI) > DELTA * self.theta.powf(S_THETA)
+    }
+
+    fn armijo(&self, alpha: f64, phi: f64) -> bool {
+        not_above(phi - self.phi, ETA * alpha * self.slope, self.phi)
+    }
+
+    /// Smallest step worth trying (WB06 eq. 23).
+    fn smallest_step(&self, theta_min: f64) -> f64 {
+        let mut alpha = GAMMA_THETA;
+        if self.slope < 0.0 {
+            alpha = alpha.min(GAMMA_PHI * self.theta / -self.slope);
+            if self.theta <= theta_min {
+                alpha = alpha.min(DELTA * self.theta.powf(S_THETA) / (-self.slope).powf(S_PHI));
+            }
+        }
+        GAMMA_ALPHA * alpha
+    }
+}
+
+impl Run<'_> {
+    /// Searches along the direction and moves the point; false when the step became too small.
+    pub(super) fn line_search(&mut self, session: &mut Session, tiny: bool) -> bool {
+        let settings = session.settings;
+        let tau = barrier::boundary_fraction(settings, self.mu);
+        let reference = Reference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
+        let alpha_max =
+            barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
+        let smallest = reference.smallest_step(self.theta_min);
+        let mut alpha = alpha_max;
+        let mut trials = 0;
+        if tiny {
+            let (_, _, finite) = self.try_step(alpha, false);
+            if finite {
+                self.accept(session, alpha, tau, 1);
+                return true;
+            }
+        }
+        while alpha > smallest || trials == 0 {
+            trials += 1;
+            let (theta, phi, finite) = self.try_step(alpha, false);
+            if finite {
+                if let Some(kind) = self.judge(&reference, alpha, theta, phi) {
+                    self.finish(session, &reference, kind, alpha, tau, trials);
+                    return true;
+                }
+                if trials == 1 && theta >= reference.theta {
+                    if let Some((kind, alpha, extra)) =
+                        self.second_order_correction(session, &reference, alpha, tau, theta)
+                    {
+                        self.finish(session, &reference, kind, alpha, tau, trials + extra);
+                        return true;
+                    }
+                }
+            }
+            alpha *= 0.5;
+        }
+        false
+    }
+
+    /// grad phi^T dw.
+    fn slope(&self) -> f64 {
+        let mut slope = 0.0;
+        for j in 0..self.form.length() {
+            let barrier = self.mu / self.at.slack_upper[j] - self.mu / self.at.slack_lower[j];
+            let damping = DAMPING * self.mu * self.form.single_side(j);
+            slope += (self.gradient[j] + barrier + damping) * self.direction.w[j];
+        }
+        slope
+    }
+
+    /// Evaluates theta and phi at w + alpha dw (dw: the correction's when `corrected`).
+    fn try_step(&mut self, alpha: f64, corrected: bool) -> (f64, f64, bool) {
+        let direction = if corrected { &self.search.correction.w } else { &self.direction.w };
+        for ((t, w), d) in self.search.trial.iter_mut().zip(&self.point.w).zip(direction) {
+            *t = w + alpha * d;
+        }
+        self.form.constraints(&self.search.trial, &mut self.search.trial_c);
+        let theta: f64 = self.search.trial_c.iter().map(|c| c.abs()).sum();
+        if !theta.is_finite() {
+            return (theta, f64::NAN, false);
+        }
+        let phi =
+            self.form.objective(&self.search.trial) + barrier::barrier_term(&self.form, &self.search.trial, self.mu);
+        (theta, phi, phi.is_finite())
+    }
+
+    /// Tests a trial point against reference and filter.
+    fn judge(&self, reference: &Reference, alpha: f64, theta: f64, phi: f64) -> Option<Accepted> {
+        if !self.filter.accepts(theta, phi) {
+            return None;
+        }
+        if phi > reference.phi {
+            let base = if reference.phi.abs() > 10.0 { reference.phi.abs().log10() } else { 1.0 };
+            if (phi - reference.phi).log10() > MAX_PHI_INCREASE + base {
+                return None;
+            }
+        }
+        if reference.theta <= self.theta_min && reference.switches(alpha) {
+            return reference.armijo(alpha, phi).then_some(Accepted::Objective);
+        }
+        let less_violation = not_above(theta, (1.0 - GAMMA_THETA) * reference.theta, reference.theta);
+        let less_objective = not_above(phi - reference.phi, -GAMMA_PHI * reference.theta, reference.phi);
+        (less_violation || less_objective).then_some(if reference.switches(alpha) && reference.armijo(alpha, phi) {
+            Accepted::Objective
+        } else {
+            Accepted::Filter
+        })
+    }
+
+    /// Corrections for the curvature of the rows: same matrix, c replaced by alpha c + c(trial) (WB06 section 2.4).
+    fn second_order_correction(
+        &mut self,
+        session: &mut Session,
+        reference: &Reference,
+        alpha: f64,
+        tau: f64,
+        first_theta: f64,
+    ) -> Option<(Accepted, f64, usize)> {
+        let settings = session.settings;
+        let mut previous = first_theta;
+        let mut step = alpha;
+        self.search.corrected_c.copy_from_slice(&self.c);
+        for count in 1..=settings.max_second_order_corrections {
+            for (s, t) in self.search.corrected_c.iter_mut().zip(&self.search.trial_c) {
+                *s = step * *s + t;
+            }
+            let keep = std::mem::take(&mut self.rhs.y);
+            self.rhs.y = self.search.corrected_c.iter().map(|c| -c).collect();
+            let ratio = session.newton.solve(
+                &self.form,
+                settings,
+                &self.point,
+                &self.at,
+                &self.rhs,
+                &mut self.search.correction,
+            );
+            self.rhs.y = keep;
+            if ratio > settings.residual_limit {
+                return None;
+            }
+            step = barrier::fraction_to_boundary(
+                &self.at.slack_lower,
+                &self.at.slack_upper,
+                &self.search.correction.w,
+                tau,
+            );
+            let (theta, phi, finite) = self.try_step(step, true);
+            if !finite {
+                return None;
+            }
+            if let Some(kind) = self.judge(reference, alpha, theta, phi) {
+                std::mem::swap(&mut self.direction, &mut self.search.correction);
+                return Some((kind, step, count));
+            }
+            if theta > KAPPA_SOC * previous {
+                return None;
+            }
+            previous = theta;
+        }
+        None
+    }
+
+    fn finish(
+        &mut self,
+        session: &mut Session,
+        reference: &Reference,
+        kind: Accepted,
+        alpha: f64,
+        tau: f64,
+        trials: usize,
+    ) {
+        if matches!(kind, Accepted::Filter) {
+            self.filter.add(reference.theta, reference.phi);
+        }
+        self.accept(session, alpha, tau, trials);
+    }
+
+    /// Moves to w + alpha dw, y + alpha dy, z + alpha_z dz and evaluates there.
+    fn accept(&mut self, session: &mut Session, alpha: f64, tau: f64, trials: usize) {
+        let alpha_dual = barrier::fraction_to_zero(&self.point.zl, &self.direction.zl, tau)
+            .min(barrier::fraction_to_zero(&self.point.zu, &self.direction.zu, tau));
+        let add = |a: &mut [f64], d: &[f64], alpha: f64| {
+            for (a, d) in a.iter_mut().zip(d) {
+                *a += alpha * d;
+            }
+        };
+        add(&mut self.point.w, &self.direction.w, alpha);
+        add(&mut self.point.y, &self.direction.y, alpha);
+        add(&mut self.point.zl, &self.direction.zl, alpha_dual);
+        add(&mut self.point.zu, &self.direction.zu, alpha_dual);
+        session.last_step = StepRecord {
+            alpha_primal: alpha,
+            alpha_dual,
+            delta_w: self.correction.delta_w,
+            delta_c: self.correction.delta_c,
+            trials,
+        };
+        self.evaluate();
+        barrier::keep_near_centre(&mut self.point, &self.at, self.mu);
+    }
+}

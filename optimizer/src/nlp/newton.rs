@@ -1,0 +1,311 @@
+//! The primal-dual Newton system and its solution with iterative refinement.
+//!
+//! ```text
+//! (W + delta_w) dw + A^T dy - dz_L + dz_U = r_w
+//!        A dw      - delta_c dy           = r_y
+//!      Z_L dw      + S_L dz_L             = r_L
+//!     -Z_U dw      + S_U dz_U             = r_U
+//! ```
+//!
+//! with S_L = w - l, S_U = u - w. The bound multipliers and the attached variables are eliminated, the rest is the
+//! matrix of `kkt`; the residual is always that of the full system above, which is not symmetric and not scaled by
+//! the eliminated slacks (WB06 section 3.10).
+
+use std::time::Instant;
+
+use super::formulation::Formulation;
+use super::kkt::KktMatrix;
+use super::kkt_solver::{Inertia, KktSolver};
+use super::settings::NlpSettings;
+
+/// A point or a direction: w, row multipliers, bound multipliers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct PrimalDual {
+    pub w: Vec<f64>,
+    pub y: Vec<f64>,
+    pub zl: Vec<f64>,
+    pub zu: Vec<f64>,
+}
+
+impl PrimalDual {
+    pub(super) fn zeros(form: &Formulation) -> Self {
+        let length = form.length();
+        Self { w: vec![0.0; length], y: vec![0.0; form.m], zl: vec![0.0; length], zu: vec![0.0; length] }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (a, b) in self.parts_mut().into_iter().zip(other.parts()) {
+            for (x, y) in a.iter_mut().zip(b) {
+                *x += y;
+            }
+        }
+    }
+
+    fn parts(&self) -> [&[f64]; 4] {
+        [&self.w, &self.y, &self.zl, &self.zu]
+    }
+
+    fn parts_mut(&mut self) -> [&mut [f64]; 4] {
+        [&mut self.w, &mut self.y, &mut self.zl, &mut self.zu]
+    }
+
+    /// Largest absolute entry; NaN counts as infinite.
+    pub(super) fn largest(&self) -> f64 {
+        self.parts().iter().map(|p| largest(p)).fold(0.0, f64::max)
+    }
+}
+
+/// Largest absolute entry; NaN counts as infinite.
+pub(super) fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |a: f64, v| if v.is_nan() { f64::INFINITY } else { a.max(v.abs()) })
+}
+
+/// Derivatives and slacks at the current point.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Linearisation {
+    pub jacobian: Vec<f64>,
+    pub hessian: Vec<f64>,
+    /// w - l and u - w; infinite without the bound.
+    pub slack_lower: Vec<f64>,
+    pub slack_upper: Vec<f64>,
+}
+
+/// Clock of the linear algebra.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LinearTally {
+    pub factor_seconds: f64,
+    pub solve_seconds: f64,
+    pub factorisations: usize,
+    pub backsolves: usize,
+}
+
+/// KKT matrix, factorisation and workspace.
+pub(super) struct NewtonSystem {
+    matrix: KktMatrix,
+    solver: Box<dyn KktSolver>,
+    /// Diagonal of the w block: Sigma + curvature + delta_w.
+    diagonal: Vec<f64>,
+    delta_w: f64,
+    delta_c: f64,
+    rhs: Vec<f64>,
+    residual: PrimalDual,
+    correction: PrimalDual,
+    pub tally: LinearTally,
+}
+
+impl NewtonSystem {
+    pub(super) fn new(matrix: KktMatrix, solver: Box<dyn KktSolver>) -> Self {
+        let rhs = vec![0.0; matrix.order];
+        Self {
+            matrix,
+            solver,
+            diagonal: Vec::new(),
+            delta_w: 0.0,
+            delta_c: 0.0,
+            rhs,
+            residual: PrimalDual::default(),
+            correction: PrimalDual::default(),
+            tally: LinearTally::default(),
+        }
+    }
+
+    pub(super) fn factor_entries(&self) -> usize {
+        self.solver.factor_entries()
+    }
+
+    /// Makes the work vectors fit the formulation (its feasibility form is longer).
+    pub(super) fn fit(&mut self, form: &Formulation) {
+        self.diagonal = vec![0.0; form.length()];
+        self.residual = PrimalDual::zeros(form);
+        self.correction = PrimalDual::zeros(form);
+    }
+
+    /// Factorises the Newton matrix with the given regularisation.
+    pub(super) fn factor(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        delta_w: f64,
+        delta_c: f64,
+    ) -> Option<Inertia> {
+        for j in 0..form.length() {
+            let sigma = point.zl[j] / at.slack_lower[j] + point.zu[j] / at.slack_upper[j];
+            self.diagonal[j] = sigma + form.curvature(j) + delta_w;
+        }
+        self.delta_w = delta_w;
+        self.delta_c = delta_c;
+        self.factor_with(form, Some(&at.hessian), &at.jacobian)
+    }
+
+    fn factor_with(&mut self, form: &Formulation, hessian: Option<&[f64]>, jacobian: &[f64]) -> Option<Inertia> {
+        let clock = Instant::now();
+        let finite = self.matrix.assemble(form, hessian, jacobian, &self.diagonal, self.delta_c);
+        let inertia = if finite { self.solver.factor(&self.matrix.values) } else { None };
+        self.tally.factor_seconds += clock.elapsed().as_secs_f64();
+        self.tally.factorisations += 1;
+        inertia
+    }
+
+    /// min |grad F + A^T y - z_L + z_U|^2 over y, by the regularised augmented system with H = I (WB06 section 3.6).
+    /// `None` when the factorisation fails or the result exceeds `limit`.
+    pub(super) fn least_squares_multipliers(
+        &mut self,
+        form: &Formulation,
+        gradient: &[f64],
+        point: &PrimalDual,
+        jacobian: &[f64],
+        delta_c: f64,
+        limit: f64,
+    ) -> Option<Vec<f64>> {
+        self.diagonal.fill(1.0);
+        self.delta_w = 0.0;
+        self.delta_c = delta_c;
+        let inertia = self.factor_with(form, None, jacobian)?;
+        if inertia.negative != form.m || inertia.zero > 0 {
+            return None;
+        }
+        let b: Vec<f64> = (0..form.length()).map(|j| -(gradient[j] - point.zl[j] + point.zu[j])).collect();
+        let zero = vec![0.0; form.m];
+        let (mut dw, mut y) = (vec![0.0; form.length()], vec![0.0; form.m]);
+        self.reduced_solve(form, &b, &zero, &mut dw, &mut y);
+        (largest(&y) <= limit).then_some(y)
+    }
+
+    /// Solves (W + d) dw + A^T dy = b, A dw - delta_c dy = c with the last factorisation.
+    fn reduced_solve(&mut self, form: &Formulation, b: &[f64], c: &[f64], dw: &mut [f64], dy: &mut [f64]) {
+        let clock = Instant::now();
+        let n = form.n;
+        for j in 0..n {
+            self.rhs[j] = if form.fixed[j].is_some() { 0.0 } else { b[j] };
+        }
+        self.rhs[n..].copy_from_slice(c);
+        for (k, a) in form.attached.iter().enumerate() {
+            self.rhs[n + a.row] -= a.sign * b[n + k] / self.diagonal[n + k];
+        }
+        self.solver.solve(&mut self.rhs);
+        dw[..n].copy_from_slice(&self.rhs[..n]);
+        dy.copy_from_slice(&self.rhs[n..]);
+        for (k, a) in form.attached.iter().enumerate() {
+            dw[n + k] = (b[n + k] - a.sign * dy[a.row]) / self.diagonal[n + k];
+        }
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        self.tally.backsolves += 1;
+    }
+
+    /// Solves the full system by elimination with the last factorisation.
+    fn full_solve(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+    ) {
+        // out.zl serves as scratch for the eliminated right-hand side
+        let mut b = std::mem::take(&mut out.zl);
+        for j in 0..form.length() {
+            b[j] = rhs.w[j] + rhs.zl[j] / at.slack_lower[j] - rhs.zu[j] / at.slack_upper[j];
+        }
+        self.reduced_solve(form, &b, &rhs.y, &mut out.w, &mut out.y);
+        out.zl = b;
+        for j in 0..form.length() {
+            out.zl[j] = (rhs.zl[j] - point.zl[j] * out.w[j]) / at.slack_lower[j];
+            out.zu[j] = (rhs.zu[j] + point.zu[j] * out.w[j]) / at.slack_upper[j];
+        }
+    }
+
+    /// rhs - (matrix)(direction) of the full system, into `self.residual`.
+    fn full_residual(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        d: &PrimalDual,
+    ) {
+        let r = &mut self.residual;
+        r.w.fill(0.0);
+        form.add_hessian_product(&at.hessian, &d.w, &mut r.w);
+        form.add_transpose(&at.jacobian, &d.y, &mut r.w);
+        for j in 0..form.length() {
+            let own = (form.curvature(j) + self.delta_w) * d.w[j];
+            r.w[j] = rhs.w[j] - (r.w[j] + own - d.zl[j] + d.zu[j]);
+            r.zl[j] = if at.slack_lower[j].is_finite() {
+                rhs.zl[j] - (point.zl[j] * d.w[j] + at.slack_lower[j] * d.zl[j])
+            } else {
+                0.0
+            };
+            r.zu[j] = if at.slack_upper[j].is_finite() {
+                rhs.zu[j] - (at.slack_upper[j] * d.zu[j] - point.zu[j] * d.w[j])
+            } else {
+                0.0
+            };
+            if j < form.n && form.fixed[j].is_some() {
+                r.w[j] = 0.0;
+            }
+        }
+        r.y.fill(0.0);
+        form.add_product(&at.jacobian, &d.w, &mut r.y);
+        for i in 0..form.m {
+            r.y[i] = if form.rows[i] == super::formulation::RowKind::Free {
+                0.0
+            } else {
+                rhs.y[i] - (r.y[i] - self.delta_c * d.y[i])
+            };
+        }
+    }
+
+    /// Solves the full system and refines; returns the relative residual
+    /// |r| / (|rhs| + min(|d|, 1e6 |rhs|)), infinite when the solution is not finite.
+    pub(super) fn solve(
+        &mut self,
+        form: &Formulation,
+        settings: &NlpSettings,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+    ) -> f64 {
+        let size = rhs.largest();
+        self.full_solve(form, point, at, rhs, out);
+        let mut best = f64::INFINITY;
+        let mut refinements = 0;
+        loop {
+            self.full_residual(form, point, at, rhs, out);
+            let length = out.largest();
+            let scale = size + length.min(1e6 * size);
+            let ratio = if !length.is_finite() {
+                f64::INFINITY
+            } else if scale > 0.0 {
+                self.residual.largest() / scale
+            } else {
+                0.0
+            };
+            if ratio >= best && refinements > 0 {
+                // The last correction did not help: take it back.
+                for (a, b) in out.parts_mut().into_iter().zip(self.correction.parts()) {
+                    for (x, y) in a.iter_mut().zip(b) {
+                        *x -= y;
+                    }
+                }
+                return best;
+            }
+            let stagnates = refinements > 0 && ratio > 0.5 * best;
+            best = ratio;
+            if ratio <= settings.residual_target || !ratio.is_finite() || stagnates {
+                return best;
+            }
+            if refinements == settings.max_refinements {
+                return best;
+            }
+            let residual = std::mem::take(&mut self.residual);
+            let mut correction = std::mem::take(&mut self.correction);
+            self.full_solve(form, point, at, &residual, &mut correction);
+            self.residual = residual;
+            self.correction = correction;
+            out.add(&self.correction);
+            refinements += 1;
+        }
+    }
+}

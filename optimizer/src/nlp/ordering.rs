@@ -1,0 +1,127 @@
+//! Elimination order of the KKT matrix.
+//!
+//! With blocks: blocks by ascending number (children before parents), and inside a block each row next to a variable
+//! it is structurally matched with, so that no supernode begins with a lone row, whose diagonal may be zero.
+//! Without: approximate minimum degree, left to the factorisation.
+
+use super::formulation::Formulation;
+use super::kkt::couplings;
+use super::problem::EliminationBlocks;
+use super::status::NlpError;
+
+/// Block of each index of the KKT matrix (variables, then rows).
+pub(super) fn block_of_index(blocks: &EliminationBlocks) -> Vec<usize> {
+    blocks.block_of_variable.iter().chain(&blocks.block_of_row).copied().collect()
+}
+
+/// Checks that blocks form a forest and couple only along its branches.
+pub(super) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Result<(), NlpError> {
+    let fail = |what: String| Err(NlpError::InvalidProblem(format!("elimination blocks: {what}")));
+    let count = blocks.parent.len();
+    if blocks.block_of_variable.len() != form.n || blocks.block_of_row.len() != form.m {
+        return fail(format!(
+            "cover {} variables and {} rows of {} and {}",
+            blocks.block_of_variable.len(),
+            blocks.block_of_row.len(),
+            form.n,
+            form.m
+        ));
+    }
+    for (b, parent) in blocks.parent.iter().enumerate() {
+        if parent.is_some_and(|p| p <= b || p >= count) {
+            return fail(format!("the parent of block {b} has no larger number"));
+        }
+    }
+    let of = block_of_index(blocks);
+    if let Some(b) = of.iter().find(|&&b| b >= count) {
+        return fail(format!("block {b} does not exist"));
+    }
+    for (i, j) in couplings(form) {
+        let (mut low, high) = (of[i].min(of[j]), of[i].max(of[j]));
+        while low < high {
+            let Some(parent) = blocks.parent[low] else { break };
+            low = parent;
+        }
+        if low != high {
+            return fail(format!(
+                "entry ({i}, {j}) couples blocks {} and {}, neither an ancestor of the other",
+                of[i], of[j]
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Elimination order from blocks: position -> index.
+pub(super) fn block_order(form: &Formulation, blocks: &EliminationBlocks) -> Vec<usize> {
+    let partner = match_rows(form, Some(blocks));
+    let mut row_of_variable = vec![None; form.n];
+    for (i, variable) in partner.iter().enumerate() {
+        if let Some(j) = variable {
+            row_of_variable[*j] = Some(i);
+        }
+    }
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); blocks.parent.len()];
+    for j in 0..form.n {
+        let list = &mut members[blocks.block_of_variable[j]];
+        list.push(j);
+        if let Some(i) = row_of_variable[j] {
+            list.push(form.n + i);
+        }
+    }
+    for i in 0..form.m {
+        if partner[i].is_none() {
+            members[blocks.block_of_row[i]].push(form.n + i);
+        }
+    }
+    members.into_iter().flatten().collect()
+}
+
+/// Structural matching of rows with variables (inside their block when there are blocks) by augmenting paths; a row
+/// without a partner gets `None`.
+pub(super) fn match_rows(form: &Formulation, blocks: Option<&EliminationBlocks>) -> Vec<Option<usize>> {
+    let pattern = form.program.jacobian_pattern();
+    let mut columns_of_row: Vec<Vec<usize>> = vec![Vec::new(); form.m];
+    for j in 0..form.n {
+        if form.fixed[j].is_some() {
+            continue;
+        }
+        for q in pattern.column_starts[j]..pattern.column_starts[j + 1] {
+            let i = pattern.row_indices[q];
+            if blocks.is_none_or(|b| b.block_of_variable[j] == b.block_of_row[i]) {
+                columns_of_row[i].push(j);
+            }
+        }
+    }
+    let mut row_of: Vec<Option<usize>> = vec![None; form.n];
+    let mut partner: Vec<Option<usize>> = vec![None; form.m];
+    let mut seen = vec![usize::MAX; form.n];
+    for start in 0..form.m {
+        // depth-first search for an augmenting path, without recursion: (row, next column to try)
+        let mut path: Vec<(usize, usize)> = vec![(start, 0)];
+        let mut via: Vec<usize> = Vec::new();
+        while let Some(&mut (row, ref mut next)) = path.last_mut() {
+            let Some(&j) = columns_of_row[row].get(*next) else {
+                path.pop();
+                via.pop();
+                continue;
+            };
+            *next += 1;
+            if seen[j] == start {
+                continue;
+            }
+            seen[j] = start;
+            via.push(j);
+            if let Some(owner) = row_of[j] {
+                path.push((owner, 0));
+            } else {
+                for (&(r, _), &c) in path.iter().zip(&via) {
+                    row_of[c] = Some(r);
+                    partner[r] = Some(c);
+                }
+                break;
+            }
+        }
+    }
+    partner
+}

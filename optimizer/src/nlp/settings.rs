@@ -1,0 +1,264 @@
+//! Settings of the solver: typed, validated, every field with default, meaning and source.
+//!
+//! "WB06" is Wächter & Biegler, *On the implementation of an interior-point filter line-search algorithm for
+//! large-scale nonlinear programming*, Math. Program. 106 (2006); symbols in brackets are that paper's.
+
+use serde::{Deserialize, Serialize};
+
+use super::status::NlpError;
+
+/// How the barrier parameter mu is driven to zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum BarrierStrategy {
+    /// Fiacco-McCormick: mu is reduced each time the barrier problem is solved to `kappa_epsilon * mu` (WB06 section 2.1).
+    #[default]
+    Monotone,
+    /// LOQO rule (Vanderbei & Shanno 1999) from the average complementarity and its least favourable pair, each
+    /// iteration, as long as the optimality error keeps falling; otherwise monotone until it falls again.
+    Adaptive,
+}
+
+/// First value of the bound multipliers of a cold start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum BoundMultiplierStart {
+    /// z = 1 (WB06 section 3.6).
+    #[default]
+    One,
+    /// z = mu / slack: on the central path from the first iteration. Better when `mu_initial` is small.
+    Centred,
+}
+
+/// When the constraint block of the KKT matrix is regularised by -delta_c.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum DualRegularisation {
+    /// Only after a factorisation that looked singular (WB06 algorithm IC).
+    WhenSingular,
+    /// Always: redundant rows then cost no extra factorisation.
+    #[default]
+    Always,
+}
+
+/// Which factorisation solves the KKT systems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum LinearSolver {
+    /// The multifrontal factorisation, with the supernodal one as its fallback.
+    #[default]
+    Auto,
+    /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes.
+    Supernodal,
+    /// Static multifrontal LBL^T over the elimination blocks, with Bunch-Kaufman pivoting inside fronts.
+    Multifrontal,
+}
+
+/// Settings of [`solve`](super::solve). `NlpSettings::default()` is a good general choice.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NlpSettings {
+    /// Scaled optimality error below which a point is converged. Default 1e-8 (WB06 epsilon_tol).
+    pub tolerance: f64,
+    /// Largest unscaled |g - bounds| and |x - bounds| of a converged point. Default 1e-6 (tighter than IPOPT's 1e-4).
+    pub violation_tolerance: f64,
+    /// Largest unscaled gradient of the Lagrangian of a converged point. Default 1 (IPOPT `dual_inf_tol`).
+    pub dual_tolerance: f64,
+    /// Largest unscaled complementarity product of a converged point. Default 1e-4 (IPOPT `compl_inf_tol`).
+    pub complementarity_tolerance: f64,
+    /// Iterations (feasibility phase included) before [`NlpStatus::IterationLimit`](super::NlpStatus). Default 1000.
+    pub max_iterations: usize,
+    /// Wall time in seconds before [`NlpStatus::TimeLimit`](super::NlpStatus). Default infinity (JSON: null).
+    #[serde(with = "infinite_as_null")]
+    pub max_seconds: f64,
+    /// |x| beyond which the problem is called unbounded. Default 1e20 (IPOPT `diverging_iterates_tol`).
+    pub divergence_limit: f64,
+
+    /// Barrier strategy. Default monotone.
+    pub barrier_strategy: BarrierStrategy,
+    /// First barrier parameter of a cold start. Default 0.1 (WB06 mu_0). Small values keep a good start.
+    pub mu_initial: f64,
+    /// First barrier parameter of a warm start; `None`: the average complementarity of the start, at most
+    /// `mu_initial`. Default none.
+    pub mu_warm: Option<f64>,
+    /// Error to which a barrier problem is solved, in units of mu. Default 10 (WB06 kappa_epsilon).
+    pub kappa_epsilon: f64,
+    /// Linear decrease of mu. Default 0.2 (WB06 kappa_mu).
+    pub kappa_mu: f64,
+    /// Superlinear decrease mu^theta_mu. Default 1.5 (WB06 theta_mu).
+    pub theta_mu: f64,
+    /// Smallest fraction to the boundary. Default 0.99 (WB06 tau_min).
+    pub tau_min: f64,
+
+    /// Widening of every bound, relative to max(1, |bound|). Default 1e-8 (WB06 section 3.5).
+    pub bound_relaxation: f64,
+    /// Smallest distance of a cold start from its bounds, relative to max(1, |bound|). Default 0.01 (WB06 kappa_1).
+    pub bound_push: f64,
+    /// The same relative to the distance between two bounds. Default 0.01 (WB06 kappa_2).
+    pub bound_fraction: f64,
+    /// [`bound_push`](Self::bound_push) of a warm start. Default 1e-6.
+    pub warm_bound_push: f64,
+    /// [`bound_fraction`](Self::bound_fraction) of a warm start. Default 1e-6.
+    pub warm_bound_fraction: f64,
+    /// Smallest bound multiplier of a warm start. Default 1e-9.
+    pub warm_multiplier_push: f64,
+    /// First bound multipliers of a cold start. Default one.
+    pub bound_multiplier_start: BoundMultiplierStart,
+    /// Least-squares row multipliers larger than this are replaced by zero. Default 1000 (WB06 lambda_max).
+    pub multiplier_limit: f64,
+
+    /// Gradient-based scaling at the start: objective and rows are scaled down until their largest derivative is
+    /// this. `None`: no scaling (the problem is scaled by hand). Default none. IPOPT uses 100.
+    pub gradient_scaling: Option<f64>,
+
+    /// First regularisation of the Hessian. Default 1e-4 (WB06 delta_w^0).
+    pub hessian_regularisation_first: f64,
+    /// Smallest regularisation of the Hessian. Default 1e-20 (WB06 delta_w^min).
+    pub hessian_regularisation_min: f64,
+    /// Regularisation of the Hessian that counts as failure. Default 1e20.
+    pub hessian_regularisation_max: f64,
+    /// When delta_c > 0. Default always.
+    pub dual_regularisation: DualRegularisation,
+    /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c).
+    pub dual_regularisation_value: f64,
+
+    /// Relative residual of the full KKT system that ends iterative refinement. Default 1e-10.
+    pub residual_target: f64,
+    /// Relative residual above which the step is refused and the matrix treated as singular. Default 1e-5.
+    pub residual_limit: f64,
+    /// Refinement steps per system. Default 10.
+    pub max_refinements: usize,
+
+    /// Second-order corrections per iteration. Default 4 (WB06 p^max).
+    pub max_second_order_corrections: usize,
+    /// Shortened steps in a row that start the watchdog. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
+    pub watchdog_trigger: usize,
+    /// Trial iterations of the watchdog. Default 3.
+    pub watchdog_trials: usize,
+
+    /// Weight of the l1 violation in the feasibility phase. Default 1000 (WB06 rho).
+    pub elastic_weight: f64,
+    /// The feasibility phase ends when the violation has fallen to this share of its first value and the filter
+    /// accepts. Default 0.9 (WB06 kappa_resto).
+    pub required_reduction: f64,
+    /// Feasibility phases before the solve is called stalled. Default 50.
+    pub max_feasibility_phases: usize,
+
+    /// Factorisation. Default auto.
+    pub linear_solver: LinearSolver,
+    /// Threads of the multifrontal factorisation, 1 to 16; the result does not depend on it. Default 1.
+    pub threads: usize,
+}
+
+impl Default for NlpSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-8,
+            violation_tolerance: 1e-6,
+            dual_tolerance: 1.0,
+            complementarity_tolerance: 1e-4,
+            max_iterations: 1000,
+            max_seconds: f64::INFINITY,
+            divergence_limit: 1e20,
+            barrier_strategy: BarrierStrategy::default(),
+            mu_initial: 0.1,
+            mu_warm: None,
+            kappa_epsilon: 10.0,
+            kappa_mu: 0.2,
+            theta_mu: 1.5,
+            tau_min: 0.99,
+            bound_relaxation: 1e-8,
+            bound_push: 0.01,
+            bound_fraction: 0.01,
+            warm_bound_push: 1e-6,
+            warm_bound_fraction: 1e-6,
+            warm_multiplier_push: 1e-9,
+            bound_multiplier_start: BoundMultiplierStart::default(),
+            multiplier_limit: 1000.0,
+            gradient_scaling: None,
+            hessian_regularisation_first: 1e-4,
+            hessian_regularisation_min: 1e-20,
+            hessian_regularisation_max: 1e20,
+            dual_regularisation: DualRegularisation::default(),
+            dual_regularisation_value: 1e-8,
+            residual_target: 1e-10,
+            residual_limit: 1e-5,
+            max_refinements: 10,
+            max_second_order_corrections: 4,
+            watchdog_trigger: 10,
+            watchdog_trials: 3,
+            elastic_weight: 1000.0,
+            required_reduction: 0.9,
+            max_feasibility_phases: 50,
+            linear_solver: LinearSolver::default(),
+            threads: 1,
+        }
+    }
+}
+
+impl NlpSettings {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// [`NlpError::InvalidSetting`] names the first field out of range, its value and the range.
+    pub fn validate(&self) -> Result<(), NlpError> {
+        let positive = |field: &'static str, value: f64| in_range(field, value, f64::MIN_POSITIVE, f64::MAX);
+        positive("tolerance", self.tolerance)?;
+        positive("violation_tolerance", self.violation_tolerance)?;
+        positive("dual_tolerance", self.dual_tolerance)?;
+        positive("complementarity_tolerance", self.complementarity_tolerance)?;
+        in_range("max_seconds", self.max_seconds, 0.0, f64::INFINITY)?;
+        positive("divergence_limit", self.divergence_limit)?;
+        positive("mu_initial", self.mu_initial)?;
+        if let Some(mu) = self.mu_warm {
+            positive("mu_warm", mu)?;
+        }
+        positive("kappa_epsilon", self.kappa_epsilon)?;
+        in_range("kappa_mu", self.kappa_mu, 1e-6, 0.999)?;
+        in_range("theta_mu", self.theta_mu, 1.0, 1.999)?;
+        in_range("tau_min", self.tau_min, 0.1, 0.999_999)?;
+        in_range("bound_relaxation", self.bound_relaxation, 0.0, 1e-2)?;
+        in_range("bound_push", self.bound_push, f64::MIN_POSITIVE, 1e10)?;
+        in_range("bound_fraction", self.bound_fraction, f64::MIN_POSITIVE, 0.5)?;
+        in_range("warm_bound_push", self.warm_bound_push, f64::MIN_POSITIVE, 1e10)?;
+        in_range("warm_bound_fraction", self.warm_bound_fraction, f64::MIN_POSITIVE, 0.5)?;
+        in_range("warm_multiplier_push", self.warm_multiplier_push, f64::MIN_POSITIVE, 1e10)?;
+        in_range("multiplier_limit", self.multiplier_limit, 0.0, f64::MAX)?;
+        if let Some(limit) = self.gradient_scaling {
+            positive("gradient_scaling", limit)?;
+        }
+        positive("hessian_regularisation_first", self.hessian_regularisation_first)?;
+        positive("hessian_regularisation_min", self.hessian_regularisation_min)?;
+        in_range(
+            "hessian_regularisation_max",
+            self.hessian_regularisation_max,
+            self.hessian_regularisation_first,
+            f64::MAX,
+        )?;
+        in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
+        in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
+        in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;
+        in_range("watchdog_trials", self.watchdog_trials as f64, 1.0, 100.0)?;
+        positive("elastic_weight", self.elastic_weight)?;
+        in_range("required_reduction", self.required_reduction, 0.0, 0.999_999)?;
+        in_range("threads", self.threads as f64, 1.0, 16.0)
+    }
+}
+
+fn in_range(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), NlpError> {
+    if value >= low && value <= high { Ok(()) } else { Err(NlpError::InvalidSetting { field, value, low, high }) }
+}
+
+/// JSON has no infinity: an infinite limit is written as null.
+mod infinite_as_null {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    #[allow(clippy::trivially_copy_pass_by_ref)] // the signature serde asks for
+    pub(super) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        if value.is_finite() { serializer.serialize_some(value) } else { serializer.serialize_none() }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
+}

@@ -1,0 +1,201 @@
+//! What a solve says: progress records, exit status, result, and errors that prevent a start.
+
+use thiserror::Error;
+
+use super::start::WarmPoint;
+
+/// Why the solver stopped. Only `Converged` is a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NlpStatus {
+    /// All tolerances are met.
+    Converged,
+    /// The feasibility phase converged to a stationary point of the l1 violation, and the violation is above its
+    /// tolerance there: no feasible point nearby. (A nonconvex problem may be feasible elsewhere.)
+    Infeasible,
+    /// No further progress, for a reason that proves nothing about the problem.
+    Stalled,
+    /// The iterates diverge: the objective is probably unbounded below.
+    Unbounded,
+    /// [`max_iterations`](super::NlpSettings::max_iterations) is used up.
+    IterationLimit,
+    /// [`max_seconds`](super::NlpSettings::max_seconds) is used up.
+    TimeLimit,
+    /// The caller asked to stop.
+    Cancelled,
+}
+
+/// What an iteration was working on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Phase {
+    /// The problem itself.
+    Regular,
+    /// The l1-elastic feasibility problem.
+    Feasibility,
+}
+
+/// One iteration, as told to the observer. Violation and objective are unscaled and those of the problem itself in
+/// either phase; dual infeasibility and complementarity belong to the phase's problem.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NlpIteration {
+    /// Number, from 0 (the start), over both phases.
+    pub number: usize,
+    /// Phase.
+    pub phase: Phase,
+    /// f(x).
+    pub objective: f64,
+    /// max violation of the rows.
+    pub violation: f64,
+    /// max |gradient of the Lagrangian|.
+    pub dual_infeasibility: f64,
+    /// max |bound distance * multiplier|.
+    pub complementarity: f64,
+    /// Barrier parameter.
+    pub mu: f64,
+    /// Step length of x, slacks and row multipliers that led here.
+    pub alpha_primal: f64,
+    /// Step length of the bound multipliers that led here.
+    pub alpha_dual: f64,
+    /// Regularisation of the Hessian in the step that led here.
+    pub delta_w: f64,
+    /// Regularisation of the rows in the step that led here.
+    pub delta_c: f64,
+    /// Trial points of the line search that led here, second-order corrections included.
+    pub trials: usize,
+}
+
+/// Largest violations of the optimality conditions at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Residuals {
+    /// max violation of row bounds and (unrelaxed) variable bounds.
+    pub violation: f64,
+    /// max |grad f + J^T y - z_L + z_U|.
+    pub dual_infeasibility: f64,
+    /// max |bound distance * multiplier|.
+    pub complementarity: f64,
+}
+
+/// Where the time went, in seconds of wall clock.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Timing {
+    /// Functions and derivatives of the problem.
+    pub evaluation: f64,
+    /// Analysis of the KKT structure.
+    pub analysis: f64,
+    /// Numerical factorisations.
+    pub factorisation: f64,
+    /// Forward and backward substitutions.
+    pub backsolves: f64,
+    /// Everything.
+    pub total: f64,
+}
+
+/// How often things were done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Iterations of the problem itself.
+    pub regular_iterations: usize,
+    /// Iterations of the feasibility phase.
+    pub feasibility_iterations: usize,
+    /// Entries into the feasibility phase.
+    pub feasibility_phases: usize,
+    /// Numerical factorisations.
+    pub factorisations: usize,
+    /// Forward-backward substitutions.
+    pub backsolves: usize,
+    /// Evaluations of g.
+    pub constraint_evaluations: usize,
+    /// Stored entries of the factor.
+    pub factor_entries: usize,
+    /// Times the multifrontal factorisation gave way to the supernodal one.
+    pub solver_fallbacks: usize,
+}
+
+/// Outcome of a solve. Sign convention: L = f + y^T g - z_L^T (x - x_L) - z_U^T (x_U - x).
+#[derive(Debug, Clone, PartialEq)]
+pub struct NlpResult {
+    /// Why the solver stopped.
+    pub status: NlpStatus,
+    /// x (length n).
+    pub x: Vec<f64>,
+    /// y (length m): >= 0 where the upper row bound is active, <= 0 where the lower one is.
+    pub row_multipliers: Vec<f64>,
+    /// z_L >= 0 (length n).
+    pub lower_multipliers: Vec<f64>,
+    /// z_U >= 0 (length n).
+    pub upper_multipliers: Vec<f64>,
+    /// Slack of each row (length m): the solver's value of g_i inside its bounds; of an equality, its bound.
+    pub slacks: Vec<f64>,
+    /// Multipliers >= 0 of the slacks' lower bounds (length m, zero for equalities).
+    pub slack_lower_multipliers: Vec<f64>,
+    /// Multipliers >= 0 of the slacks' upper bounds (length m, zero for equalities).
+    pub slack_upper_multipliers: Vec<f64>,
+    /// f(x).
+    pub objective: f64,
+    /// Residuals in the problem's own units.
+    pub residuals: Residuals,
+    /// Residuals as the solver saw them: scaled by objective and row scaling and by the size of the multipliers.
+    pub scaled_residuals: Residuals,
+    /// Last barrier parameter.
+    pub mu: f64,
+    /// Iterations over both phases.
+    pub iterations: usize,
+    /// Counts.
+    pub counts: Counts,
+    /// Times.
+    pub timing: Timing,
+}
+
+impl NlpResult {
+    /// The start from which a similar problem is best solved next.
+    pub fn warm_point(&self) -> WarmPoint {
+        WarmPoint {
+            x: self.x.clone(),
+            row_multipliers: self.row_multipliers.clone(),
+            lower_multipliers: self.lower_multipliers.clone(),
+            upper_multipliers: self.upper_multipliers.clone(),
+            slacks: self.slacks.clone(),
+            slack_lower_multipliers: self.slack_lower_multipliers.clone(),
+            slack_upper_multipliers: self.slack_upper_multipliers.clone(),
+        }
+    }
+}
+
+/// Why a solve could not begin.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum NlpError {
+    /// A setting is out of range.
+    #[error("setting {field} is {value}, allowed is {low} to {high}")]
+    InvalidSetting {
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest allowed value.
+        low: f64,
+        /// Largest allowed value.
+        high: f64,
+    },
+    /// The problem contradicts itself.
+    #[error("invalid problem: {0}")]
+    InvalidProblem(String),
+    /// The start does not fit the problem.
+    #[error("invalid start: {0}")]
+    InvalidStart(String),
+    /// A function has no finite value at the start.
+    #[error("{what} has no finite value at the start (first at index {index})")]
+    EvaluationFailed {
+        /// Which function.
+        what: &'static str,
+        /// Index of the first offending entry.
+        index: usize,
+    },
+    /// The KKT structure could not be analysed.
+    #[error("the KKT matrix of order {order} could not be analysed: {reason}")]
+    Analysis {
+        /// Order of the matrix.
+        order: usize,
+        /// What went wrong.
+        reason: String,
+    },
+}

@@ -1,0 +1,9 @@
+//! The hybrid system: eight domains and their cycle, contact rows, outputs, Bezier curves, phase variable.
+
+pub mod bezier;
+pub mod domain;
+pub mod phase;
+
+pub use bezier::{BEZIER_COEFFICIENTS, BEZIER_DEGREE, basis};
+pub use domain::{CYCLE, ContactRow, Domain, DomainKind};
+pub use phase::phase_gradient;
