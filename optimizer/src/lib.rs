@@ -6,6 +6,7 @@
 
 pub mod body;
 pub mod bounds;
+pub mod cold_start;
 pub mod device;
 pub mod gait;
 pub mod gait_problem;

@@ -16,6 +16,8 @@ mod interior_point;
 mod kkt;
 mod kkt_solver;
 mod line_search;
+mod linear_solver;
+mod multifrontal;
 mod newton;
 mod optimality;
 mod ordering;

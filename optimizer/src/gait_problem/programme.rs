@@ -101,7 +101,19 @@ pub struct GaitProgramme {
     pub(super) reference_angles: Vec<Vec<[f64; 7]>>,
     bounds: VariableBounds,
     settings: GaitSettings,
+    reference: ReferenceGait,
     structure: Arc<Structure>,
+}
+
+/// A row or variable bound that is not met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowViolation {
+    /// The row, or
+    pub row: Option<usize>,
+    /// the variable whose bound it is.
+    pub variable: Option<usize>,
+    /// In coded units.
+    pub amount: f64,
 }
 
 #[derive(Debug, Default)]
@@ -167,6 +179,7 @@ impl GaitProgramme {
             regularisation: settings.regularisation,
             bounds: variable_bounds(&layout, bounds, &settings.limits, device),
             settings: *settings,
+            reference: reference.clone(),
             weights: ObjectiveWeights { cost_of_transport: 1.0, tracking: 0.0 },
             structure: Arc::new(Structure::default()),
             model,
@@ -195,6 +208,83 @@ impl GaitProgramme {
     /// Parts of the objective at x.
     pub fn objective_parts(&self, x: &[f64]) -> ObjectiveParts {
         objective::parts(self, x)
+    }
+
+    /// Largest violation of any row or variable bound at x, in coded units, with what is violated.
+    pub fn violations(&self, x: &[f64]) -> Vec<RowViolation> {
+        let mut values = vec![0.0; self.rows.names.len()];
+        self.constraints(x, &mut values);
+        let mut result = Vec::new();
+        for (row, value) in values.iter().enumerate() {
+            let excess = (self.rows.lower[row] - value).max(value - self.rows.upper[row]);
+            // A value that is not a number is a violation.
+            if excess > 0.0 || excess.is_nan() {
+                result.push(RowViolation { row: Some(row), variable: None, amount: excess });
+            }
+        }
+        for (variable, value) in x.iter().enumerate() {
+            let excess = (self.bounds.lower[variable] - value).max(value - self.bounds.upper[variable]);
+            if excess > 0.0 || excess.is_nan() {
+                result.push(RowViolation { row: None, variable: Some(variable), amount: excess });
+            }
+        }
+        result.sort_by(|a, b| b.amount.total_cmp(&a.amount));
+        result
+    }
+
+    /// Range of a variable in physical units.
+    pub fn variable_range(&self, variable: usize) -> (f64, f64) {
+        let scale = self.layout.scale[variable];
+        (self.bounds.lower[variable] * scale, self.bounds.upper[variable] * scale)
+    }
+
+    /// Reference angles q\[2..\] at a stride fraction, rad.
+    pub fn reference_at(&self, fraction: f64) -> [f64; 7] {
+        self.reference.seven_angles(fraction)
+    }
+
+    /// Contact rows of a domain with their target positions (m) and foot points.
+    pub fn contact_targets_at(
+        &self,
+        d: usize,
+        right_step: f64,
+        stride: f64,
+    ) -> impl Iterator<Item = (ContactRow, f64, usize)> + '_ {
+        self.contacts[d].iter().zip(&self.contact_targets[d]).map(move |(row, target)| {
+            let position = target[0] + target[1] * right_step + target[2] * stride;
+            (*row, position, super::rows::foot_point_index(row.point, row.side))
+        })
+    }
+
+    /// Whether domain d already fixes the same foot in the same direction.
+    pub fn shares_contact(&self, d: usize, contact: ContactRow) -> bool {
+        self.contacts[d].iter().any(|row| row.side == contact.side && row.axis == contact.axis)
+    }
+
+    /// Position component of a foot point and its gradient by the nine coordinates.
+    pub fn foot_point_linearised(&self, state: &PointState, foot_point: usize, axis: Axis) -> (f64, [f64; 9]) {
+        let point = &self.foot_points[foot_point];
+        let index = mechanics::axis_index(axis);
+        let mut gradient = [0.0; 9];
+        gradient[index] = 1.0;
+        gradient[2..].copy_from_slice(&mechanics::position_gradient(state, point, axis));
+        (state.contact_position(point)[index], gradient)
+    }
+
+    /// dp of domain d's stance leg at a posture, m.
+    pub fn hip_phase_of(&self, d: usize, q: &[f64; 9]) -> f64 {
+        self.phase_of_stance(self.layout.domains[d].domain.stance).along(q)
+    }
+
+    /// A variable vector with everything that is not at a mesh point taken from another programme of the same mesh
+    /// (its point blocks are zero).
+    pub fn adopt_globals(&self, other: &Self, x_other: &[f64]) -> Vec<f64> {
+        let mut x = vec![0.0; self.layout.variables];
+        // Points come first in every layout; the tail has the same order in both variants.
+        let (start, start_other) = (self.layout.hip_velocities, other.layout.hip_velocities);
+        let tail = self.layout.variables - start;
+        x[start..].copy_from_slice(&x_other[start_other..start_other + tail]);
+        x
     }
 
     /// The settings it was built with.

@@ -264,6 +264,7 @@ impl<'p> Run<'p> {
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, dw, dc);
+            if std::env::var_os("DBG").is_some() { eprintln!("   dw {dw:.1e} dc {dc:.1e} {inertia:?} m {}", self.form.m); }
             let go_on = match inertia {
                 Some(i) if i.zero == 0 && i.negative == self.form.m => {
                     let ratio = session.newton.solve(
@@ -274,11 +275,12 @@ impl<'p> Run<'p> {
                         &self.rhs,
                         &mut self.direction,
                     );
+                    if std::env::var_os("DBG").is_some() { eprintln!("   ratio {ratio:.1e}"); }
                     if ratio <= settings.residual_limit {
                         self.correction.accept();
                         return true;
                     }
-                    self.correction.singular(settings, self.mu)
+                    session.newton.distrust() || self.correction.singular(settings, self.mu)
                 }
                 Some(i) if i.zero == 0 && i.negative > self.form.m => self.correction.increase(settings),
                 _ => self.correction.singular(settings, self.mu),

@@ -47,4 +47,13 @@ pub(super) trait KktSolver: Send {
     fn solve(&mut self, rhs: &mut [f64]);
     /// Stored entries of the factor.
     fn factor_entries(&self) -> usize;
+    /// The last solution's residual was bad. True when the same matrix, factorised again, will be treated by another
+    /// method.
+    fn distrust(&mut self) -> bool {
+        false
+    }
+    /// Times another method was used.
+    fn fallbacks(&self) -> usize {
+        0
+    }
 }

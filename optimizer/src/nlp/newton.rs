@@ -113,6 +113,15 @@ impl NewtonSystem {
         self.solver.factor_entries()
     }
 
+    pub(super) fn solver_fallbacks(&self) -> usize {
+        self.solver.fallbacks()
+    }
+
+    /// See [`KktSolver::distrust`].
+    pub(super) fn distrust(&mut self) -> bool {
+        self.solver.distrust()
+    }
+
     /// Makes the work vectors fit the formulation (its feasibility form is longer).
     pub(super) fn fit(&mut self, form: &Formulation) {
         self.diagonal = vec![0.0; form.length()];

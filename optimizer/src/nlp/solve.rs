@@ -6,14 +6,13 @@ use super::barrier;
 use super::formulation::{Formulation, RowKind, entries};
 use super::interior_point::{Ending, Run, Session, StepRecord};
 use super::kkt::KktMatrix;
-use super::kkt_solver::KktSolver;
+use super::linear_solver;
 use super::newton::{NewtonSystem, PrimalDual};
 use super::ordering;
 use super::problem::NonlinearProgram;
 use super::settings::{BoundMultiplierStart, NlpSettings};
 use super::start::{StartPoint, WarmPoint};
 use super::status::{Counts, NlpError, NlpIteration, NlpResult, NlpStatus, Residuals, Timing};
-use super::supernodal::Supernodal;
 
 /// Minimises f(x) subject to the bounds of `problem`, from `start`.
 ///
@@ -74,7 +73,7 @@ pub fn solve(
 
     let analysis = Instant::now();
     let matrix = KktMatrix::new(&run.form);
-    let solver = choose_solver(&run.form, &matrix)?;
+    let solver = linear_solver::choose(&run.form, &matrix, settings)?;
     let analysis = analysis.elapsed().as_secs_f64();
     let mut session = Session {
         settings,
@@ -109,11 +108,6 @@ pub fn solve(
     run.begin_filter();
     let ending = run.iterate(&mut session, None);
     Ok(report(&mut run, &session, ending, analysis))
-}
-
-fn choose_solver(form: &Formulation, matrix: &KktMatrix) -> Result<Box<dyn KktSolver>, NlpError> {
-    let order = form.program.elimination_blocks().map(|blocks| ordering::block_order(form, blocks));
-    Ok(Box::new(Supernodal::new(&matrix.column_starts, &matrix.row_indices, order)?))
 }
 
 /// `value`, moved to at least min(push max(1, |bound|), fraction (u - l)) from its bounds (WB06 section 3.6).
@@ -275,6 +269,7 @@ fn report(run: &mut Run, session: &Session, ending: Ending, analysis: f64) -> Nl
     counts.backsolves = session.newton.tally.backsolves;
     counts.constraint_evaluations = form.tally.constraints;
     counts.factor_entries = session.newton.factor_entries();
+    counts.solver_fallbacks = session.newton.solver_fallbacks();
     NlpResult {
         status: match ending {
             Ending::Converged => NlpStatus::Converged,

@@ -80,6 +80,19 @@ impl Supernodal {
     }
 }
 
+impl Supernodal {
+    /// Multiplications and additions of a factorisation.
+    pub(super) fn flops(&self) -> f64 {
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return f64::INFINITY };
+        let of = |s: usize| -> f64 {
+            let width = symbolic.supernode_end()[s] - symbolic.supernode_begin()[s];
+            let height = symbolic.supernode(s).pattern().len() + width;
+            (0..width).map(|k| ((height - k) as f64).powi(2)).sum()
+        };
+        (0..symbolic.n_supernodes()).map(of).sum()
+    }
+}
+
 impl KktSolver for Supernodal {
     fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
         if values.iter().any(|v| !v.is_finite()) {
@@ -87,6 +100,8 @@ impl KktSolver for Supernodal {
         }
         let size = self.subdiagonal.len();
         let matrix = SparseColMatRef::new(self.pattern.as_ref(), values);
+        // The kernel writes the subdiagonal of pairs only.
+        self.subdiagonal.fill(0.0);
         self.symbolic.factorize_numeric_intranode_lblt(
             &mut self.factor,
             &mut self.subdiagonal,

@@ -3,6 +3,7 @@
 
 pub mod hock_schittkowski;
 pub mod hyper_dual;
+pub mod sparse;
 
 use gait_optimizer::nlp::{NonlinearProgram, SparsityPattern};
 pub use hyper_dual::Dual;

@@ -1,0 +1,36 @@
+//! Cart-pole swing-up with both factorisations: iterations and times.
+//!
+//! `cargo run --release -p gait-optimizer --example sparse_nlp [intervals]`
+
+#[path = "../tests/nlp_standard/mod.rs"]
+mod nlp_standard;
+
+use gait_optimizer::nlp::{LinearSolver, NlpIteration, NlpSettings, StartPoint, solve};
+
+fn main() {
+    let intervals = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(400);
+    let verbose = std::env::args().nth(2).is_some();
+    let problem = nlp_standard::sparse::cart_pole(intervals, 20.0, 1);
+    let start = StartPoint::Cold(problem.start.clone());
+    for (linear_solver, threads) in
+        [(LinearSolver::Supernodal, 1), (LinearSolver::Multifrontal, 1), (LinearSolver::Multifrontal, 2), (LinearSolver::Auto, 1)]
+    {
+        let settings = NlpSettings { linear_solver, threads, ..NlpSettings::default() };
+        let mut show = |it: &NlpIteration| {
+            if verbose {
+                println!(
+                    "{:4} {:?} f={:.8e} viol={:.2e} dual={:.2e} compl={:.2e} mu={:.1e} a={:.1e}/{:.1e} dw={:.1e} dc={:.1e} ls={}",
+                    it.number, it.phase, it.objective, it.violation, it.dual_infeasibility, it.complementarity, it.mu,
+                    it.alpha_primal, it.alpha_dual, it.delta_w, it.delta_c, it.trials
+                );
+            }
+        };
+        match solve(&problem, &start, &settings, &mut show, &|| false) {
+            Ok(r) => println!(
+                "{linear_solver:?} x{threads}: {:?} f = {:.9} in {} iterations, {:?}\n   {:?}",
+                r.status, r.objective, r.iterations, r.counts, r.timing
+            ),
+            Err(error) => println!("{error}"),
+        }
+    }
+}

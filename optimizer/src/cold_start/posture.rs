@@ -1,0 +1,262 @@
+//! Inverse kinematics over the whole stride: angles near the reference, contacts exact, feet above the ground, smooth.
+//!
+//! minimise `|q[2..] - q_ref|^2 + 0.3 (px - px0)^2 + w |second differences|^2` over all points of the stride, subject
+//! to the contact positions, non-negative heights of the other foot points, and joint ranges. Solved as a short
+//! sequence of convex QPs with linearised kinematics.
+
+use super::{ColdStartError, GuessSettings};
+use crate::body::PointState;
+use crate::gait::Axis;
+use crate::gait_problem::GaitProgramme;
+use crate::gait_problem::programme::stride_fraction;
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+
+/// Weight of the forward position of the hip.
+const HIP_WEIGHT: f64 = 0.3;
+/// Weight of second differences, relative to the tracking weight 1.
+const SMOOTHNESS: f64 = 30.0;
+/// Linearisations.
+const PASSES: usize = 8;
+/// Stop when no coordinate moves more than this, m or rad.
+const STEP_TOLERANCE: f64 = 1e-6;
+
+/// One instant of the stride: the points of the domains that share it.
+struct Instant {
+    /// (domain, point).
+    members: Vec<(usize, usize)>,
+    fraction: f64,
+}
+
+/// The instants of the stride: ends of adjacent domains are one instant.
+fn instants(programme: &GaitProgramme) -> Vec<Instant> {
+    let mut result: Vec<Instant> = Vec::new();
+    for (d, domain) in programme.layout.domains.iter().enumerate() {
+        for k in 0..domain.points {
+            let fraction = stride_fraction(d, domain.sigma(k));
+            match result.last_mut() {
+                Some(last) if k == 0 && d > 0 => last.members.push((d, k)),
+                _ => result.push(Instant { members: vec![(d, k)], fraction }),
+            }
+        }
+    }
+    result
+}
+
+/// Rows of a sparse matrix being written, as triplets.
+#[derive(Default)]
+struct Triplets {
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Triplets {
+    fn push(&mut self, row: usize, column: usize, value: f64) {
+        self.rows.push(row);
+        self.columns.push(column);
+        self.values.push(value);
+    }
+
+    fn matrix(self, rows: usize, columns: usize) -> CscMatrix<f64> {
+        CscMatrix::new_from_triplets(rows, columns, self.rows, self.columns, self.values)
+    }
+}
+
+/// Coordinates of every point of every domain: `result[d][k]`.
+///
+/// # Errors
+/// [`ColdStartError`] when a sub-problem is not solved.
+pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec<[f64; 9]>>, ColdStartError> {
+    let instants = instants(programme);
+    let count = instants.len();
+    let stride = guess.stride_length_m;
+    let speed = stride / guess.stride_time_s;
+    let right_step = 0.5 * stride;
+    let toe_left = programme.model.left.toe_ahead_m;
+    let targets: Vec<[f64; 9]> = instants
+        .iter()
+        .map(|instant| {
+            let mut reference = programme.reference_at(instant.fraction);
+            for knee in [2, 5] {
+                reference[knee] = (reference[knee] * guess.knee_flexion).clamp(0.05, 1.35);
+            }
+            let mut q = [0.0; 9];
+            q[0] = -toe_left - 0.22 * stride + speed * instant.fraction * guess.stride_time_s;
+            q[1] = 0.98 * (programme.model.left.thigh_length_m
+                + programme.model.left.shank_length_m
+                + programme.model.left.ankle_height_m);
+            q[2..].copy_from_slice(&reference);
+            q
+        })
+        .collect();
+    let mut q = targets.clone();
+    let torso = programme.variable_range(programme.layout.domains[0].point(0) + 2);
+    for pass in 0..PASSES {
+        let step = linearised_step(programme, &instants, &targets, &q, right_step, stride, torso)?;
+        let mut largest = 0.0_f64;
+        for (i, row) in q.iter_mut().enumerate() {
+            for c in 0..9 {
+                let change = step[9 * i + c].clamp(-0.5, 0.5);
+                row[c] += change;
+                largest = largest.max(change.abs());
+            }
+        }
+        if largest < STEP_TOLERANCE && pass > 0 {
+            break;
+        }
+    }
+    let mut result: Vec<Vec<[f64; 9]>> =
+        programme.layout.domains.iter().map(|d| vec![[0.0; 9]; d.points]).collect();
+    for (i, instant) in instants.iter().enumerate() {
+        for &(d, k) in &instant.members {
+            result[d][k] = q[i];
+        }
+    }
+    let _ = count;
+    Ok(result)
+}
+
+/// Joint ranges of the guess, inside the ranges of the programme.
+fn joint_range(coordinate: usize, torso: (f64, f64), hip_ankle: [(f64, f64); 9]) -> Option<(f64, f64)> {
+    let (low, high) = match coordinate {
+        0 | 1 => return None,
+        2 => torso,
+        4 | 7 => (0.03_f64, 1.4_f64),
+        _ => (-0.5, 0.65),
+    };
+    let own = hip_ankle[coordinate];
+    Some((low.max(own.0), high.min(own.1)))
+}
+
+fn linearised_step(
+    programme: &GaitProgramme,
+    instants: &[Instant],
+    targets: &[[f64; 9]],
+    q: &[[f64; 9]],
+    right_step: f64,
+    stride: f64,
+    torso: (f64, f64),
+) -> Result<Vec<f64>, ColdStartError> {
+    let count = instants.len();
+    let n = 9 * count;
+    // Objective 1/2 x'Px + c'x over the step x.
+    let mut p = Triplets::default();
+    let mut c = vec![0.0; n];
+    for i in 0..count {
+        for coordinate in 0..9 {
+            let weight = match coordinate {
+                0 => HIP_WEIGHT,
+                1 => 1e-6,
+                _ => 1.0,
+            };
+            p.push(9 * i + coordinate, 9 * i + coordinate, 2.0 * weight);
+            c[9 * i + coordinate] += 2.0 * weight * (q[i][coordinate] - targets[i][coordinate]);
+        }
+    }
+    // The last instant is the first of the next stride: smoothness within the stride only, periodicity by equality.
+    for i in 1..count - 1 {
+        let (before, after) =
+            (instants[i].fraction - instants[i - 1].fraction, instants[i + 1].fraction - instants[i].fraction);
+        let scale = 2.0 / (before + after);
+        // Divided second difference over 1/80 of a stride.
+        let h = (1.0_f64 / 80.0).powi(2);
+        let stencil = [h * scale / before, -h * scale * (1.0 / before + 1.0 / after), h * scale / after];
+        for coordinate in 0..9 {
+            let current: f64 = (0..3).map(|s| stencil[s] * q[i + s - 1][coordinate]).sum();
+            for a in 0..3 {
+                let ia = 9 * (i + a - 1) + coordinate;
+                c[ia] += 2.0 * SMOOTHNESS * stencil[a] * current;
+                for b in 0..=a {
+                    let ib = 9 * (i + b - 1) + coordinate;
+                    p.push(ib.min(ia), ib.max(ia), 2.0 * SMOOTHNESS * stencil[a] * stencil[b]);
+                }
+            }
+        }
+    }
+    let mut equality = Triplets::default();
+    let mut equality_rhs = Vec::new();
+    let mut inequality = Triplets::default();
+    let mut inequality_rhs = Vec::new();
+    let ranges: [(f64, f64); 9] =
+        std::array::from_fn(|coordinate| programme.variable_range(programme.layout.domains[0].point(0) + coordinate));
+    for (i, instant) in instants.iter().enumerate() {
+        let state = PointState::new(&q[i], &[0.0; 9], &[0.0; 9]);
+        let last = i + 1 == count;
+        let mut grounded = [false; 4];
+        if !last {
+            for &(d, k) in &instant.members {
+                for (contact, target, foot_point) in programme.contact_targets_at(d, right_step, stride) {
+                    let seen = grounded[foot_point] && contact.axis == Axis::Z;
+                    let flat_x = contact.axis == Axis::X
+                        && instant.members.iter().any(|&(other, _)| other < d && programme.shares_contact(other, contact));
+                    if seen || flat_x {
+                        continue;
+                    }
+                    if contact.axis == Axis::Z {
+                        grounded[foot_point] = true;
+                    }
+                    let (position, gradient) = programme.foot_point_linearised(&state, foot_point, contact.axis);
+                    let row = equality_rhs.len();
+                    for (coordinate, value) in gradient.into_iter().enumerate() {
+                        if value != 0.0 {
+                            equality.push(row, 9 * i + coordinate, value);
+                        }
+                    }
+                    equality_rhs.push(target - position);
+                }
+                let _ = k;
+            }
+            for (foot_point, on_ground) in grounded.iter().enumerate() {
+                if *on_ground {
+                    continue;
+                }
+                let (height, gradient) = programme.foot_point_linearised(&state, foot_point, Axis::Z);
+                let row = inequality_rhs.len();
+                for (coordinate, value) in gradient.into_iter().enumerate() {
+                    if value != 0.0 {
+                        inequality.push(row, 9 * i + coordinate, -value);
+                    }
+                }
+                inequality_rhs.push(height);
+            }
+        } else {
+            for coordinate in 0..9 {
+                let row = equality_rhs.len();
+                equality.push(row, 9 * i + coordinate, 1.0);
+                equality.push(row, coordinate, -1.0);
+                let shift = if coordinate == 0 { stride } else { 0.0 };
+                equality_rhs.push(q[0][coordinate] + shift - q[i][coordinate]);
+            }
+        }
+        for coordinate in 2..9 {
+            if let Some((low, high)) = joint_range(coordinate, torso, ranges) {
+                for (sign, bound) in [(1.0, high), (-1.0, -low)] {
+                    let row = inequality_rhs.len();
+                    inequality.push(row, 9 * i + coordinate, sign);
+                    inequality_rhs.push(bound - sign * q[i][coordinate]);
+                }
+            }
+        }
+    }
+    let (ne, ni) = (equality_rhs.len(), inequality_rhs.len());
+    let mut rows = equality;
+    for k in 0..inequality.rows.len() {
+        rows.push(ne + inequality.rows[k], inequality.columns[k], inequality.values[k]);
+    }
+    let mut rhs = equality_rhs;
+    rhs.extend(inequality_rhs);
+    let settings = DefaultSettingsBuilder::default()
+        .verbose(false)
+        .max_iter(100)
+        .build()
+        .map_err(|e| ColdStartError::SubProblem { what: "posture", status: e.to_string() })?;
+    let cones = [SupportedConeT::ZeroConeT(ne), SupportedConeT::NonnegativeConeT(ni)];
+    let mut solver = DefaultSolver::new(&p.matrix(n, n), &c, &rows.matrix(ne + ni, n), &rhs, &cones, settings)
+        .map_err(|e| ColdStartError::SubProblem { what: "posture", status: e.to_string() })?;
+    solver.solve();
+    match solver.solution.status {
+        SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(solver.solution.x.clone()),
+        other => Err(ColdStartError::SubProblem { what: "posture", status: format!("{other:?}") }),
+    }
+}
