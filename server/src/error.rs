@@ -3,7 +3,7 @@
 use crate::store::StoreError;
 use crate::studies::lifecycle::NotPossible;
 use gait_learner::LearnerError;
-use gait_optimizer::ModelError;
+use gait_optimizer::{ModelError, SolveError};
 use serde_json::Value;
 use thiserror::Error;
 
@@ -102,6 +102,16 @@ impl From<StoreError> for Error {
 impl From<ModelError> for Error {
     fn from(error: ModelError) -> Self {
         Self::Invalid(Box::new(error.into()))
+    }
+}
+
+impl From<SolveError> for Error {
+    fn from(error: SolveError) -> Self {
+        match error {
+            SolveError::Model(error) => error.into(),
+            SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
+            SolveError::ColdStart(_) => Self::Internal(error.to_string()),
+        }
     }
 }
 

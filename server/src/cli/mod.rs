@@ -2,7 +2,10 @@
 
 mod body;
 mod logging;
+mod problem;
 mod serve;
+mod solve;
+mod sweep;
 mod tune;
 
 use crate::error::Error;
@@ -28,6 +31,10 @@ enum Command {
     Serve(serve::Serve),
     /// Tune a gait unattended: propose, optimise, compare by Gait RMSE, repeat.
     Tune(tune::Tune),
+    /// Optimise one gait.
+    Solve(solve::Solve),
+    /// Optimise one gait for each row of a table of actions.
+    Sweep(sweep::Sweep),
 }
 
 /// Runs the program.
@@ -41,6 +48,8 @@ pub fn run() -> ExitCode {
     let done = match cli.command {
         Command::Serve(serve) => runtime.block_on(serve.run()),
         Command::Tune(tune) => runtime.block_on(tune.run()),
+        Command::Solve(solve) => runtime.block_on(solve.run()),
+        Command::Sweep(sweep) => runtime.block_on(sweep.run()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

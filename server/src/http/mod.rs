@@ -1,6 +1,9 @@
 //! The HTTP face: REST under `/api/v1`, pages for people, static files.
 
 pub mod api;
+mod extract;
+mod gait_series;
+mod negotiate;
 pub mod pages;
 mod problem;
 mod router;

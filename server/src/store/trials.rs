@@ -310,6 +310,18 @@ pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCou
     })
 }
 
+/// The smallest Gait RMSE of the converged trials of a study, rad.
+///
+/// # Errors
+/// What the database reports.
+pub async fn smallest_rmse(db: &mut Connection, study: StudyId) -> StoreResult<Option<f64>> {
+    let row = sqlx::query("select min(gait_rmse_rad) from trials where study_id = ? and state = 'converged'")
+        .bind(study)
+        .fetch_one(db)
+        .await?;
+    Ok(row.try_get(0)?)
+}
+
 fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
     Ok(Trial {
         id: row.try_get("id")?,

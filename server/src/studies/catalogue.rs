@@ -18,7 +18,7 @@ const PAPER: [(u32, &str, &str); 2] = [
 /// # Errors
 /// What the database reports.
 pub async fn device(db: &mut Connection) -> Result<Device, Error> {
-    Ok(devices::ensure(db, &optimizer::Device::ampro3()).await?)
+    Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?)
 }
 
 /// The built-in reference gait of the record.
@@ -26,7 +26,7 @@ pub async fn device(db: &mut Connection) -> Result<Device, Error> {
 /// # Errors
 /// What the database reports.
 pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGait, Error> {
-    Ok(reference_gaits::ensure(db, &builtin_reference()?).await?)
+    Ok(reference_gaits::ensure(db, &optimizer::ReferenceGait::builtin()?).await?)
 }
 
 /// Adds what is missing of the built-in things.
@@ -58,24 +58,4 @@ pub async fn subject_with(db: &mut Connection, body: optimizer::Subject) -> Resu
         Some(found) => Ok(found),
         None => Ok(subjects::insert(db, &pseudonym, body, "").await?),
     }
-}
-
-/// The built-in reference gait.
-///
-/// # Errors
-/// When the embedded file cannot be read.
-pub fn builtin_reference() -> Result<optimizer::ReferenceGait, Error> {
-    let text = include_str!("../../../optimizer/data/reference_gait.csv");
-    let mut angles_rad = Vec::new();
-    for line in text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
-        let numbers: Vec<f64> = line.split(',').skip(1).filter_map(|cell| cell.parse().ok()).collect();
-        let row: [f64; 5] =
-            numbers.get(..5).and_then(|n| n.try_into().ok()).ok_or_else(|| Error::Internal(line.to_owned()))?;
-        angles_rad.push(row);
-    }
-    Ok(optimizer::ReferenceGait {
-        name: "Falisse 2019, subject 1".to_owned(),
-        provenance: text.lines().filter_map(|line| line.strip_prefix("# ")).collect::<Vec<_>>().join(" "),
-        angles_rad,
-    })
 }
