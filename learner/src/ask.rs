@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::feedback::FeedbackLog;
 use crate::posterior::Learner;
-use crate::settings::{LearnerSettings, Method};
+use crate::settings::{LearnerSettings, Partner};
 use crate::space::{ActionIndex, SearchSpace};
 
 /// Why a comparison is asked.
@@ -60,19 +60,30 @@ impl Learner {
         space.check(action)?;
         settings.validate()?;
         log.validate(space, settings.categories())?;
-        let end = log.visited.iter().position(|&a| a == action).unwrap_or(log.visited.len());
+        let tried = log.visited.len();
+        let end = match log.visited.iter().rposition(|&a| a == action) {
+            // Repeated trials: an earlier one is not the one asked about.
+            Some(position) if !settings.repeats || position + 1 == tried => position,
+            _ => tried,
+        };
         let earlier = &log.visited[..end];
         let mut questions: Vec<Question> = Vec::new();
-        if settings.method == Method::LineCoSpar {
-            for &against in earlier.iter().rev().take(settings.buffer) {
-                if against != action && !questions.iter().any(|q| q.against == against) {
-                    questions.push(Question { action, against, reason: QuestionReason::Previous });
-                }
+        let mut add = |against, reason| {
+            if against != action && !questions.iter().any(|q: &Question| q.against == against) {
+                questions.push(Question { action, against, reason });
             }
-        } else if !earlier.is_empty() {
-            let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
-            let best = self.posterior(space, &before, settings)?.best();
-            questions.extend(best.map(|against| Question { action, against, reason: QuestionReason::Incumbent }));
+        };
+        match settings.partner {
+            Partner::Previous => {
+                earlier.iter().rev().take(settings.buffer).for_each(|&a| add(a, QuestionReason::Previous));
+            }
+            Partner::Every => earlier.iter().rev().for_each(|&a| add(a, QuestionReason::Previous)),
+            Partner::Incumbent if earlier.is_empty() => {}
+            Partner::Incumbent => {
+                let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
+                let best = self.posterior(space, &before, settings)?.best();
+                best.into_iter().for_each(|a| add(a, QuestionReason::Incumbent));
+            }
         }
         Ok(questions)
     }

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::inference::{Approximate, Approximation};
+use crate::inference::{Approximate, Approximation, Spread};
 use crate::kernel::Kernel;
 use crate::likelihood::Interval;
-use crate::linalg::dot;
+use crate::linalg::{Cholesky, Square, dot};
 use crate::model::Model;
+use crate::random::Random;
 use crate::settings::Link;
 use crate::space::{ActionIndex, SearchSpace};
 
@@ -99,7 +100,7 @@ impl State {
                 weights: Vec::new(),
                 whitened: Vec::new(),
                 factors: Vec::new(),
-                spread: crate::inference::Spread::Covariance(crate::linalg::Square::zeros(0)),
+                spread: Spread::Covariance(Square::zeros(0)),
                 evidence: 0.0,
             },
         }
@@ -170,6 +171,40 @@ impl Belief {
         (a.mean - b.mean, variance.max(0.0))
     }
 
+    /// A joint draw of the utilities of all points, and of some actions that are not points.
+    pub(crate) fn draw(&self, others: &[Vec<usize>], random: &mut Random) -> Result<(Vec<f64>, Vec<f64>)> {
+        let model = self.model();
+        let mut noise: Vec<f64> = model.points.iter().map(|_| random.normal()).collect();
+        let spread = match &self.approximation().spread {
+            Spread::Precision(factor) => {
+                factor.solve_upper(&mut noise);
+                model.prior.multiply(&noise)
+            }
+            Spread::Covariance(covariance) => {
+                Cholesky::new(&covariance.ridged(1e-9 * self.kernel.variance))?.multiply(&noise)
+            }
+        };
+        let points: Vec<f64> = self.approximation().mean.iter().zip(spread).map(|(m, s)| m + s).collect();
+        let mut whitened_draw = points.clone();
+        model.prior.solve_lower(&mut whitened_draw);
+        let columns: Vec<Vec<f64>> = others
+            .iter()
+            .map(|levels| {
+                let mut column = self.kernel.column(levels, &model.levels);
+                model.prior.solve_lower(&mut column);
+                column
+            })
+            .collect();
+        let left = Square::from_fn(others.len(), |i, j| {
+            let ridge = if i == j { self.kernel.nugget } else { 0.0 };
+            self.kernel.covariance(&others[i], &others[j]) - dot(&columns[i], &columns[j]) + ridge
+        });
+        let noise: Vec<f64> = others.iter().map(|_| random.normal()).collect();
+        let spread = Cholesky::new(&left)?.multiply(&noise);
+        let others = columns.iter().zip(spread).map(|(column, s)| dot(column, &whitened_draw) + s).collect();
+        Ok((points, others))
+    }
+
     /// Weights `c` with `Cov(f(x), f(point)) = k(x, points) . c` for every `x` that is not a point.
     pub(crate) fn covariance_weights(&self, slot: usize) -> Vec<f64> {
         let prior = &self.model().prior;
@@ -179,12 +214,12 @@ impl Belief {
         let mut row = prior.row(slot).to_vec();
         row.resize(unit.len(), 0.0);
         match &self.approximation().spread {
-            crate::inference::Spread::Covariance(covariance) => {
+            Spread::Covariance(covariance) => {
                 let mut column = covariance.row(slot).to_vec();
                 prior.solve(&mut column);
                 column
             }
-            crate::inference::Spread::Precision(factor) => {
+            Spread::Precision(factor) => {
                 // Sigma e = L B^-1 L' e, hence K^-1 Sigma e = L'^-1 B^-1 L' e.
                 factor.solve(&mut row);
                 prior.solve_upper(&mut row);

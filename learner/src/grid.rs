@@ -3,10 +3,8 @@
 //! The covariances of the whole grid with the points are never stored: the dimensions are cut in two halves, and each
 //! covariance is a product (or two) of a number of the left half and a number of the right half.
 
-use pulp::Arch;
-
 use crate::belief::Belief;
-use crate::linalg::{BLOCK, Block, dots_inline};
+use crate::linalg::{BLOCK, Block, multiply_two};
 use crate::space::SearchSpace;
 
 /// The grid seen from a belief's points.
@@ -81,26 +79,49 @@ impl<'a> Grid<'a> {
 
     /// `k(x, points) . a` and `k(x, points) . b` for every action.
     pub(crate) fn forms(&self, a: &[f64], b: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mut results = (Vec::new(), Vec::new());
-        let size = self.left.count * self.right.count;
-        results.0.reserve(size);
-        results.1.reserve(size);
+        let (rows, columns) = (self.left.count, self.right.count);
+        let mut results = (vec![0.0; rows * columns], vec![0.0; rows * columns]);
         let separate = |half: &Half| (half.separate_forms(a), half.separate_forms(b));
         let (left_alone, right_alone) = (separate(&self.left), separate(&self.right));
-        let points = a.len().max(1);
-        for y in 0..self.left.count {
+        let points = a.len();
+        if points == 0 {
+            return results;
+        }
+        for y in 0..rows {
             let row = self.left.row(y);
             let with_a: Vec<f64> = row.iter().enumerate().map(|(i, u)| u * a[i % points]).collect();
             let with_b: Vec<f64> = row.iter().enumerate().map(|(i, u)| u * b[i % points]).collect();
-            Arch::new().dispatch(|| {
-                for z in 0..self.right.count {
-                    let (s, t) = dots_inline(self.right.row(z), &with_a, &with_b);
-                    results.0.push(s + left_alone.0[y] + right_alone.0[z]);
-                    results.1.push(t + left_alone.1[y] + right_alone.1[z]);
+            let range = y * columns..(y + 1) * columns;
+            let (into_a, into_b) = (&mut results.0[range.clone()], &mut results.1[range]);
+            multiply_two(&self.right.coupled, &with_a, &with_b, into_a, into_b);
+            if !self.left.separate.is_empty() {
+                for z in 0..columns {
+                    into_a[z] += left_alone.0[y] + right_alone.0[z];
+                    into_b[z] += left_alone.1[y] + right_alone.1[z];
                 }
-            });
+            }
         }
         results
+    }
+
+    /// Prior covariances of every action with one point.
+    pub(crate) fn with_point(&self, slot: usize) -> Vec<f64> {
+        let points = self.belief.model().points.len();
+        let mut covariances = Vec::with_capacity(self.left.count * self.right.count);
+        for y in 0..self.left.count {
+            let u = self.left.row(y);
+            for z in 0..self.right.count {
+                let w = self.right.row(z);
+                let mut k = u[slot] * w[slot];
+                if !self.left.separate.is_empty() {
+                    k += u[points + slot] * w[points + slot]
+                        + self.left.separate[y * points + slot]
+                        + self.right.separate[z * points + slot];
+                }
+                covariances.push(k);
+            }
+        }
+        covariances
     }
 
     /// Covariances of an action with the points.
@@ -130,7 +151,7 @@ impl<'a> Grid<'a> {
             for (lane, &action) in chunk.iter().enumerate() {
                 self.column(action, &mut block, lane);
             }
-            model.prior.solve_lower_many(&mut block);
+            model.prior.solve_lower_block(&mut block);
             let explained = crate::linalg::block_dots(&block, &block);
             let kept = self.belief.approximation().spread.block_variances(&model.prior, block);
             variances.extend((0..chunk.len()).map(|lane| (total - explained[lane] + kept[lane]).max(0.0)));

@@ -95,6 +95,16 @@ impl Kernel {
         &self.factors[dimension]
     }
 
+    /// The table of a dimension in the additive and pairwise parts.
+    pub(crate) fn broad(&self, dimension: usize) -> &Square {
+        &self.broad[dimension]
+    }
+
+    /// Weights of the product, the sum of tables and the sum of products of two tables.
+    pub(crate) fn weights(&self) -> [f64; 3] {
+        [self.product, self.additive, self.pairwise]
+    }
+
     pub(crate) fn symmetric(&self, from: usize, a: &[usize], b: &[usize]) -> Symmetric {
         let mut s = Symmetric { product: 1.0, first: 0.0, second: 0.0 };
         for (d, (&i, &j)) in a.iter().zip(b).enumerate() {

@@ -33,5 +33,5 @@ pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
 pub use posterior::{Learner, Posterior, Prediction, posterior};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch};
-pub use settings::{Inference, Labels, LearnerSettings, Link, Method};
+pub use settings::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
 pub use space::{ActionIndex, Dimension, SearchSpace};

@@ -62,11 +62,8 @@ fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<A
         let (plus, minus) = feedback.actions();
         let (about, interval) = match feedback {
             Feedback::Label { category, .. } => {
-                let bounds = &settings.ordinal_thresholds;
-                let low = if category == 0 { f64::NEG_INFINITY } else { bounds[category - 1] };
-                let high = bounds.get(category).copied().unwrap_or(f64::INFINITY);
                 let about = usize::from(settings.labels == Labels::Separate);
-                (about, Interval { low, high, noise: settings.ordinal_noise })
+                (about, settings.label_interval(category))
             }
             Feedback::Preference { .. } => (0, above(settings.preference_noise)),
             Feedback::Suggestion { .. } => (0, above(settings.coactive_noise)),
@@ -94,6 +91,17 @@ fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape 
         lengthscales: dimensions.iter().map(|d| d.lengthscale * settings.lengthscale_factor).collect(),
         broad_lengthscales: dimensions.iter().map(|d| d.range() * settings.broad_lengthscale).collect(),
         relevance: vec![1.0; dimensions.len()],
+    }
+}
+
+fn feasibility_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape {
+    let factor = settings.lengthscale_factor * settings.feasibility_lengthscale_factor;
+    KernelShape {
+        product: 1.0 - settings.feasibility_additive_share,
+        additive: settings.feasibility_additive_share,
+        pairwise: 0.0,
+        lengthscales: space.dimensions().iter().map(|d| d.lengthscale * factor).collect(),
+        ..kernel_shape(space, settings)
     }
 }
 
@@ -133,10 +141,12 @@ impl Learner {
         let utility = Belief { kernel: Arc::clone(&kernel), state: self.utility.advance(&process, &about_utility)? };
         let feasibility = match settings.labels {
             Labels::InUtility => None,
-            Labels::Separate => Some(Belief {
-                kernel: Arc::clone(&kernel),
-                state: self.feasibility.advance(&process, &about_feasibility)?,
-            }),
+            Labels::Separate => {
+                let kernel = Arc::new(Kernel::new(space, &feasibility_shape(space, settings)));
+                let process = Process { space, kernel: &kernel, link: settings.link, method };
+                let state = self.feasibility.advance(&process, &about_feasibility)?;
+                Some(Belief { kernel, state })
+            }
         };
         Ok(Posterior {
             space: space.clone(),

@@ -4,12 +4,14 @@ use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::acquisition::{eubo, line};
+use crate::acquisition::information::InformationGain;
+use crate::acquisition::{eubo, line, thompson};
 use crate::error::{LearnerError, Result};
 use crate::feedback::FeedbackLog;
+use crate::grid::Grid;
 use crate::posterior::{Learner, Posterior};
 use crate::random::Random;
-use crate::settings::{LearnerSettings, Method};
+use crate::settings::{LearnerSettings, Method, Partner, Start};
 use crate::space::{ActionIndex, SearchSpace};
 
 /// Why an action is proposed.
@@ -17,7 +19,7 @@ use crate::space::{ActionIndex, SearchSpace};
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ProposalReason {
-    /// Nothing was tried yet: a uniformly random action.
+    /// Nothing was tried yet.
     FirstAction,
     /// The method draws at random.
     RandomAction,
@@ -25,6 +27,10 @@ pub enum ProposalReason {
     ThompsonOnLine,
     /// Highest expected utility of the better of it and the best action so far.
     ExpectedBestUtility,
+    /// Highest of one joint draw over the whole grid.
+    JointThompson,
+    /// Its answers would tell most about the utility.
+    InformationGain,
     /// No line through the best action held an untried one: a uniformly random untried action.
     LinesExhausted,
 }
@@ -113,18 +119,109 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
     }
     let mut random = Random::new(seed, (belief.visited().len() + pending.len()) as u64);
     let Some(best) = belief.best() else {
-        let action = random_untried(space, &taken, &mut random);
+        let action = match centre(space)? {
+            centre if belief.settings().start == Start::Centre && !taken.contains(&centre) => centre,
+            _ => random_untried(space, &taken, &mut random),
+        };
         return Ok(Proposal { action, reason: ProposalReason::FirstAction, best: None });
     };
     let (action, reason) = match belief.settings().method {
-        Method::LineCoSpar => line_cospar(belief, best, &taken, &mut random)?,
-        Method::Eubo => match eubo::against(belief, best, &taken) {
+        Method::LineCoSpar => line_cospar(belief, best, pending, &taken, &mut random)?,
+        Method::Eubo => match on_lines(belief, best, &taken, &mut random) {
             Some(action) => (action, ProposalReason::ExpectedBestUtility),
             None => return Err(LearnerError::Exhausted { actions: space.len() }),
         },
+        Method::Thompson => match thompson(belief, &taken, &mut random)? {
+            Some(action) => (action, ProposalReason::JointThompson),
+            None => return Err(LearnerError::Exhausted { actions: space.len() }),
+        },
+        Method::InformationGain => (informative(belief, best, &taken, &mut random), ProposalReason::InformationGain),
         Method::Random => (random_untried(space, &taken, &mut random), ProposalReason::RandomAction),
     };
     Ok(Proposal { action, reason, best: Some(best) })
+}
+
+/// Whether an action reaches the lowest threshold when its mean is raised by the avoidance setting.
+fn reaches(belief: &Posterior, mean: f64, sd: f64) -> bool {
+    let settings = belief.settings();
+    match (settings.avoidance, settings.ordinal_thresholds.first()) {
+        (Some(factor), Some(&threshold)) => mean + factor * sd > threshold,
+        _ => true,
+    }
+}
+
+/// The untried action with the highest joint draw, of those outside the region of avoidance if there are any.
+fn thompson(belief: &Posterior, taken: &HashSet<ActionIndex>, random: &mut Random) -> Result<Option<ActionIndex>> {
+    let space = belief.space();
+    let grid = Grid::new(space, &belief.utility);
+    let draw = thompson::draw(space, &belief.utility, &grid, random)?;
+    let mut ranked: Vec<(f64, ActionIndex)> =
+        draw.into_iter().zip((0..).map(ActionIndex)).filter(|(_, action)| !taken.contains(action)).collect();
+    ranked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let allowed = ranked.iter().find(|(_, action)| {
+        belief.settings().avoidance.is_none()
+            || belief.predict(*action).is_ok_and(|p| reaches(belief, p.mean, p.standard_deviation))
+    });
+    Ok(allowed.or(ranked.first()).map(|&(_, action)| action))
+}
+
+/// Random actions among which the most informative is sought, as ROIAL does.
+const INFORMATION_CANDIDATES: usize = 500;
+
+/// The most informative of 500 random untried actions, of those outside the region of avoidance if there are any.
+fn informative(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> ActionIndex {
+    let space = belief.space();
+    let gain = InformationGain::new(belief.settings(), random);
+    let partner = match belief.settings().partner {
+        Partner::Previous => belief.visited().last().copied().unwrap_or(best),
+        Partner::Incumbent | Partner::Every => best,
+    };
+    let utility = &belief.utility;
+    let other = utility.view(partner, space.levels(partner));
+    let other_variance = utility.variance(&other);
+    let mut top: Option<((bool, f64), ActionIndex)> = None;
+    for _ in 0..INFORMATION_CANDIDATES {
+        let action = random_untried(space, taken, random);
+        let view = utility.view(action, space.levels(action));
+        let variance = utility.variance(&view);
+        let covariance = utility.covariance(&view, &other);
+        let rank = (
+            reaches(belief, view.mean, variance.sqrt()),
+            gain.of([view.mean, other.mean], [variance, other_variance], covariance),
+        );
+        if top.is_none_or(|(highest, _)| rank > highest) {
+            top = Some((rank, action));
+        }
+    }
+    top.map_or(best, |(_, action)| action)
+}
+
+/// EUBO on some random lines through the best action, or, where they hold nothing untried, on the whole grid.
+fn on_lines(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> Option<ActionIndex> {
+    let lines = belief.settings().lines;
+    if lines > 0 && belief.visited().len() < belief.settings().line_trials {
+        let candidates: Vec<ActionIndex> =
+            (0..lines).flat_map(|_| line::through(belief.space(), best, random)).collect();
+        if let Some(action) = eubo::against(belief, best, taken, Some(&candidates)) {
+            return Some(action);
+        }
+    }
+    eubo::against(belief, best, taken, None)
+}
+
+/// The middle level of every dimension, the lower of two.
+fn centre(space: &SearchSpace) -> Result<ActionIndex> {
+    space.index_of_levels(&space.shape().iter().map(|n| (n - 1) / 2).collect::<Vec<_>>())
 }
 
 /// A uniformly random action outside `taken`, which must not hold the whole space.
@@ -143,18 +240,25 @@ fn random_untried(space: &SearchSpace, taken: &HashSet<ActionIndex>, random: &mu
 fn line_cospar(
     belief: &Posterior,
     best: ActionIndex,
+    pending: &[ActionIndex],
     taken: &HashSet<ActionIndex>,
     random: &mut Random,
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
+    if belief.settings().repeats {
+        return line_with_repeats(belief, best, pending, random);
+    }
     let suggested: Vec<ActionIndex> =
         belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
-    for _ in 0..MAX_LINES {
+    for attempt in 0..MAX_LINES {
         let mut candidates = suggested.clone();
         for action in line::through(space, best, random) {
             if !taken.contains(&action) && !candidates.contains(&action) {
                 candidates.push(action);
             }
+        }
+        if belief.settings().avoidance.is_some() && attempt < MAX_LINES / 2 {
+            candidates.retain(|&a| belief.predict(a).is_ok_and(|p| reaches(belief, p.mean, p.standard_deviation)));
         }
         if candidates.is_empty() {
             continue;
@@ -167,6 +271,32 @@ fn line_cospar(
         return Ok((chosen, ProposalReason::ThompsonOnLine));
     }
     Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted))
+}
+
+/// The published draw over visited actions and line, repeated until it avoids the buffered and pending ones.
+fn line_with_repeats(
+    belief: &Posterior,
+    best: ActionIndex,
+    pending: &[ActionIndex],
+    random: &mut Random,
+) -> Result<(ActionIndex, ProposalReason)> {
+    let space = belief.space();
+    let model = belief.utility.model();
+    let line: Vec<ActionIndex> =
+        line::through(space, best, random).into_iter().filter(|&a| model.slot(a).is_none()).collect();
+    let levels: Vec<Vec<usize>> = line.iter().map(|&a| space.levels(a)).collect();
+    let buffered: Vec<ActionIndex> =
+        belief.visited().iter().rev().take(belief.settings().buffer).chain(pending).copied().collect();
+    let mut chosen = best;
+    for _ in 0..50 {
+        let (points, others) = belief.utility.draw(&levels, random)?;
+        let all = model.points.iter().zip(&points).chain(line.iter().zip(&others));
+        chosen = all.fold((best, f64::NEG_INFINITY), |top, (&a, &f)| if f > top.1 { (a, f) } else { top }).0;
+        if !buffered.contains(&chosen) {
+            break;
+        }
+    }
+    Ok((chosen, ProposalReason::ThompsonOnLine))
 }
 
 #[cfg(test)]
@@ -191,8 +321,8 @@ mod tests {
             let levels = space.levels(a);
             -(levels[0] as f64 - 1.0).powi(2) - (levels[1] as f64 - 2.0).powi(2) - (levels[2] as f64).powi(2)
         };
-        for method in [Method::LineCoSpar, Method::Eubo, Method::Random] {
-            let settings = LearnerSettings::of(method);
+        for method in [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random] {
+            let settings = LearnerSettings { repeats: false, ..LearnerSettings::of(method) };
             let mut log = FeedbackLog::default();
             for trial in 0..space.len() {
                 let proposal = propose(&space, &log, &[], &settings, 5).unwrap();
@@ -228,7 +358,7 @@ mod tests {
     #[test]
     fn batches_hold_different_actions() {
         let space = grid();
-        let settings = LearnerSettings { samples_per_iteration: 8, ..LearnerSettings::default() };
+        let settings = LearnerSettings { samples_per_iteration: 8, repeats: false, ..LearnerSettings::default() };
         let log = FeedbackLog { visited: vec![ActionIndex(0)], feedback: vec![] };
         let pending = [ActionIndex(3), ActionIndex(7)];
         let mut batch: Vec<_> =

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
+use crate::likelihood::Interval;
 
 /// How the next action is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -14,6 +15,10 @@ pub enum Method {
     /// The action with the greatest expected utility of the better of itself and the best action so far, over the
     /// whole grid.
     Eubo,
+    /// The highest of one joint draw of the utility of all actions.
+    Thompson,
+    /// The action whose answers would tell most about the utility.
+    InformationGain,
     /// A uniformly random action that was not visited.
     Random,
 }
@@ -49,6 +54,28 @@ pub enum Labels {
     Separate,
 }
 
+/// What is tried first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// A uniformly random action.
+    Random,
+    /// The middle level of every dimension.
+    Centre,
+}
+
+/// Which earlier actions a new one is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Partner {
+    /// The last ones tried, as many as the buffer holds: what a person on the device remembers.
+    Previous,
+    /// The best one so far.
+    Incumbent,
+    /// Every one: free where the answer is computed.
+    Every,
+}
+
 /// Everything that decides how a log is read and what is proposed next.
 ///
 /// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors.
@@ -76,6 +103,12 @@ pub struct LearnerSettings {
     pub broad_lengthscale: f64,
     /// Where labels enter.
     pub labels: Labels,
+    /// Multiplies every lengthscale of the function that separate labels are about.
+    pub feasibility_lengthscale_factor: f64,
+    /// Share of functions of one quantity in the function that separate labels are about.
+    pub feasibility_additive_share: f64,
+    /// What is tried first.
+    pub start: Start,
     /// Scale of the noise of a preference, in units of utility.
     pub preference_noise: f64,
     /// Scale of the noise of a label.
@@ -89,8 +122,19 @@ pub struct LearnerSettings {
     pub tie_noise: f64,
     /// Utilities closer than this are felt as equal.
     pub tie_width: f64,
+    /// Region of avoidance: actions whose mean plus this many standard deviations does not reach the lowest
+    /// threshold are not proposed while others are left (ROIAL uses -0.45). None: no region is avoided.
+    pub avoidance: Option<f64>,
     /// Number `n` of actions proposed at a time.
     pub samples_per_iteration: usize,
+    /// Whether LineCoSpar may propose again an action that was tried before the buffered ones, as published.
+    pub repeats: bool,
+    /// Number of random lines through the best action on which EUBO looks; 0 looks at the whole grid.
+    pub lines: usize,
+    /// Number of trials after which EUBO leaves the lines and looks at the whole grid.
+    pub line_trials: usize,
+    /// Which earlier actions a new one is compared with.
+    pub partner: Partner,
     /// Number `b` of earlier actions with which a new one is compared.
     pub buffer: usize,
 }
@@ -108,13 +152,21 @@ impl Default for LearnerSettings {
             pairwise_share: 0.0,
             broad_lengthscale: 1.0,
             labels: Labels::InUtility,
+            feasibility_lengthscale_factor: 1.0,
+            feasibility_additive_share: 0.0,
+            start: Start::Random,
             preference_noise: 0.02,
             ordinal_noise: 0.1,
             ordinal_thresholds: vec![0.0],
             coactive_noise: 0.02,
             tie_noise: 0.02,
             tie_width: 0.02,
+            avoidance: None,
             samples_per_iteration: 1,
+            repeats: true,
+            lines: 0,
+            line_trials: usize::MAX,
+            partner: Partner::Previous,
             buffer: 1,
         }
     }
@@ -124,11 +176,24 @@ impl LearnerSettings {
     /// The recommended settings of a method.
     pub fn of(method: Method) -> Self {
         match method {
-            Method::LineCoSpar | Method::Random => Self { method, ..Self::default() },
-            Method::Eubo => {
-                Self { method, inference: Inference::ExpectationPropagation, link: Link::Probit, ..Self::default() }
+            Method::LineCoSpar | Method::Thompson | Method::InformationGain | Method::Random => {
+                Self { method, ..Self::default() }
             }
+            Method::Eubo => Self {
+                method,
+                inference: Inference::ExpectationPropagation,
+                link: Link::Probit,
+                partner: Partner::Incumbent,
+                ..Self::default()
+            },
         }
+    }
+
+    /// The utilities of a category of labels.
+    pub(crate) fn label_interval(&self, category: usize) -> Interval {
+        let bounds = &self.ordinal_thresholds;
+        let low = category.checked_sub(1).and_then(|below| bounds.get(below)).copied().unwrap_or(f64::NEG_INFINITY);
+        Interval { low, high: bounds.get(category).copied().unwrap_or(f64::INFINITY), noise: self.ordinal_noise }
     }
 
     /// Number of categories of labels.
@@ -149,6 +214,8 @@ impl LearnerSettings {
             ("additive_share", self.additive_share, 0.0, 1.0),
             ("pairwise_share", self.pairwise_share, 0.0, 1.0),
             ("broad_lengthscale", self.broad_lengthscale, 1e-2, 1e3),
+            ("feasibility_lengthscale_factor", self.feasibility_lengthscale_factor, 1e-3, 1e3),
+            ("feasibility_additive_share", self.feasibility_additive_share, 0.0, 1.0),
             ("preference_noise", self.preference_noise, 1e-4, 1e4),
             ("ordinal_noise", self.ordinal_noise, 1e-4, 1e4),
             ("coactive_noise", self.coactive_noise, 1e-4, 1e4),
@@ -158,6 +225,11 @@ impl LearnerSettings {
             if !(value >= low && value <= high) {
                 return refuse(setting, format!("{value} is not between {low} and {high}"));
             }
+        }
+        if let Some(avoidance) = self.avoidance
+            && (avoidance.is_nan() || avoidance.abs() > 1e3)
+        {
+            return refuse("avoidance", format!("{avoidance} is not between -1000 and 1000"));
         }
         if self.additive_share + self.pairwise_share > 1.0 {
             return refuse("pairwise_share", "additive and pairwise shares together exceed 1".into());

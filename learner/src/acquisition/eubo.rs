@@ -20,9 +20,46 @@ pub(crate) fn expected_gain(mean: f64, variance: f64) -> f64 {
     mean * math::normal_cdf(z) + sd * math::normal_density(z)
 }
 
+/// Upper bounds of [`expected_gain`] by linear interpolation of the convex `h(z) = z Phi(z) + phi(z)`.
+struct GainBound {
+    table: Vec<f64>,
+}
+
+impl GainBound {
+    const REACH: f64 = 8.0;
+    const STEPS: f64 = 32.0;
+
+    fn new() -> Self {
+        let h = |i: u32| {
+            let z = f64::from(i) / Self::STEPS - Self::REACH;
+            z * math::normal_cdf(z) + math::normal_density(z)
+        };
+        Self { table: (0..=512).map(h).collect() }
+    }
+
+    fn of(&self, mean: f64, variance: f64) -> f64 {
+        // A little more than the variance covers its rounding.
+        let sd = (variance.max(0.0) + 1e-9).sqrt();
+        let at = (mean / sd + Self::REACH) * Self::STEPS;
+        if at >= 511.0 {
+            return mean + sd * 1e-9;
+        }
+        let at = at.max(0.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0..511")]
+        let i = at as usize;
+        let weight = at - i as f64;
+        sd * (self.table[i] + weight * (self.table[i + 1] - self.table[i]))
+    }
+}
+
 /// The action outside `taken` with the highest expected utility of the better of it and `best`, times its
 /// probability of being feasible where that is a function of its own.
-pub(crate) fn against(belief: &Posterior, best: ActionIndex, taken: &HashSet<ActionIndex>) -> Option<ActionIndex> {
+pub(crate) fn against(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    among: Option<&[ActionIndex]>,
+) -> Option<ActionIndex> {
     let space = belief.space();
     let utility = &belief.utility;
     let grid = Grid::new(space, utility);
@@ -42,27 +79,39 @@ pub(crate) fn against(belief: &Posterior, best: ActionIndex, taken: &HashSet<Act
     let total = utility.kernel.variance;
     // Cauchy-Schwarz: what the answers about the incumbent alone remove of a variance.
     let spent = (total + utility.kernel.nugget - own).max(1e-12);
-    let taken: HashSet<u64> = taken.iter().map(|a| a.0).collect();
-    let mut ranked: Vec<(f64, usize)> = (0..means.len())
-        .filter(|&x| !taken.contains(&(x as u64)))
-        .map(|x| {
-            let prior = utility.kernel.covariance(&space.levels(ActionIndex(x as u64)), &space.levels(best));
-            let removed = if slot.is_some() { (prior - covariances[x]).powi(2) / spent } else { 0.0 };
-            let variance = total - removed + own - 2.0 * covariances[x];
-            let gain = if hopeless { 1.0 } else { expected_gain(means[x] - incumbent.mean, variance) };
-            let chance = feasibility.as_ref().map_or(1.0, |(_, means, total)| {
-                let z = (means[x] - threshold) / total.sqrt();
-                if z >= 0.0 { 1.0 } else { math::normal_cdf(z) }
-            });
-            (gain * chance, x)
-        })
-        .collect();
-    ranked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let mut top: Option<(f64, usize)> = None;
-    for chunk in ranked.chunks(BLOCK) {
-        if top.is_some_and(|(value, _)| chunk[0].0 < value) {
-            break;
+    let with_best = slot.map(|slot| grid.with_point(slot));
+    let bounds = GainBound::new();
+    let bound = |x: usize| {
+        let removed = with_best.as_ref().map_or(0.0, |k| (k[x] - covariances[x]).powi(2) / spent);
+        let variance = total - removed + own - 2.0 * covariances[x];
+        let gain = if hopeless { 1.0 } else { bounds.of(means[x] - incumbent.mean, variance) };
+        let chance = feasibility.as_ref().map_or(1.0, |(_, means, total)| {
+            let z = (means[x] - threshold) / total.sqrt();
+            if z >= 0.0 { 1.0 } else { math::normal_cdf(z) }
+        });
+        gain * chance
+    };
+    let mut free = vec![among.is_none(); means.len()];
+    for action in among.unwrap_or_default() {
+        if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
+            *free = true;
         }
+    }
+    for action in taken {
+        if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
+            *free = false;
+        }
+    }
+    let mut ranked: Vec<(f64, usize)> = (0..means.len()).filter(|&x| free[x]).map(|x| (bound(x), x)).collect();
+    let order = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    let mut top: Option<(f64, usize)> = None;
+    // The first block alone usually rules out most of the rest, which then need not be sorted.
+    let first = BLOCK.min(ranked.len());
+    if first < ranked.len() {
+        ranked.select_nth_unstable_by(first, order);
+    }
+    let (head, tail) = ranked.split_at_mut(first);
+    let mut consider = |chunk: &[(f64, usize)]| {
         let actions: Vec<usize> = chunk.iter().map(|c| c.1).collect();
         let variances = grid.variances(&actions);
         let chances: Vec<f64> = match &feasibility {
@@ -87,6 +136,16 @@ pub(crate) fn against(belief: &Posterior, best: ActionIndex, taken: &HashSet<Act
                 top = Some((value, x));
             }
         }
+        top.map_or(f64::NEG_INFINITY, |(value, _)| value)
+    };
+    let mut highest = if head.is_empty() { f64::NEG_INFINITY } else { consider(head) };
+    let mut rest: Vec<(f64, usize)> = tail.iter().copied().filter(|(bound, _)| *bound >= highest).collect();
+    rest.sort_unstable_by(order);
+    for chunk in rest.chunks(BLOCK) {
+        if chunk[0].0 < highest {
+            break;
+        }
+        highest = consider(chunk);
     }
     top.map(|(_, x)| ActionIndex(x as u64))
 }
@@ -140,7 +199,7 @@ mod tests {
                     top = (gain, action);
                 }
             }
-            assert_eq!(against(&belief, best, &taken), Some(top.1));
+            assert_eq!(against(&belief, best, &taken, None), Some(top.1));
         }
     }
 }

@@ -111,13 +111,7 @@ impl Working {
             row[..=i].copy_from_slice(prior.row(i));
             precision.solve_lower(row);
         }
-        for i in 0..n {
-            for j in 0..=i {
-                let value = dot(columns.row(i), columns.row(j));
-                self.covariance.row_mut(i)[j] = value;
-                self.covariance.row_mut(j)[i] = value;
-            }
-        }
+        self.covariance = columns.outer_product();
         self.mean = self.covariance.multiply(&shifts(n, sites, &self.factors));
         Ok(())
     }

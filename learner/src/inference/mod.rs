@@ -11,7 +11,7 @@ pub(crate) use expectation_propagation::ExpectationPropagation;
 pub(crate) use laplace::Laplace;
 
 use crate::error::Result;
-use crate::linalg::{Block, Cholesky, Square, add_scaled, block_dots, block_multiply};
+use crate::linalg::{Block, Cholesky, Square, add_scaled, block_dots};
 use crate::model::{Model, Site};
 use crate::settings::Link;
 
@@ -76,12 +76,12 @@ impl Spread {
     pub(crate) fn block_variances(&self, prior: &Cholesky, mut whitened: Block) -> [f64; crate::linalg::BLOCK] {
         match self {
             Self::Precision(factor) => {
-                factor.solve_lower_many(&mut whitened);
+                factor.solve_lower_block(&mut whitened);
                 block_dots(&whitened, &whitened)
             }
             Self::Covariance(covariance) => {
-                prior.solve_upper_many(&mut whitened);
-                block_dots(&whitened, &block_multiply(covariance, &whitened))
+                prior.solve_upper_block(&mut whitened);
+                block_dots(&whitened, &covariance.multiply_block(&whitened))
             }
         }
     }
@@ -104,14 +104,5 @@ pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[Fa
             add_scaled(product.row_mut(minus), w, prior.row(minus));
         }
     }
-    let mut result = Square::zeros(n);
-    for k in 0..n {
-        for (i, &l) in prior.row(k).iter().enumerate() {
-            add_scaled(&mut result.row_mut(i)[..=i], l, &product.row(k)[..=i]);
-        }
-    }
-    for i in 0..n {
-        result.row_mut(i)[i] += 1.0;
-    }
-    Cholesky::new(&result)
+    Cholesky::new(&prior.identity_plus_transposed_product(&product))
 }
