@@ -37,7 +37,9 @@ impl From<ModelError> for FieldError {
                 Self { field, value: value.into(), allowed: format!("{minimum} to {maximum}"), message }
             }
             ModelError::Unknown { field, value, known } => Self { field, value: value.into(), allowed: known, message },
-            ModelError::Malformed { what, reason } => Self { field: what, value: Value::Null, allowed: reason, message },
+            ModelError::Malformed { what, reason } => {
+                Self { field: what, value: Value::Null, allowed: reason, message }
+            }
         }
     }
 }

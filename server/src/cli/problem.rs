@@ -5,7 +5,8 @@ use super::serve::interrupted;
 use crate::error::Error;
 use clap::Args;
 use gait_optimizer::{
-    CancelToken, Device, GaitProblem, GaitSettings, Mesh, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds, WarmStart,
+    CancelToken, Device, GaitProblem, GaitSettings, Mesh, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
+    WarmStart,
 };
 use std::path::{Path, PathBuf};
 
@@ -69,8 +70,9 @@ impl ProblemFlags {
 
     pub(super) fn warm_start(&self) -> Result<Option<WarmStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let outcome: SolveOutcome = serde_json::from_str(&read(path)?)
-            .map_err(|e| Error::Malformed(format!("{}: not a file of `gaitwright solve --out`: {e}", path.display())))?;
+        let outcome: SolveOutcome = serde_json::from_str(&read(path)?).map_err(|e| {
+            Error::Malformed(format!("{}: not a file of `gaitwright solve --out`: {e}", path.display()))
+        })?;
         Ok(Some(outcome.warm_start))
     }
 }

@@ -188,7 +188,11 @@ async fn follow(director: &Director, study: &Study, json: bool) -> Result<(), Er
             }
             StudyState::Paused | StudyState::Stopped => {
                 bar.finish_and_clear();
-                return Err(Error::conflict(format!("the study is {}: {}", present.state.as_str(), present.state_reason)));
+                return Err(Error::conflict(format!(
+                    "the study is {}: {}",
+                    present.state.as_str(),
+                    present.state_reason
+                )));
             }
         }
         loop {

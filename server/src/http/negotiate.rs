@@ -7,7 +7,8 @@ use axum::response::{IntoResponse, Response};
 /// Whether CSV is asked for before JSON.
 pub(crate) fn wants_csv(headers: &HeaderMap) -> bool {
     let accept = headers.get(header::ACCEPT).and_then(|value| value.to_str().ok()).unwrap_or("");
-    let place = |kind: &str| accept.split(',').position(|part| part.split(';').next().is_some_and(|k| k.trim() == kind));
+    let place =
+        |kind: &str| accept.split(',').position(|part| part.split(';').next().is_some_and(|k| k.trim() == kind));
     match (place("text/csv"), place("application/json")) {
         (Some(csv), Some(json)) => csv < json,
         (Some(_), None) => true,

@@ -43,6 +43,12 @@ impl Axis {
         Self { from, to, ticks, decimals: decimals_of(step) }
     }
 
+    /// Drops the ticks between whole numbers.
+    pub(super) fn keep_whole_ticks(&mut self) {
+        self.ticks.retain(|tick| tick.fract() == 0.0);
+        self.decimals = 0;
+    }
+
     /// Where a value lies between the ends, 0 to 1.
     pub(super) fn place(&self, value: f64) -> f64 {
         (value - self.from) / (self.to - self.from)
@@ -72,7 +78,13 @@ fn round_step(raw: f64) -> f64 {
 
 fn decimals_of(step: f64) -> usize {
     let digits = -(step * 1.0001).log10().floor();
-    if digits <= 0.0 { 0 } else if digits >= 12.0 { 12 } else { (1..=12).find(|n| f64::from(*n) >= digits).unwrap_or(12) as usize }
+    if digits <= 0.0 {
+        0
+    } else if digits >= 12.0 {
+        12
+    } else {
+        (1..=12).find(|n| f64::from(*n) >= digits).unwrap_or(12) as usize
+    }
 }
 
 #[cfg(test)]
@@ -83,7 +95,10 @@ mod tests {
     #[test]
     fn ticks_are_round() {
         let axis = Axis::over([0.03, 0.41].into_iter(), 5, false);
-        assert_eq!(axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(), ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
+        assert_eq!(
+            axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(),
+            ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
+        );
         let axis = Axis::over([-40.0, 60.0].into_iter(), 5, false);
         assert_eq!(axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(), ["−40", "−20", "0", "20", "40", "60"]);
     }

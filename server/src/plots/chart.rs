@@ -51,7 +51,7 @@ const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 300.0;
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = 14.0;
-const TOP: f64 = 22.0;
+const TOP: f64 = 30.0;
 const BOTTOM: f64 = 44.0;
 
 impl Chart {
@@ -79,7 +79,7 @@ impl Chart {
         let all = || self.series.iter().flat_map(|series| series.points.iter());
         let mut x = Axis::over(all().map(|p| p.0), 8, true);
         if self.whole_x {
-            x.ticks.retain(|tick| tick.fract() == 0.0);
+            x.keep_whole_ticks();
         }
         let y = Axis::over(all().map(|p| p.1), 5, false);
         let mut svg = String::with_capacity(16 * 1024);
@@ -115,6 +115,9 @@ impl Chart {
         for (value, name) in &self.marks {
             let at = px(*value);
             write!(svg, "<path class=\"mark\" d=\"M{at:.1} {TOP}V{bottom}\"/>")?;
+            if name.is_empty() {
+                continue;
+            }
             write!(svg, "<text class=\"mark\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", at + 3.0, TOP + 10.0, escape(name))?;
         }
         write!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>")?;

@@ -53,10 +53,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
 /// [`StoreError::Missing`], or what the database reports.
 pub async fn get(db: &mut Connection, id: DeviceId) -> StoreResult<Device> {
     let row = sqlx::query("select * from devices where id = ?").bind(id).fetch_optional(db).await?;
-    row.as_ref()
-        .map(from_row)
-        .transpose()?
-        .ok_or_else(|| StoreError::Missing { what: "device", id: id.to_string() })
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "device", id: id.to_string() })
 }
 
 /// Every device, newest first.

@@ -68,6 +68,7 @@ pub async fn after(db: &mut Connection, study: StudyId, seq: i64, limit: u32) ->
 /// # Errors
 /// What the database reports.
 pub async fn last(db: &mut Connection, study: StudyId) -> StoreResult<i64> {
-    let row = sqlx::query("select coalesce(max(seq), 0) from events where study_id = ?").bind(study).fetch_one(db).await?;
+    let row =
+        sqlx::query("select coalesce(max(seq), 0) from events where study_id = ?").bind(study).fetch_one(db).await?;
     Ok(row.try_get(0)?)
 }

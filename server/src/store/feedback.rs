@@ -190,7 +190,10 @@ pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow
     .bind(id)
     .fetch_optional(db)
     .await?;
-    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "preference", id: id.to_string() })
+    row.as_ref()
+        .map(from_row)
+        .transpose()?
+        .ok_or_else(|| StoreError::Missing { what: "preference", id: id.to_string() })
 }
 
 /// Every row of a study with a sequence number above `after`, retracted ones included, as heard.

@@ -1,6 +1,6 @@
 //! Reference gaits: what Gait RMSE is measured against.
 
-use super::{Connection, ReferenceGaitId, Instant, StoreError, StoreResult, json, now};
+use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json, now};
 use gait_optimizer::ReferenceGait as Definition;
 use serde::Serialize;
 use sqlx::Row;
@@ -26,7 +26,8 @@ pub struct ReferenceGait {
 pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<ReferenceGait> {
     let text = json::to_text("reference gait", definition)?;
     let hash = json::sha256(text.as_bytes());
-    let found = sqlx::query("select * from reference_gaits where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
+    let found =
+        sqlx::query("select * from reference_gaits where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
     if let Some(row) = found {
         return from_row(&row);
     }

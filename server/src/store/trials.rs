@@ -30,15 +30,8 @@ pub enum TrialState {
 
 impl TrialState {
     /// Every state.
-    pub const ALL: [Self; 7] = [
-        Self::Queued,
-        Self::Running,
-        Self::Converged,
-        Self::NotConverged,
-        Self::Failed,
-        Self::Lost,
-        Self::Cancelled,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Queued, Self::Running, Self::Converged, Self::NotConverged, Self::Failed, Self::Lost, Self::Cancelled];
 
     /// As stored and shown.
     pub fn as_str(self) -> &'static str {

@@ -77,9 +77,9 @@ fn reason_in_words(reason: ProposalReason) -> String {
     match reason {
         ProposalReason::FirstAction => "first action: drawn at random",
         ProposalReason::RandomAction => "drawn at random",
-        ProposalReason::ThompsonOnLine => "highest of a Thompson draw on a line through the best action",
-        ProposalReason::ExpectedBestUtility => "highest expected utility of the better of it and the best action",
-        ProposalReason::LinesExhausted => "no untried action on any line through the best: drawn at random",
+        ProposalReason::ThompsonOnLine => "Thompson draw on a line through the best",
+        ProposalReason::ExpectedBestUtility => "highest expected utility beside the best",
+        ProposalReason::LinesExhausted => "lines exhausted: drawn at random",
         _ => "chosen by the learner",
     }
     .to_owned()

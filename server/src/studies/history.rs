@@ -36,11 +36,8 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
             cost_of_transport: best.cost_of_transport,
         })
     };
-    let mut history: Vec<Milestone> = standing
-        .trials
-        .iter()
-        .filter_map(|trial| milestone(trial.number - 1, trial.best_before?))
-        .collect();
+    let mut history: Vec<Milestone> =
+        standing.trials.iter().filter_map(|trial| milestone(trial.number - 1, trial.best_before?)).collect();
     let last = standing.trials.iter().rev().find(|trial| trial.state.is_result()).map(|trial| trial.number);
     if let (Some(last), Some(best)) = (last, best_trial(standing)?)
         && history.last().is_none_or(|milestone| milestone.iteration < last)

@@ -33,16 +33,8 @@ pub enum Act {
 
 impl Act {
     /// Every act.
-    pub const ALL: [Self; 8] = [
-        Self::Start,
-        Self::Ask,
-        Self::Answered,
-        Self::Pause,
-        Self::Resume,
-        Self::Finish,
-        Self::Stop,
-        Self::Extend,
-    ];
+    pub const ALL: [Self; 8] =
+        [Self::Start, Self::Ask, Self::Answered, Self::Pause, Self::Resume, Self::Finish, Self::Stop, Self::Extend];
 
     /// In words, for messages.
     pub fn as_str(self) -> &'static str {
@@ -131,7 +123,14 @@ mod tests {
 
     #[test]
     fn every_state_is_reached_and_has_a_way_on() {
-        for state in [StudyState::Draft, StudyState::Running, StudyState::Waiting, StudyState::Paused, StudyState::Finished, StudyState::Stopped] {
+        for state in [
+            StudyState::Draft,
+            StudyState::Running,
+            StudyState::Waiting,
+            StudyState::Paused,
+            StudyState::Finished,
+            StudyState::Stopped,
+        ] {
             assert!(!acts_of_people(state).is_empty(), "{state:?}");
         }
     }

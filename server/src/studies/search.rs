@@ -79,12 +79,9 @@ mod tests {
 
     #[test]
     fn bounds_that_are_not_tuned_keep_their_values() {
-        let space = SearchSpace::new(vec![Dimension {
-            name: "a5".to_owned(),
-            values: vec![0.0, 0.02],
-            lengthscale: 0.02,
-        }])
-        .unwrap();
+        let space =
+            SearchSpace::new(vec![Dimension { name: "a5".to_owned(), values: vec![0.0, 0.02], lengthscale: 0.02 }])
+                .unwrap();
         let base = TunedBounds { a1: 17.0, ..TunedBounds::default() };
         let bounds = bounds_of(&space, base, ActionIndex(1)).unwrap();
         assert_eq!(bounds, TunedBounds { a5: 0.02, ..base });

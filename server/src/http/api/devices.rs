@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
-use crate::store::devices::{self, Device};
 use crate::store::DeviceId;
+use crate::store::devices::{self, Device};
 use axum::Json;
 use axum::extract::State;
 

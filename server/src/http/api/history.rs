@@ -42,9 +42,7 @@ fn table(study: StudyId, history: &[Milestone]) -> Result<Response, Error> {
     let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     let rows = history
         .iter()
-        .map(|m| {
-            vec![m.iteration.to_string(), m.number.to_string(), text(m.gait_rmse_rad), text(m.cost_of_transport)]
-        })
+        .map(|m| vec![m.iteration.to_string(), m.number.to_string(), text(m.gait_rmse_rad), text(m.cost_of_transport)])
         .collect();
     let header = ["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"];
     csv_answer(&format!("history-{}.csv", study.short()), &header, rows)

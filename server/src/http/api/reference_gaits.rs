@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
-use crate::store::reference_gaits::{self, ReferenceGait};
 use crate::store::ReferenceGaitId;
+use crate::store::reference_gaits::{self, ReferenceGait};
 use axum::Json;
 use axum::extract::State;
 
@@ -14,6 +14,9 @@ pub(super) async fn list(State(app): State<AppState>) -> Result<Json<Vec<Referen
 }
 
 /// `GET {id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<ReferenceGaitId>) -> Result<Json<ReferenceGait>, Error> {
+pub(super) async fn get(
+    State(app): State<AppState>,
+    Id(id): Id<ReferenceGaitId>,
+) -> Result<Json<ReferenceGait>, Error> {
     Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?))
 }

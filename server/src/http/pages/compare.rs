@@ -50,11 +50,7 @@ struct Saved {
 }
 
 /// `GET /studies/{id}/compare`.
-pub(super) async fn get(
-    State(app): State<AppState>,
-    Id(id): Id<StudyId>,
-    Params(choice): Params<Choice>,
-) -> Page {
+pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>, Params(choice): Params<Choice>) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;

@@ -34,26 +34,42 @@ const JOINTS: [&str; 6] = ["left hip", "left knee", "left ankle", "right hip", "
 pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Vec<Drawn> {
     let points = points(gait);
     let end = points.last().map_or(1.0, |point| point.time_s).max(1e-9);
+    // A gap between domains: forces, torques and accelerations may jump there.
     let over = |f: &dyn Fn(&Point<'_>) -> f64| -> Vec<(f64, f64)> {
-        points.iter().map(|point| (100.0 * point.time_s / end, f(point))).collect()
+        let mut line: Vec<(f64, f64)> = Vec::with_capacity(points.len() + 8);
+        for (i, point) in points.iter().enumerate() {
+            if i > 0 && points[i - 1].domain != point.domain {
+                line.push((f64::NAN, f64::NAN));
+            }
+            line.push((100.0 * point.time_s / end, f(point)));
+        }
+        line
     };
+    let marks = domain_starts(&points, end);
     let mut drawn = Vec::new();
+    let mut draw = |mut chart: Chart, note: &'static str| {
+        chart.marks.clone_from(&marks);
+        drawn.push(Drawn::new(&chart, note));
+    };
     for (title, q, column) in ANGLES {
         let measured = reference.angles_rad.iter().enumerate().map(|(i, row)| (i as f64, row[column].to_degrees()));
-        let chart = Chart::new(title, CYCLE, "angle, °")
-            .with("reference", 7, Stroke::Dashed, measured.collect())
-            .with("this gait", 0, Stroke::Solid, over(&|p| p.q[q].to_degrees()));
-        drawn.push(Drawn::new(&chart, "Flexion, dorsiflexion and forward lean are positive."));
+        let chart = Chart::new(title, CYCLE, "angle, °").with("reference", 7, Stroke::Dashed, measured.collect()).with(
+            "this gait",
+            0,
+            Stroke::Solid,
+            over(&|p| p.q[q].to_degrees()),
+        );
+        draw(chart, "Flexion, dorsiflexion and forward lean are positive.");
     }
     let knee_and_ankle = Chart::new("Prosthesis", CYCLE, "angle, °")
         .with("right knee", 0, Stroke::Solid, over(&|p| p.q[7].to_degrees()))
         .with("right ankle", 1, Stroke::Dashed, over(&|p| p.q[8].to_degrees()));
-    drawn.push(Drawn::new(&knee_and_ankle, "The prosthetic joints have no reference."));
+    draw(knee_and_ankle, "The prosthetic joints have no reference.");
     for (title, axis) in [("Ground force, vertical", 1), ("Ground force, forward", 0)] {
         let chart = Chart::new(title, CYCLE, "force, N")
             .with("left foot", 0, Stroke::Solid, over(&|p| p.forces[axis] + p.forces[2 + axis]))
             .with("right foot (prosthesis)", 1, Stroke::Dashed, over(&|p| p.forces[4 + axis] + p.forces[6 + axis]));
-        drawn.push(Drawn::new(&chart, "Heel and toe together."));
+        draw(chart, "Heel and toe together.");
     }
     for (title, first) in [("Joint torques, left", 0), ("Joint torques, right (prosthesis side)", 3)] {
         let mut chart = Chart::new(title, CYCLE, "torque, N m");
@@ -61,7 +77,7 @@ pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Vec<Drawn> {
             let stroke = if joint % 3 == 1 { Stroke::Dashed } else { Stroke::Solid };
             chart = chart.with(JOINTS[joint], joint % 3, stroke, over(&|p| p.u[joint]));
         }
-        drawn.push(Drawn::new(&chart, ""));
+        draw(chart, "");
     }
     if points.iter().any(|point| point.activation.is_some()) {
         for (title, muscles) in [
@@ -75,10 +91,23 @@ pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Vec<Drawn> {
                 let line = over(&|p| p.activation.map_or(f64::NAN, |a| a[muscle]));
                 chart = chart.with(MUSCLES[muscle], place, stroke, line);
             }
-            drawn.push(Drawn::new(&chart, ""));
+            draw(chart, "");
         }
     }
     drawn
+}
+
+/// Where each domain begins, in percent of the cycle.
+fn domain_starts(points: &[Point<'_>], end: f64) -> Vec<(f64, String)> {
+    let mut starts: Vec<(f64, String)> = Vec::new();
+    let mut current = "";
+    for point in points {
+        if point.domain != current {
+            current = point.domain;
+            starts.push((100.0 * point.time_s / end, String::new()));
+        }
+    }
+    starts
 }
 
 /// How the solve went.

@@ -172,15 +172,16 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
 }
 
 fn figures(standing: &Standing) -> Result<Figures, gait_learner::LearnerError> {
-    let question =
-        standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
+    let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
     Ok(Figures { best: best_trial(standing)?, history: history::of(standing)?, question })
 }
 
 fn running_row(trial: &Trial, track: Option<Track>) -> RunningRow {
     let text = track.and_then(|track| track.records.last().copied()).map_or_else(
         || "starting".to_owned(),
-        |r| format!("iteration {}, objective {:.4}, violation {:.1e}", r.iteration, r.objective, r.constraint_violation),
+        |r| {
+            format!("iteration {}, objective {:.4}, violation {:.1e}", r.iteration, r.objective, r.constraint_violation)
+        },
     );
     RunningRow { id: trial.id, number: trial.number, text }
 }
@@ -221,11 +222,7 @@ fn view(standing: Standing, counts: TrialCounts, figures: &Figures, running: Vec
     }
 }
 
-fn trial_row(
-    trial: &Trial,
-    number_of: impl Fn(TrialId) -> Option<(TrialId, u32)>,
-    best: Option<TrialId>,
-) -> TrialRow {
+fn trial_row(trial: &Trial, number_of: impl Fn(TrialId) -> Option<(TrialId, u32)>, best: Option<TrialId>) -> TrialRow {
     TrialRow {
         id: trial.id,
         number: trial.number,
