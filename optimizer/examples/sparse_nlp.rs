@@ -1,6 +1,7 @@
-//! Cart-pole swing-up with both factorisations: iterations and times.
+//! A sparse problem with every factorisation: iterations and times.
 //!
-//! `cargo run --release -p gait-optimizer --example sparse_nlp [intervals]`
+//! `cargo run --release -p gait-optimizer --example sparse_nlp [intervals [show]]`: a cart-pole swing-up with that many
+//! intervals; with 0 intervals a synthetic problem of the size of a gait optimisation.
 
 #[path = "../tests/nlp_standard/mod.rs"]
 mod nlp_standard;
@@ -10,18 +11,43 @@ use gait_optimizer::nlp::{LinearSolver, NlpIteration, NlpSettings, StartPoint, s
 fn main() {
     let intervals = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(400);
     let verbose = std::env::args().nth(2).is_some();
-    let problem = nlp_standard::sparse::cart_pole(intervals, 20.0, 1);
+    let problem = if intervals == 0 {
+        nlp_standard::sparse::gait_sized(8, 11)
+    } else {
+        nlp_standard::sparse::cart_pole(intervals, 20.0, 1)
+    };
+    println!("{} variables, {} rows", problem.start.len(), problem.row_lower.len());
     let start = StartPoint::Cold(problem.start.clone());
-    for (linear_solver, threads) in
-        [(LinearSolver::Supernodal, 1), (LinearSolver::Multifrontal, 1), (LinearSolver::Multifrontal, 2), (LinearSolver::Auto, 1)]
-    {
-        let settings = NlpSettings { linear_solver, threads, ..NlpSettings::default() };
+    for (linear_solver, threads) in [
+        (LinearSolver::Supernodal, 1),
+        (LinearSolver::Multifrontal, 1),
+        (LinearSolver::Multifrontal, 2),
+        (LinearSolver::Auto, 1),
+    ] {
+        let limit = std::env::args().nth(3).and_then(|a| a.parse().ok()).unwrap_or(5);
+        let settings = NlpSettings {
+            linear_solver,
+            threads,
+            short_step_limit: limit,
+            required_reduction: std::env::args().nth(4).and_then(|a| a.parse().ok()).unwrap_or(0.9),
+            ..NlpSettings::default()
+        };
         let mut show = |it: &NlpIteration| {
             if verbose {
                 println!(
                     "{:4} {:?} f={:.8e} viol={:.2e} dual={:.2e} compl={:.2e} mu={:.1e} a={:.1e}/{:.1e} dw={:.1e} dc={:.1e} ls={}",
-                    it.number, it.phase, it.objective, it.violation, it.dual_infeasibility, it.complementarity, it.mu,
-                    it.alpha_primal, it.alpha_dual, it.delta_w, it.delta_c, it.trials
+                    it.number,
+                    it.phase,
+                    it.objective,
+                    it.violation,
+                    it.dual_infeasibility,
+                    it.complementarity,
+                    it.mu,
+                    it.alpha_primal,
+                    it.alpha_dual,
+                    it.delta_w,
+                    it.delta_c,
+                    it.trials
                 );
             }
         };

@@ -83,6 +83,8 @@ pub struct DomainTrajectory {
     pub name: String,
     /// Duration, s.
     pub duration_s: f64,
+    /// Times of the points from the start of the stride, s.
+    pub time_s: Vec<f64>,
     /// q at each point: px, pz (m), torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R (rad).
     pub q: Vec<[f64; 9]>,
     /// Velocities, m/s and rad/s.
@@ -118,4 +120,25 @@ pub struct MuscleTrajectory {
     pub fibre_velocity: Vec<[f64; 10]>,
     /// Activation, 0..1.
     pub activation: Vec<[f64; 10]>,
+}
+
+impl Gait {
+    /// Coordinates at a time of the stride, s, linear between mesh points; clamped to the stride.
+    pub fn coordinates_at(&self, time_s: f64) -> [f64; 9] {
+        let mut result = [0.0; 9];
+        for domain in &self.domains {
+            for k in 1..domain.time_s.len() {
+                let (before, after) = (domain.time_s[k - 1], domain.time_s[k]);
+                if time_s <= after || after <= before {
+                    let share = ((time_s - before) / (after - before)).clamp(0.0, 1.0);
+                    for i in 0..9 {
+                        result[i] = domain.q[k - 1][i] + share * (domain.q[k][i] - domain.q[k - 1][i]);
+                    }
+                    return result;
+                }
+                result = domain.q[k];
+            }
+        }
+        result
+    }
 }

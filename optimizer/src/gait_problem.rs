@@ -10,6 +10,7 @@
 //! | C8 fibre kinematics | [`fibres`] |
 //! | C9-C12 joint torques from muscles | [`muscle_forces`] |
 
+mod answer;
 pub mod contact_limits;
 pub mod entries;
 pub mod fibres;
@@ -26,6 +27,7 @@ pub mod stride;
 pub mod transitions;
 pub mod zero_dynamics;
 
+pub use answer::gait_of;
 pub use layout::{Layout, PointVariables};
 pub use programme::{GaitProgramme, ObjectiveWeights};
 pub use rows::{RowKind, RowName, RowTable};

@@ -1,1 +1,32 @@
 //! Figures of a gait: Gait RMSE against a reference.
+
+use crate::gait::Gait;
+use crate::reference::ReferenceGait;
+
+/// Equidistant times of the stride at which gait and reference are compared.
+pub const RMSE_SAMPLES: usize = 200;
+
+/// Gait RMSE and its parts, rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaitRmse {
+    /// Sum of the parts.
+    pub total: f64,
+    /// RMS difference of torso, hip_L, knee_L, ankle_L, hip_R.
+    pub parts: [f64; 5],
+}
+
+/// `sum_i sqrt(mean((q_i - ref_i)^2))` over the five human coordinates, at equidistant times of the stride (gait and
+/// reference linear between their points).
+pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
+    let mut squares = [0.0; 5];
+    for sample in 0..RMSE_SAMPLES {
+        let fraction = sample as f64 / (RMSE_SAMPLES - 1) as f64;
+        let angles = gait.coordinates_at(fraction * gait.stride_time_s);
+        let wanted = reference.at_clamped(fraction);
+        for i in 0..5 {
+            squares[i] += (angles[2 + i] - wanted[i]).powi(2);
+        }
+    }
+    let parts = squares.map(|s| (s / RMSE_SAMPLES as f64).sqrt());
+    GaitRmse { total: parts.iter().sum(), parts }
+}

@@ -17,6 +17,9 @@ mod kkt;
 mod kkt_solver;
 mod line_search;
 mod linear_solver;
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod matrix_tests;
 mod multifrontal;
 mod newton;
 mod optimality;

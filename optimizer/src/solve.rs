@@ -1,14 +1,22 @@
 //! The public face: one gait problem in, one honest outcome out.
 
 use crate::bounds::TunedBounds;
+use crate::cold_start::{self, ColdStartError, GuessSettings};
 use crate::device::Device;
 use crate::gait::Gait;
+use crate::gait_problem::programme::RowViolation;
+use crate::gait_problem::{GaitProgramme, gait_of};
+use crate::metrics::gait_rmse;
+use crate::nlp::{
+    self, BoundMultiplierStart, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, StartPoint, WarmPoint,
+};
 use crate::reference::ReferenceGait;
-use crate::settings::GaitSettings;
+use crate::settings::{GaitSettings, Mesh};
 use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 use thiserror::Error;
 
 /// One gait problem.
@@ -97,17 +105,16 @@ impl CancelToken {
     }
 }
 
-/// Primal-dual point of an earlier solve of the same subject structure, mesh and variant.
+/// Primal-dual point of an earlier solve of a problem of the same mesh and variant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct WarmStart {
-    /// Scaled primal variables in the layout of the problem.
-    pub variables: Vec<f64>,
-    /// Multipliers of all constraint rows.
-    pub multipliers: Vec<f64>,
-    /// Multipliers of the lower variable bounds.
-    pub lower_bound_multipliers: Vec<f64>,
-    /// Multipliers of the upper variable bounds.
-    pub upper_bound_multipliers: Vec<f64>,
+    /// Variant it belongs to.
+    pub muscles: bool,
+    /// Mesh it belongs to.
+    pub mesh: Mesh,
+    /// Scaled primal variables and all multipliers.
+    pub point: WarmPoint,
 }
 
 /// Limits and numerical options of one solve.
@@ -120,12 +127,45 @@ pub struct SolveOptions {
     pub max_iterations: usize,
     /// Most seconds of wall time for the whole solve; `None`: no limit.
     pub time_limit_s: Option<f64>,
+    /// Threads of the linear algebra, 1 to 16; the result does not depend on it.
+    pub threads: usize,
 }
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-6, max_iterations: 1000, time_limit_s: None }
+        Self { tolerance: 1e-6, max_iterations: 1000, time_limit_s: None, threads: 1 }
     }
+}
+
+impl SolveOptions {
+    /// Checks every option.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        ModelError::check_range("tolerance", self.tolerance, 1e-10, 1e-2)?;
+        ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
+        ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
+        if let Some(limit) = self.time_limit_s {
+            ModelError::check_range("time_limit_s", limit, 0.0, 1e7)?;
+        }
+        Ok(())
+    }
+}
+
+/// Largest scaled violation of a gait that is called converged.
+pub const CONVERGED_VIOLATION: f64 = 1e-6;
+
+/// What a solve started from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StartedFrom {
+    /// Its own cold start.
+    Cold,
+    /// The warm start that was given.
+    Warm,
+    /// A cold start after the given warm start did not converge.
+    ColdAfterWarm,
 }
 
 /// The figures of one solve: a contract for scripts (`gaitwright solve --json`).
@@ -133,6 +173,8 @@ impl Default for SolveOptions {
 pub struct SolveReport {
     /// How it ended.
     pub status: SolveStatus,
+    /// What it started from.
+    pub started_from: StartedFrom,
     /// Interior-point iterations over all phases.
     pub iterations: usize,
     /// Objective: cost of transport plus regularisation.
@@ -198,22 +240,182 @@ pub enum SolveError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The warm start does not belong to a problem of this shape.
-    #[error("the warm start has {found} variables, this problem has {expected}: other mesh or other variant")]
-    WarmStartShape {
-        /// Variables of the warm start.
-        found: usize,
-        /// Variables of the problem.
-        expected: usize,
-    },
-    /// A numerical sub-problem of the cold start could not be solved.
+    #[error("the warm start is of another problem: {0}")]
+    WarmStartShape(String),
+    /// A convex sub-problem of the cold start could not be solved.
     #[error("cold start: {0}")]
-    ColdStart(String),
+    ColdStart(#[from] ColdStartError),
+    /// The interior point refused its input.
+    #[error(transparent)]
+    Solver(#[from] NlpError),
+}
+
+impl GaitProblem {
+    /// A problem with the built-in device and reference, default bounds and settings.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming what is out of range.
+    pub fn new(subject: Subject, muscles: bool) -> Result<Self, ModelError> {
+        subject.validate()?;
+        Ok(Self {
+            subject,
+            device: Device::ampro3()?,
+            bounds: TunedBounds::default(),
+            muscles,
+            settings: GaitSettings::default(),
+            reference: ReferenceGait::builtin()?,
+        })
+    }
+
+    fn programme(&self, muscles: bool) -> Result<GaitProgramme, ModelError> {
+        GaitProgramme::new(&self.subject, &self.device, &self.bounds, muscles, &self.settings, &self.reference)
+    }
+}
+
+/// First barrier parameter of each phase of a cold start. Small values keep the natural guess: at 0.1 the barrier of
+/// 7,000 bounds swamps a cost of 0.06.
+const MU_TRACKING: f64 = 1e-3;
+const MU_MUSCLE_TRACKING: f64 = 1e-2;
+const MU_COST: f64 = 1e-4;
+/// Weight and tolerance of the tracking phases.
+const TRACKING_WEIGHT: f64 = 10.0;
+const TRACKING_TOLERANCE: f64 = 1e-3;
+/// First barrier parameter of a warm start.
+const MU_WARM: f64 = 1e-5;
+/// Most violations reported.
+const MAX_VIOLATIONS: usize = 20;
+
+/// One solve in progress: what all its phases share.
+struct Run<'a> {
+    options: &'a SolveOptions,
+    observer: &'a mut dyn FnMut(&IterationRecord),
+    cancel: &'a CancelToken,
+    started: Instant,
+    iterations: usize,
+    evaluation_s: f64,
+    linear_algebra_s: f64,
+}
+
+impl Run<'_> {
+    fn phase(
+        &mut self,
+        phase: Phase,
+        programme: &GaitProgramme,
+        start: &StartPoint,
+        settings: NlpSettings,
+    ) -> Result<NlpResult, SolveError> {
+        let remaining = self.options.time_limit_s.map_or(f64::INFINITY, |limit| {
+            (limit - self.started.elapsed().as_secs_f64()).max(0.0)
+        });
+        let settings = NlpSettings {
+            max_seconds: remaining,
+            max_iterations: self.options.max_iterations,
+            bound_multiplier_start: BoundMultiplierStart::Centred,
+            threads: self.options.threads,
+            ..settings
+        };
+        let before = self.iterations;
+        let observer = &mut *self.observer;
+        let result = nlp::solve(
+            programme,
+            start,
+            &settings,
+            &mut |record| {
+                observer(&IterationRecord {
+                    iteration: before + record.number,
+                    phase,
+                    objective: record.objective,
+                    constraint_violation: record.violation,
+                    dual_infeasibility: record.dual_infeasibility,
+                    barrier: record.mu,
+                    step: record.alpha_primal,
+                });
+            },
+            &|| self.cancel.is_cancelled(),
+        )?;
+        self.iterations += result.iterations;
+        self.evaluation_s += result.timing.evaluation;
+        self.linear_algebra_s += result.timing.analysis + result.timing.factorisation + result.timing.backsolves;
+        Ok(result)
+    }
+
+    fn interrupted(result: &NlpResult) -> bool {
+        matches!(result.status, NlpStatus::Cancelled | NlpStatus::TimeLimit)
+    }
+
+    /// Tracking, with muscles tracking again, then cost.
+    fn cold(&mut self, problem: &GaitProblem, programme: &GaitProgramme) -> Result<NlpResult, SolveError> {
+        let guess = GuessSettings::default();
+        let plain = problem.programme(false)?;
+        let postures = cold_start::posture::solve(&plain, &guess)?;
+        let first = cold_start::motion::guess(&plain, &postures, &guess);
+        let tracking_settings =
+            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..NlpSettings::default() };
+        let mut tracked = self.phase(
+            Phase::Tracking,
+            &plain.for_tracking(TRACKING_WEIGHT),
+            &StartPoint::Cold(first),
+            tracking_settings.clone(),
+        )?;
+        if problem.muscles {
+            let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x)?;
+            if Self::interrupted(&tracked) {
+                return Ok(blank(programme, with_muscles, tracked));
+            }
+            tracked = self.phase(
+                Phase::MuscleTracking,
+                &programme.for_tracking(TRACKING_WEIGHT),
+                &StartPoint::Cold(with_muscles),
+                NlpSettings { mu_initial: MU_MUSCLE_TRACKING, ..tracking_settings },
+            )?;
+        }
+        if Self::interrupted(&tracked) {
+            return Ok(tracked);
+        }
+        self.phase(
+            Phase::Cost,
+            programme,
+            &StartPoint::Cold(tracked.x),
+            NlpSettings { tolerance: self.options.tolerance, mu_initial: MU_COST, ..NlpSettings::default() },
+        )
+    }
+
+    fn warm(&mut self, programme: &GaitProgramme, warm: &WarmStart) -> Result<NlpResult, SolveError> {
+        self.phase(
+            Phase::Cost,
+            programme,
+            &StartPoint::Warm(warm.point.clone()),
+            NlpSettings {
+                tolerance: self.options.tolerance,
+                mu_initial: MU_COST,
+                mu_warm: Some(MU_WARM),
+                warm_bound_push: 1e-4,
+                warm_bound_fraction: 1e-4,
+                ..NlpSettings::default()
+            },
+        )
+    }
+}
+
+/// An interrupted result in the shape of `programme`: its multipliers carry no information.
+fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
+    let (n, m) = (programme.variables(), programme.rows());
+    NlpResult {
+        x,
+        row_multipliers: vec![0.0; m],
+        lower_multipliers: vec![0.0; n],
+        upper_multipliers: vec![0.0; n],
+        slacks: vec![0.0; m],
+        slack_lower_multipliers: vec![0.0; m],
+        slack_upper_multipliers: vec![0.0; m],
+        ..result
+    }
 }
 
 /// Solves one gait problem. Deterministic: same inputs, same bits.
 ///
 /// `observer` is called once per iteration, on the calling thread. A solve that ends without a gait is an
-/// `Ok` outcome with another status than `Converged`.
+/// `Ok` outcome with another status than `Converged`. A warm start that does not converge falls back to a cold start.
 ///
 /// # Errors
 /// [`SolveError`] when the input is invalid.
@@ -224,7 +426,139 @@ pub fn solve(
     observer: &mut dyn FnMut(&IterationRecord),
     cancel: &CancelToken,
 ) -> Result<SolveOutcome, SolveError> {
-    let _ = (warm_start, options, observer, cancel);
-    problem.subject.validate()?;
-    Err(SolveError::ColdStart("under construction".to_owned()))
+    options.validate()?;
+    let programme = problem.programme(problem.muscles)?;
+    if let Some(warm) = warm_start {
+        check_shape(problem, &programme, warm)?;
+    }
+    let mut run = Run {
+        options,
+        observer,
+        cancel,
+        started: Instant::now(),
+        iterations: 0,
+        evaluation_s: 0.0,
+        linear_algebra_s: 0.0,
+    };
+    let mut started_from = StartedFrom::Cold;
+    let mut result = match warm_start {
+        None => run.cold(problem, &programme)?,
+        Some(warm) => {
+            started_from = StartedFrom::Warm;
+            let result = run.warm(&programme, warm)?;
+            if result.status == NlpStatus::Converged || Run::interrupted(&result) {
+                result
+            } else {
+                started_from = StartedFrom::ColdAfterWarm;
+                run.cold(problem, &programme)?
+            }
+        }
+    };
+    // Polish: the residuals of the point that is handed out are measured on that point, after it is moved into its
+    // bounds (the solver works in bounds widened by 1e-8).
+    programme.project_into_bounds(&mut result.x);
+    Ok(outcome(problem, &programme, &result, &run, started_from))
+}
+
+fn check_shape(problem: &GaitProblem, programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
+    if warm.muscles != problem.muscles {
+        return Err(SolveError::WarmStartShape(format!(
+            "it is {} muscles, the problem is {} muscles",
+            if warm.muscles { "with" } else { "without" },
+            if problem.muscles { "with" } else { "without" }
+        )));
+    }
+    if warm.mesh != problem.settings.mesh {
+        return Err(SolveError::WarmStartShape(format!(
+            "its mesh is {:?}, the problem's is {:?}",
+            warm.mesh, problem.settings.mesh
+        )));
+    }
+    let (n, m) = (programme.variables(), programme.rows());
+    let point = &warm.point;
+    for (name, found, expected) in [
+        ("variables", point.x.len(), n),
+        ("lower multipliers", point.lower_multipliers.len(), n),
+        ("upper multipliers", point.upper_multipliers.len(), n),
+        ("row multipliers", point.row_multipliers.len(), m),
+        ("slacks", point.slacks.len(), m),
+        ("lower slack multipliers", point.slack_lower_multipliers.len(), m),
+        ("upper slack multipliers", point.slack_upper_multipliers.len(), m),
+    ] {
+        if found != expected {
+            return Err(SolveError::WarmStartShape(format!("{found} {name}, expected {expected}")));
+        }
+    }
+    Ok(())
+}
+
+fn status_of(status: NlpStatus) -> SolveStatus {
+    match status {
+        NlpStatus::Converged => SolveStatus::Converged,
+        NlpStatus::Infeasible => SolveStatus::Infeasible,
+        NlpStatus::IterationLimit => SolveStatus::IterationLimit,
+        NlpStatus::TimeLimit => SolveStatus::TimeLimit,
+        NlpStatus::Cancelled => SolveStatus::Cancelled,
+        _ => SolveStatus::Stalled,
+    }
+}
+
+fn outcome(
+    problem: &GaitProblem,
+    programme: &GaitProgramme,
+    result: &NlpResult,
+    run: &Run<'_>,
+    started_from: StartedFrom,
+) -> SolveOutcome {
+    let x = &result.x;
+    let gait = gait_of(problem, programme, x);
+    let rmse = gait_rmse(&gait, &problem.reference);
+    let violations = programme.violations(x);
+    let max_violation = violations.first().map_or(0.0, |v| v.amount);
+    let mut status = status_of(result.status);
+    if status == SolveStatus::Converged && !(max_violation <= CONVERGED_VIOLATION) {
+        status = SolveStatus::Stalled;
+    }
+    let parts = programme.objective_parts(x);
+    let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
+    let report = SolveReport {
+        status,
+        started_from,
+        iterations: run.iterations,
+        objective: programme.objective(x),
+        cost_of_transport: parts.cost_of_transport,
+        gait_rmse_rad: rmse.total,
+        gait_rmse_parts_rad: rmse.parts,
+        max_violation,
+        seconds_total: run.started.elapsed().as_secs_f64(),
+        seconds_evaluation: run.evaluation_s,
+        seconds_linear_algebra: run.linear_algebra_s,
+        variables: programme.variables(),
+        equalities,
+        inequalities: programme.rows() - equalities,
+        speed_m_s: gait.speed_m_s,
+        stride_length_m: gait.stride_length_m,
+        durations_s: std::array::from_fn(|d| gait.domains[d].duration_s),
+        vhip_m_s: gait.hip_velocity_m_s,
+    };
+    let violations = if status == SolveStatus::Converged {
+        Vec::new()
+    } else {
+        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
+    };
+    let warm_start =
+        WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point() };
+    SolveOutcome { report, gait, warm_start, violations }
+}
+
+fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {
+    if let Some(row) = violation.row {
+        let name = &programme.rows.names[row];
+        let (_, unit, scale) = name.kind.description();
+        Violation { row: name.label(), amount: violation.amount * scale, unit: unit.to_owned() }
+    } else {
+        let variable = violation.variable.unwrap_or(0);
+        let (label, unit) = programme.layout.variable_label(variable);
+        Violation { row: label, amount: violation.amount * programme.layout.scale[variable], unit: unit.to_owned() }
+    }
 }

@@ -3,6 +3,7 @@
 pub mod bezier;
 pub mod domain;
 pub mod phase;
+pub mod stick_figure;
 
 pub use bezier::{BEZIER_COEFFICIENTS, BEZIER_DEGREE, basis};
 pub use domain::{CYCLE, ContactRow, Domain, DomainKind};

@@ -125,9 +125,11 @@ fn nlp_redundant_equalities_are_solved_with_either_regularisation() {
 
 #[test]
 fn nlp_bounds_only_and_no_constraints_at_all() {
-    let free = Small::new("quartic", &[3.0, -2.0], &[], &[0.0], |x| (square(x[0] - x[1]) + (x[0] - 1.0).powi(4), vec![]));
+    let free =
+        Small::new("quartic", &[3.0, -2.0], &[], &[0.0], |x| (square(x[0] - x[1]) + (x[0] - 1.0).powi(4), vec![]));
     assert_eq!(cold(&free).status, NlpStatus::Converged);
-    let boxed = Small::new("linear in a box", &[0.5, 0.5], &[], &[-1.0], |x| (x[0] - x[1], vec![])).all_bounds(0.0, 1.0);
+    let boxed =
+        Small::new("linear in a box", &[0.5, 0.5], &[], &[-1.0], |x| (x[0] - x[1], vec![])).all_bounds(0.0, 1.0);
     let r = cold(&boxed);
     assert_eq!(r.status, NlpStatus::Converged);
     assert!((r.objective + 1.0).abs() < 1e-6);
@@ -267,11 +269,9 @@ fn nlp_warm_starts_need_few_iterations() {
 #[test]
 fn nlp_small_initial_barrier_and_both_strategies_agree() {
     let problem = cart_pole(60, 20.0, 1);
-    for (barrier_strategy, mu_initial) in [
-        (BarrierStrategy::Monotone, 0.1),
-        (BarrierStrategy::Monotone, 1e-3),
-        (BarrierStrategy::Adaptive, 0.1),
-    ] {
+    for (barrier_strategy, mu_initial) in
+        [(BarrierStrategy::Monotone, 0.1), (BarrierStrategy::Monotone, 1e-3), (BarrierStrategy::Adaptive, 0.1)]
+    {
         for bound_multiplier_start in [BoundMultiplierStart::One, BoundMultiplierStart::Centred] {
             let settings =
                 NlpSettings { barrier_strategy, mu_initial, bound_multiplier_start, ..NlpSettings::default() };
@@ -288,7 +288,8 @@ fn nlp_gradient_scaling_reports_unscaled_multipliers() {
         (1e4 * square(x[0]) + x[1], vec![1e3 * (x[0] + x[1]) - 1e3, 1e4 * x[1]])
     });
     let plain = cold(&problem);
-    let scaled = run(&problem, &problem.start, &NlpSettings { gradient_scaling: Some(100.0), ..NlpSettings::default() });
+    let scaled =
+        run(&problem, &problem.start, &NlpSettings { gradient_scaling: Some(100.0), ..NlpSettings::default() });
     assert_eq!((plain.status, scaled.status), (NlpStatus::Converged, NlpStatus::Converged));
     assert!((plain.row_multipliers[0] + 1e-3).abs() < 1e-8, "{plain:?}");
     assert!((scaled.row_multipliers[0] + 1e-3).abs() < 1e-8, "{scaled:?}");
@@ -343,8 +344,7 @@ fn nlp_sparse_problem_without_blocks_is_solved_too() {
 fn nlp_linear_objective_without_curvature() {
     // Only rows give curvature: the KKT matrix has zero diagonals everywhere.
     let n = 50;
-    let rows: Vec<Term> =
-        (0..n - 1).map(|k| Term::new(vec![k, k + 1], |x| x[1] - x[0] - 0.1 * x[0] * x[1])).collect();
+    let rows: Vec<Term> = (0..n - 1).map(|k| Term::new(vec![k, k + 1], |x| x[1] - x[0] - 0.1 * x[0] * x[1])).collect();
     let objective = (0..n).map(|k| Term::new(vec![k], |x| x[0])).collect();
     let bounds = vec![EQ; n - 1];
     let mut problem = Sparse::new(vec![0.5; n], objective, rows, bounds);
@@ -352,4 +352,22 @@ fn nlp_linear_objective_without_curvature() {
     let r = run(&problem, &problem.start, &NlpSettings::default());
     assert_eq!(r.status, NlpStatus::Converged, "{r:?}");
     assert!((r.x[0] - 0.01).abs() < 1e-6);
+}
+
+#[test]
+fn nlp_separable_problems_have_a_diagonal_matrix() {
+    let n = 300;
+    let objective = (0..n).map(|k| Term::new(vec![k], move |x| square(x[0] - f64::from(k as u32 % 7)))).collect();
+    let mut problem = Sparse::new(vec![1.0; n], objective, vec![], vec![]);
+    problem.upper.fill(5.0);
+    let r = run(&problem, &problem.start, &NlpSettings::default());
+    assert_eq!(r.status, NlpStatus::Converged, "{r:?}");
+    assert!((r.objective - 42.0).abs() < 1e-4, "{}", r.objective);
+}
+
+#[test]
+fn nlp_an_empty_problem_is_solved() {
+    let problem = Small::new("empty", &[], &[], &[], |_| (Dual::constant(3.0), vec![]));
+    let r = cold(&problem);
+    assert_eq!((r.status, r.objective), (NlpStatus::Converged, 3.0));
 }

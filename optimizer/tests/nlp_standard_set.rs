@@ -43,7 +43,10 @@ fn nlp_standard_set_converges_with_gradient_scaling() {
 #[test]
 fn nlp_standard_set_converges_with_the_multifrontal_solver() {
     let none: Vec<String> = Vec::new();
-    assert_eq!(misses(&NlpSettings { linear_solver: LinearSolver::Multifrontal, ..NlpSettings::default() }, None), none);
+    assert_eq!(
+        misses(&NlpSettings { linear_solver: LinearSolver::Multifrontal, ..NlpSettings::default() }, None),
+        none
+    );
 }
 
 #[test]

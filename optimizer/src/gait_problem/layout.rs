@@ -229,6 +229,36 @@ impl Layout {
         Self { muscles, domains, hip_velocities, right_step_length, stride_length, variables: next, scale }
     }
 
+    /// A variable in words, and its unit: `SS1_R point 3, velocity of knee_R`.
+    pub fn variable_label(&self, index: usize) -> (String, &'static str) {
+        for layout in &self.domains {
+            let name = layout.domain.name();
+            if index >= layout.start && index < layout.start + layout.points * layout.per_point {
+                let (k, offset) =
+                    ((index - layout.start) / layout.per_point, (index - layout.start) % layout.per_point);
+                let (what, unit) = point_variable_label(layout, offset);
+                return (format!("{name} point {k}, {what}"), unit);
+            }
+            if index == layout.duration {
+                return (format!("{name} duration"), "s");
+            }
+            if index == layout.phase_start || Some(index) == layout.phase_end {
+                return (format!("{name} phase limit"), "m");
+            }
+            if index >= layout.bezier && index < layout.bezier + layout.outputs.len() * BEZIER_COEFFICIENTS {
+                return (format!("{name} Bezier coefficient"), "rad");
+            }
+            if layout.impulse.is_some_and(|first| index >= first && index < first + layout.contacts) {
+                return (format!("{name} opening impulse"), "N s");
+            }
+        }
+        if index >= self.hip_velocities && index < self.hip_velocities + 4 {
+            return (format!("hip velocity v_hip[{}]", index - self.hip_velocities), "m/s");
+        }
+        let name = if index == self.right_step_length { "right step length" } else { "stride length" };
+        (name.to_owned(), "m")
+    }
+
     /// Physical value of variable `index`.
     #[inline]
     pub fn value(&self, x: &[f64], index: usize) -> f64 {
@@ -292,6 +322,33 @@ impl Layout {
                 x[p + layout.fibre_velocity() + m] = point.fibre_velocity[m] / SCALE_FIBRE_VELOCITY;
                 x[p + layout.activation() + m] = point.activation[m];
             }
+        }
+    }
+}
+
+fn point_variable_label(layout: &DomainLayout, offset: usize) -> (String, &'static str) {
+    const COORDINATE: [&str; 9] =
+        ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+    let angle = |i: usize, linear: &'static str, angular: &'static str| if i < 2 { linear } else { angular };
+    if offset < QD {
+        (COORDINATE[offset].to_owned(), angle(offset, "m", "rad"))
+    } else if offset < QDD {
+        (format!("velocity of {}", COORDINATE[offset - QD]), angle(offset - QD, "m/s", "rad/s"))
+    } else if offset < U {
+        (format!("acceleration of {}", COORDINATE[offset - QDD]), angle(offset - QDD, "m/s²", "rad/s²"))
+    } else if offset < FORCE {
+        (format!("torque of {}", COORDINATE[offset - U + 3]), "N m")
+    } else if offset < layout.fibre_length() {
+        (format!("contact force {}", offset - FORCE), "N")
+    } else {
+        let muscle = (offset - layout.fibre_length()) % MUSCLE_COUNT;
+        let name = crate::muscle::MUSCLES[muscle].name;
+        if offset < layout.fibre_velocity() {
+            (format!("fibre length of {name}"), "l_opt")
+        } else if offset < layout.activation() {
+            (format!("fibre velocity of {name}"), "l_opt/s")
+        } else {
+            (format!("activation of {name}"), "1")
         }
     }
 }

@@ -232,6 +232,13 @@ impl GaitProgramme {
         result
     }
 
+    /// Moves every variable into its bounds.
+    pub fn project_into_bounds(&self, x: &mut [f64]) {
+        for (value, (low, high)) in x.iter_mut().zip(self.bounds.lower.iter().zip(&self.bounds.upper)) {
+            *value = value.max(*low).min(*high);
+        }
+    }
+
     /// Range of a variable in physical units.
     pub fn variable_range(&self, variable: usize) -> (f64, f64) {
         let scale = self.layout.scale[variable];

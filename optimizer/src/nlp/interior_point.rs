@@ -79,6 +79,12 @@ struct FreeMu {
     recent: Vec<f64>,
 }
 
+/// Whether a feasibility phase may end at this w.
+pub(super) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
+
+/// Primal steps below this are short (see `NlpSettings::short_step_limit`).
+const SHORT_STEP: f64 = 0.05;
+
 impl<'p> Run<'p> {
     /// Takes a point strictly inside its bounds; evaluates nothing yet.
     pub(super) fn new(form: Formulation<'p>, point: PrimalDual, mu: f64) -> Self {
@@ -198,6 +204,13 @@ impl<'p> Run<'p> {
         self.optimality(0.0)
     }
 
+    /// Sum of the parts of the primal-dual error at the present mu.
+    pub(super) fn primal_dual_error(&mut self) -> f64 {
+        self.update_lagrangian();
+        let now = self.optimality(self.mu);
+        now.violation + now.dual + now.complementarity
+    }
+
     fn is_converged(&self, settings: &NlpSettings, now: &Optimality) -> bool {
         let scale = self.form.objective_scale;
         now.error() <= settings.tolerance
@@ -209,7 +222,6 @@ impl<'p> Run<'p> {
     fn set_mu(&mut self, mu: f64) {
         self.mu = mu;
         self.filter.clear();
-        self.search.forget();
         if let Goal::Feasibility { zeta, .. } = &mut self.form.goal {
             *zeta = mu.sqrt();
             self.objective = self.form.objective(&self.point.w);
@@ -264,7 +276,6 @@ impl<'p> Run<'p> {
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, dw, dc);
-            if std::env::var_os("DBG").is_some() { eprintln!("   dw {dw:.1e} dc {dc:.1e} {inertia:?} m {}", self.form.m); }
             let go_on = match inertia {
                 Some(i) if i.zero == 0 && i.negative == self.form.m => {
                     let ratio = session.newton.solve(
@@ -275,7 +286,6 @@ impl<'p> Run<'p> {
                         &self.rhs,
                         &mut self.direction,
                     );
-                    if std::env::var_os("DBG").is_some() { eprintln!("   ratio {ratio:.1e}"); }
                     if ratio <= settings.residual_limit {
                         self.correction.accept();
                         return true;
@@ -344,15 +354,13 @@ impl<'p> Run<'p> {
     }
 
     /// Iterates until an ending. `leave` is asked after each step of a feasibility phase.
-    pub(super) fn iterate(
-        &mut self,
-        session: &mut Session,
-        mut leave: Option<&mut dyn FnMut(&[f64]) -> bool>,
-    ) -> Ending {
+    pub(super) fn iterate(&mut self, session: &mut Session, mut leave: Option<Leave>) -> Ending {
         session.newton.fit(&self.form);
         let settings = session.settings;
         let mut tiny_steps = 0usize;
         let mut rescues = 0usize;
+        let mut short_steps = 0usize;
+        let mut soft_steps = 0usize;
         let mut elastic_resets = 0usize;
         loop {
             let now = self.current_optimality();
@@ -388,11 +396,25 @@ impl<'p> Run<'p> {
             if found && self.line_search(session, tiny) {
                 rescues = 0;
                 elastic_resets = 0;
+                soft_steps = 0;
                 if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
                     return Ending::Left;
                 }
+                short_steps = if session.last_step.alpha_primal < SHORT_STEP { short_steps + 1 } else { 0 };
+                let crawls = settings.short_step_limit > 0
+                    && short_steps >= settings.short_step_limit
+                    && self.phase() == Phase::Regular
+                    && largest(&self.c) > settings.tolerance.sqrt()
+                    && session.counts.feasibility_phases < settings.max_feasibility_phases;
+                if !crawls {
+                    continue;
+                }
+            } else if found && soft_steps < settings.max_soft_steps && self.soft_step(session) {
+                soft_steps += 1;
                 continue;
             }
+            short_steps = 0;
+            soft_steps = 0;
             session.last_step = StepRecord::default();
             match self.phase() {
                 Phase::Feasibility => {
@@ -420,7 +442,6 @@ impl<'p> Run<'p> {
     /// Forgets filter and multipliers: z = mu / slack, y by least squares.
     pub(super) fn recentre(&mut self, session: &mut Session) {
         self.filter.clear();
-        self.search.forget();
         for j in 0..self.form.length() {
             self.point.zl[j] = if self.at.slack_lower[j].is_finite() { self.mu / self.at.slack_lower[j] } else { 0.0 };
             self.point.zu[j] = if self.at.slack_upper[j].is_finite() { self.mu / self.at.slack_upper[j] } else { 0.0 };

@@ -23,9 +23,6 @@ impl Search {
             correction: PrimalDual::zeros(form),
         }
     }
-
-    /// Forgets what belongs to one barrier problem.
-    pub(super) fn forget(&mut self) {}
 }
 
 /// What the search compares with.
@@ -51,6 +48,8 @@ const S_PHI: f64 = 2.3;
 const ETA: f64 = 1e-8;
 const GAMMA_ALPHA: f64 = 0.05;
 const KAPPA_SOC: f64 = 0.99;
+/// Decrease asked of a soft step (IPOPT `soft_resto_pderror_reduction_factor`).
+const SOFT_REDUCTION: f64 = 0.9999;
 /// Largest increase of phi, in powers of ten (IPOPT `obj_max_inc`).
 const MAX_PHI_INCREASE: f64 = 5.0;
 
@@ -103,17 +102,41 @@ impl Run<'_> {
                     self.finish(session, &reference, kind, alpha, tau, trials);
                     return true;
                 }
-                if trials == 1 && theta >= reference.theta {
-                    if let Some((kind, alpha, extra)) =
+                if trials == 1
+                    && theta >= reference.theta
+                    && let Some((kind, alpha, extra)) =
                         self.second_order_correction(session, &reference, alpha, tau, theta)
-                    {
-                        self.finish(session, &reference, kind, alpha, tau, trials + extra);
-                        return true;
-                    }
+                {
+                    self.finish(session, &reference, kind, alpha, tau, trials + extra);
+                    return true;
                 }
             }
             alpha *= 0.5;
         }
+        false
+    }
+
+    /// After a failed search: the longest step that respects the bounds, if it lowers the primal-dual error of the
+    /// barrier problem (the soft feasibility phase of IPOPT). Near a solution phi is noise and this is the better judge.
+    pub(super) fn soft_step(&mut self, session: &mut Session) -> bool {
+        let tau = barrier::boundary_fraction(session.settings, self.mu);
+        let before = self.primal_dual_error();
+        let alpha = barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau)
+            .min(barrier::fraction_to_zero(&self.point.zl, &self.direction.zl, tau))
+            .min(barrier::fraction_to_zero(&self.point.zu, &self.direction.zu, tau));
+        let (theta, phi) = (self.theta(), self.phi());
+        let (_, _, finite) = self.try_step(alpha, false);
+        if !finite {
+            return false;
+        }
+        let point = self.point.clone();
+        self.accept(session, alpha, tau, 1);
+        if self.is_finite() && self.primal_dual_error() <= SOFT_REDUCTION * before {
+            self.filter.add(theta, phi);
+            return true;
+        }
+        self.point = point;
+        self.evaluate();
         false
     }
 

@@ -12,6 +12,10 @@ use super::supernodal::Supernodal;
 /// Multifrontal only while it costs at most this many times the operations of the supernodal factorisation.
 const WORTHWHILE: f64 = 4.0;
 
+/// Up to this order the matrix is one dense front whatever the setting: pivoting over all of it costs nothing.
+/// (A diagonal matrix, which has no supernodes, is factorised in fronts of one index.)
+const DENSE_ORDER: usize = 120;
+
 /// Chooses by setting and structure: the multifrontal factorisation needs elimination blocks.
 pub(super) fn choose(
     form: &Formulation,
@@ -20,6 +24,11 @@ pub(super) fn choose(
 ) -> Result<Box<dyn KktSolver>, NlpError> {
     let blocks = form.program.elimination_blocks();
     let supernodal = |order| Supernodal::new(&matrix.column_starts, &matrix.row_indices, order);
+    let diagonal = matrix.row_indices.len() == matrix.order;
+    if diagonal || matrix.order <= DENSE_ORDER {
+        let front_of = if diagonal { (0..matrix.order).collect() } else { vec![0; matrix.order] };
+        return Ok(Box::new(Multifrontal::new(&matrix.column_starts, &matrix.row_indices, &front_of, 1)?));
+    }
     let front_of = match (settings.linear_solver, blocks) {
         (LinearSolver::Auto | LinearSolver::Supernodal, None) => return Ok(Box::new(supernodal(None)?)),
         (LinearSolver::Supernodal, Some(blocks)) => {

@@ -18,13 +18,14 @@ use faer::diag::DiagMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor as lblt;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matmul};
-use faer::linalg::triangular_solve::{
-    solve_unit_lower_triangular_in_place, solve_unit_upper_triangular_in_place,
-};
+use faer::linalg::triangular_solve::{solve_unit_lower_triangular_in_place, solve_unit_upper_triangular_in_place};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 
 use super::kkt_solver::{Inertia, KktSolver};
 use super::status::NlpError;
+
+/// Operations below which starting threads costs more than it saves.
+const WORTH_A_THREAD: f64 = 2e7;
 
 /// Structure of a front.
 #[derive(Debug)]
@@ -108,15 +109,17 @@ impl Multifrontal {
                 }
             })
             .collect();
+        let flops: f64 = fronts.iter().map(|f| f.flops).sum();
+        let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
         let widest = fronts.iter().map(|f| f.pivots.len()).max().unwrap_or(0);
         let largest_panel = fronts.iter().map(|f| f.pivots.len() * f.border.len()).max().unwrap_or(0);
         let mut workspaces = Vec::new();
-        for _ in 0..threads.max(1) {
+        for _ in 0..threads {
             let request = lblt::cholesky_in_place_scratch::<usize, f64>(widest, Par::Seq, Spec::default());
             let memory = MemBuffer::try_new(request).map_err(|_| fail("not enough memory"))?;
             workspaces.push(Workspace { w: vec![0.0; largest_panel], memory });
         }
-        let pieces = schedule(&fronts, threads.max(1));
+        let pieces = schedule(&fronts, threads);
         let widest_border = fronts.iter().map(|f| f.border.len()).max().unwrap_or(0);
         Ok(Self {
             order,
@@ -298,8 +301,7 @@ fn factor_front(front: &Front, values: &[f64], before: &[Factor], base: usize, o
             let local = local as usize;
             let source = &child.update[column * width + column..(column + 1) * width];
             // Local indices ascend with the child's border, so lower stays lower.
-            let target =
-                if local < p { &mut own.panel[local * height..] } else { &mut own.update[(local - p) * b..] };
+            let target = if local < p { &mut own.panel[local * height..] } else { &mut own.update[(local - p) * b..] };
             let shift = if local < p { 0 } else { p };
             for (v, &row) in source.iter().zip(&map[column..]) {
                 target[row as usize - shift] += v;
@@ -335,11 +337,7 @@ fn factor_front(front: &Front, values: &[f64], before: &[Factor], base: usize, o
             w[j * b..(j + 1) * b].copy_from_slice(&own.panel[source..source + b]);
         }
         let l = MatRef::from_column_major_slice(&own.panel, height, p).subrows(0, p);
-        solve_unit_lower_triangular_in_place(
-            l,
-            MatMut::from_column_major_slice_mut(w, b, p).transpose_mut(),
-            Par::Seq,
-        );
+        solve_unit_lower_triangular_in_place(l, MatMut::from_column_major_slice_mut(w, b, p).transpose_mut(), Par::Seq);
         divide_columns(&mut own.panel, &own.subdiagonal, p, b, w);
         let w = MatRef::from_column_major_slice(&*w, b, p);
         let x = MatRef::from_column_major_slice(&own.panel, height, p).subrows(p, b);

@@ -48,7 +48,7 @@ pub enum LinearSolver {
     /// The multifrontal factorisation, with the supernodal one as its fallback.
     #[default]
     Auto,
-    /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes.
+    /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes (a matrix of order up to 120: one dense front).
     Supernodal,
     /// Static multifrontal LBL^T over the elimination blocks, with Bunch-Kaufman pivoting inside fronts.
     Multifrontal,
@@ -131,22 +131,25 @@ pub struct NlpSettings {
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
-    /// Shortened steps in a row that start the watchdog. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
-    pub watchdog_trigger: usize,
-    /// Trial iterations of the watchdog. Default 3.
-    pub watchdog_trials: usize,
+    /// Steps in a row that may be taken for a lower primal-dual error alone when the line search fails, before the
+    /// feasibility phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
+    pub max_soft_steps: usize,
 
     /// Weight of the l1 violation in the feasibility phase. Default 1000 (WB06 rho).
     pub elastic_weight: f64,
     /// The feasibility phase ends when the violation has fallen to this share of its first value and the filter
     /// accepts. Default 0.9 (WB06 kappa_resto).
     pub required_reduction: f64,
+    /// Steps below 0.05 in a row after which the feasibility phase is entered without waiting for the line search to
+    /// fail: a point pressed against its bounds with growing multipliers rarely recovers by itself. Default 5; 0: never.
+    pub short_step_limit: usize,
     /// Feasibility phases before the solve is called stalled. Default 50.
     pub max_feasibility_phases: usize,
 
     /// Factorisation. Default auto.
     pub linear_solver: LinearSolver,
-    /// Threads of the multifrontal factorisation, 1 to 16; the result does not depend on it. Default 1.
+    /// Threads of the multifrontal factorisation, 1 to 16; the result does not depend on it, and small matrices use one
+    /// whatever it says. Default 1.
     pub threads: usize,
 }
 
@@ -185,10 +188,10 @@ impl Default for NlpSettings {
             residual_limit: 1e-5,
             max_refinements: 10,
             max_second_order_corrections: 4,
-            watchdog_trigger: 10,
-            watchdog_trials: 3,
+            max_soft_steps: 10,
             elastic_weight: 1000.0,
             required_reduction: 0.9,
+            short_step_limit: 5,
             max_feasibility_phases: 50,
             linear_solver: LinearSolver::default(),
             threads: 1,
@@ -238,7 +241,6 @@ impl NlpSettings {
         in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
         in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
         in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;
-        in_range("watchdog_trials", self.watchdog_trials as f64, 1.0, 100.0)?;
         positive("elastic_weight", self.elastic_weight)?;
         in_range("required_reduction", self.required_reduction, 0.0, 0.999_999)?;
         in_range("threads", self.threads as f64, 1.0, 16.0)

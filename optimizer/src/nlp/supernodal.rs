@@ -3,7 +3,6 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::{Perm, PermRef};
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::SymbolicSupernodalParams;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalIntranodeLbltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, IntranodeLbltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
@@ -14,9 +13,6 @@ use faer::{Conj, MatMut, Par, Side};
 
 use super::kkt_solver::{Inertia, KktSolver};
 use super::status::NlpError;
-
-/// Below this order one dense supernode is factorised, with pivoting over the whole matrix.
-const DENSE_ORDER: usize = 120;
 
 /// Analysis, factor and workspace.
 pub(super) struct Supernodal {
@@ -47,19 +43,22 @@ impl Supernodal {
             Perm::new_checked(forward.into_boxed_slice(), inverse.into_boxed_slice(), size)
         });
         let ordering = permutation.as_ref().map_or(SymmetricOrdering::Amd, |p| SymmetricOrdering::Custom(p.as_ref()));
-        let everything = [(usize::MAX, 1.0)];
-        let supernodal_params = SymbolicSupernodalParams { relax: (size <= DENSE_ORDER).then_some(&everything[..]) };
         let symbolic = factorize_symbolic_cholesky(
             pattern.as_ref(),
             Side::Lower,
             ordering,
             CholeskySymbolicParams {
                 supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-                supernodal_params,
                 ..CholeskySymbolicParams::default()
             },
         )
         .map_err(|error| NlpError::Analysis { order: size, reason: format!("{error:?}") })?;
+        if !matches!(symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_)) {
+            return Err(NlpError::Analysis {
+                order: size,
+                reason: "the matrix is too small for supernodes".to_owned(),
+            });
+        }
         let memory = |request| {
             MemBuffer::try_new(request)
                 .map_err(|_| NlpError::Analysis { order: size, reason: "not enough memory".to_owned() })

@@ -172,8 +172,8 @@ pub fn cart_pole(intervals: usize, limit: f64, copies: usize) -> Sparse {
         let (sin, cos) = (s[1].sin(), s[1].cos());
         let mass = cart + pole * sin * sin;
         let push = (s[4] + pole * sin * (length * s[3] * s[3] + gravity * cos)) / mass;
-        let turn = -(s[4] * cos + pole * length * s[3] * s[3] * cos * sin + (cart + pole) * gravity * sin)
-            / (length * mass);
+        let turn =
+            -(s[4] * cos + pole * length * s[3] * s[3] * cos * sin + (cart + pole) * gravity * sin) / (length * mass);
         [s[2], s[3], push, turn]
     }
     let mut rows = Vec::new();
@@ -205,7 +205,8 @@ pub fn cart_pole(intervals: usize, limit: f64, copies: usize) -> Sparse {
         problem.lower[5 * k + 4] = -limit;
         problem.upper[5 * k + 4] = limit;
     }
-    for (e, (first, last)) in [(0.0, 1.0), (0.0, std::f64::consts::PI), (0.0, 0.0), (0.0, 0.0)].into_iter().enumerate() {
+    for (e, (first, last)) in [(0.0, 1.0), (0.0, std::f64::consts::PI), (0.0, 0.0), (0.0, 0.0)].into_iter().enumerate()
+    {
         for (j, value) in [(e, first), (5 * intervals + e, last)] {
             problem.lower[j] = value;
             problem.upper[j] = value;
@@ -248,4 +249,114 @@ fn dissect(points: usize, leaf: usize) -> (Vec<Option<usize>>, Vec<usize>) {
         parent[count - 1 - b] = Some(count - 1 - parents[b]);
     }
     (parent, of.into_iter().map(|b| count - 1 - b).collect())
+}
+
+/// A synthetic problem of the size and structure of a gait optimisation: `domains` x `points` mesh points with 18 state
+/// and 42 algebraic variables, 42 algebraic rows and 18 defect rows each, 3 inequality rows, 30 parameters per domain,
+/// 4 globals, periodic end. Blocks: the algebraic part of each point, then its states, by nested dissection of the
+/// points inside a domain, domain parameters, and globals.
+pub fn gait_sized(domains: usize, points: usize) -> Sparse {
+    const STATES: usize = 18;
+    const ALGEBRAIC: usize = 42;
+    const LOCAL: usize = STATES + ALGEBRAIC;
+    const PARAMETERS: usize = 30;
+    const GLOBALS: usize = 4;
+    let total = domains * points;
+    let parameter = |d: usize, c: usize| total * LOCAL + d * PARAMETERS + c;
+    let global = |c: usize| total * LOCAL + domains * PARAMETERS + c;
+    let n = global(GLOBALS);
+    let mut seed = 7u64;
+    let mut random = move || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    // Blocks: interiors 0..total, then the dissected states, parameters with their domain's first point, globals.
+    let mut parent: Vec<Option<usize>> = vec![None; total];
+    let mut state_block = vec![0; total];
+    let mut domain_root = Vec::new();
+    for d in 0..domains {
+        let (tree, of) = dissect(points - 1, 1);
+        let base = parent.len();
+        parent.extend(tree.iter().map(|p| p.map(|p| p + base)));
+        for k in 0..points - 1 {
+            state_block[d * points + k + 1] = base + of[k];
+        }
+        domain_root.push(parent.len() - 1);
+    }
+    let root = parent.len();
+    parent.push(None);
+    for d in 0..domains {
+        parent[domain_root[d]] = Some(root);
+        state_block[d * points] = root;
+    }
+    for k in 0..total {
+        parent[k] = Some(state_block[k].min(state_block[(k + 1) % total]));
+    }
+    let mut block_of_variable = vec![0; n];
+    for k in 0..total {
+        block_of_variable[k * LOCAL..k * LOCAL + STATES].fill(state_block[k]);
+        block_of_variable[k * LOCAL + STATES..(k + 1) * LOCAL].fill(k);
+    }
+    for d in 0..domains {
+        for c in 0..PARAMETERS {
+            block_of_variable[parameter(d, c)] = domain_root[d];
+        }
+    }
+    for c in 0..GLOBALS {
+        block_of_variable[global(c)] = root;
+    }
+    let (mut rows, mut bounds, mut block_of_row) = (Vec::new(), Vec::new(), Vec::new());
+    let mut objective = Vec::new();
+    for k in 0..total {
+        let d = k / points;
+        let x = k * LOCAL;
+        for i in 0..ALGEBRAIC {
+            let mut variables = vec![x + STATES + i];
+            for _ in 0..3 {
+                let j = x + (random() * STATES as f64) as usize;
+                let a = x + STATES + (random() * ALGEBRAIC as f64) as usize;
+                variables.extend([j, a]);
+            }
+            variables.push(parameter(d, i % PARAMETERS));
+            variables.push(global(i % GLOBALS));
+            variables.sort_unstable();
+            variables.dedup();
+            let own = variables.iter().position(|&v| v == x + STATES + i).unwrap();
+            let w: Vec<f64> = variables.iter().map(|_| 0.6 * random() - 0.3).collect();
+            rows.push(Term::new(variables, move |s| {
+                let coupling = s.iter().zip(&w).fold(Dual::constant(0.0), |sum, (v, w)| sum + *w * v.sin());
+                s[own] * 1.5 - coupling * (1.0 + 0.2 * s[0]) - 0.1
+            }));
+            bounds.push((0.0, 0.0));
+            block_of_row.push(k);
+        }
+        let next = (k + 1) % total;
+        for i in 0..STATES {
+            let variables =
+                vec![x + i, next * LOCAL + i, x + STATES + i, x + STATES + i + 18, parameter(d, PARAMETERS - 1)];
+            let w = random() - 0.5;
+            rows.push(Term::new(variables, move |s| s[1] - s[0] - 0.2 * (1.0 + s[4]) * (s[2] - w * s[3])));
+            bounds.push((0.0, 0.0));
+            block_of_row.push(state_block[k].min(state_block[next]));
+        }
+        for i in 0..3 {
+            rows.push(Term::new(vec![x + i, x + STATES + 3 * i], |s| s[0] * s[0] + s[1] * s[1]));
+            bounds.push((-INF, 2.5));
+            block_of_row.push(k);
+        }
+        for i in 0..LOCAL {
+            let target = 0.8 * ((k as f64 * 0.3) + i as f64).sin();
+            objective.push(Term::new(vec![x + i], move |s| (s[0] - target) * (s[0] - target)));
+        }
+    }
+    for j in total * LOCAL..n {
+        objective.push(Term::new(vec![j], |s| 0.1 * s[0] * s[0]));
+    }
+    let mut problem = Sparse::new(vec![0.1; n], objective, rows, bounds);
+    problem.lower[..total * LOCAL].fill(-3.0);
+    problem.upper[..total * LOCAL].fill(3.0);
+    problem.lower[total * LOCAL..].fill(-1.0);
+    problem.upper[total * LOCAL..].fill(1.0);
+    problem.blocks = Some(EliminationBlocks { parent, block_of_variable, block_of_row });
+    problem
 }

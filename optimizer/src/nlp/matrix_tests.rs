@@ -1,0 +1,264 @@
+//! Factorisations against matrices of known inertia, and the promise that no wrong answer is silent.
+
+use super::kkt_solver::{Inertia, KktSolver};
+use super::multifrontal::Multifrontal;
+use super::supernodal::Supernodal;
+
+/// Deterministic uniform numbers in (-1, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// A symmetric matrix, lower triangle by columns.
+struct Matrix {
+    starts: Vec<usize>,
+    rows: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Matrix {
+    fn from_dense(a: &[Vec<f64>]) -> Self {
+        let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+        for j in 0..a.len() {
+            for i in j..a.len() {
+                if a[i][j] != 0.0 || i == j {
+                    rows.push(i);
+                    values.push(a[i][j]);
+                }
+            }
+            starts.push(rows.len());
+        }
+        Self { starts, rows, values }
+    }
+
+    fn product(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; x.len()];
+        for j in 0..x.len() {
+            for q in self.starts[j]..self.starts[j + 1] {
+                let i = self.rows[q];
+                y[i] += self.values[q] * x[j];
+                if i != j {
+                    y[j] += self.values[q] * x[i];
+                }
+            }
+        }
+        y
+    }
+
+    /// Both factorisations; fronts of `width` indices in a chain.
+    fn solvers(&self, width: usize) -> Vec<(&'static str, Box<dyn KktSolver>)> {
+        let order = self.starts.len() - 1;
+        let front_of: Vec<usize> = (0..order).map(|i| i / width).collect();
+        let mut solvers: Vec<(&'static str, Box<dyn KktSolver>)> = Vec::new();
+        if order > 1 {
+            let own = Some((0..order).collect());
+            solvers.push(("supernodal, AMD", Box::new(Supernodal::new(&self.starts, &self.rows, None).unwrap())));
+            solvers.push(("supernodal, own order", Box::new(Supernodal::new(&self.starts, &self.rows, own).unwrap())));
+        }
+        solvers.push(("multifrontal", Box::new(Multifrontal::new(&self.starts, &self.rows, &front_of, 1).unwrap())));
+        let dense = Multifrontal::new(&self.starts, &self.rows, &vec![0; order], 1).unwrap();
+        solvers.push(("one front", Box::new(dense)));
+        solvers
+    }
+
+    /// Relative residual of a random system after `refinements`.
+    fn residual(&self, solver: &mut dyn KktSolver, refinements: usize) -> f64 {
+        let mut random = Random(99);
+        let b: Vec<f64> = (0..self.starts.len() - 1).map(|_| random.next()).collect();
+        let mut x = b.clone();
+        solver.solve(&mut x);
+        let size = |v: &[f64]| v.iter().fold(0.0, |m: f64, a| if a.is_nan() { f64::INFINITY } else { m.max(a.abs()) });
+        let mut worst = f64::INFINITY;
+        for step in 0..=refinements {
+            let mut r: Vec<f64> = self.product(&x).iter().zip(&b).map(|(a, b)| b - a).collect();
+            worst = size(&r) / size(&b);
+            if step < refinements {
+                solver.solve(&mut r);
+                for (x, d) in x.iter_mut().zip(&r) {
+                    *x += d;
+                }
+            }
+        }
+        worst
+    }
+}
+
+/// A = L D L^T with sparse unit lower L: inertia by Sylvester's law from the signs of D.
+fn with_inertia(order: usize, negative: usize, seed: u64) -> Matrix {
+    let mut random = Random(seed);
+    let mut l = vec![vec![0.0; order]; order];
+    for i in 0..order {
+        l[i][i] = 1.0;
+        for j in i.saturating_sub(9)..i {
+            if random.next() > 0.2 {
+                l[i][j] = random.next();
+            }
+        }
+    }
+    let d: Vec<f64> = (0..order)
+        .map(|k| {
+            let sign = if k * negative / order != (k + 1) * negative / order { -1.0 } else { 1.0 };
+            sign * (0.5 + random.next().abs())
+        })
+        .collect();
+    let mut a = vec![vec![0.0; order]; order];
+    for i in 0..order {
+        for j in 0..=i {
+            a[i][j] = (0..=j).map(|k| l[i][k] * d[k] * l[j][k]).sum();
+        }
+    }
+    Matrix::from_dense(&a)
+}
+
+#[test]
+fn nlp_inertia_of_random_matrices_is_right() {
+    for (order, negative) in [(1, 0), (1, 1), (40, 13), (150, 75), (301, 20), (400, 399)] {
+        for seed in 1..6 {
+            let matrix = with_inertia(order, negative, seed);
+            for (name, mut solver) in matrix.solvers(23) {
+                let inertia = solver.factor(&matrix.values);
+                assert_eq!(
+                    inertia,
+                    Some(Inertia { positive: order - negative, negative, zero: 0 }),
+                    "{name}, order {order}, seed {seed}"
+                );
+                let residual = matrix.residual(solver.as_mut(), 1);
+                assert!(residual < 1e-9, "{name}, order {order}, seed {seed}: {residual}");
+            }
+        }
+    }
+}
+
+/// [diag(sigma) + H, J^T; J, -delta] interleaved in chunks of 4 variables and 3 rows; `repeat` states row 0 twice.
+fn saddle(chunks: usize, spread: f64, delta: f64, repeat: bool) -> Matrix {
+    let mut random = Random(5);
+    let order = 7 * chunks;
+    let mut a = vec![vec![0.0; order]; order];
+    for k in 0..chunks {
+        let base = 7 * k;
+        for i in 0..4 {
+            let exponent = 0.5 * (random.next() + 1.0) * spread.log10();
+            a[base + i][base + i] = 10f64.powf(exponent - 0.5 * spread.log10());
+            for j in 0..i {
+                // Diagonally dominant after scaling: the Hessian is positive definite.
+                let scale = (a[base + i][base + i] * a[base + j][base + j]).sqrt();
+                a[base + i][base + j] = 0.2 * scale * random.next();
+            }
+        }
+        for i in 4..7 {
+            for j in 0..4 {
+                a[base + i][base + j] = random.next() + if i == j + 4 { 2.0 } else { 0.0 };
+            }
+            if k > 0 {
+                a[base + i][base - 7 + i - 4] = -1.0;
+            }
+            a[base + i][base + i] = -delta;
+        }
+    }
+    if repeat {
+        // The last row becomes a copy of the one before.
+        let last = order - 1;
+        for j in 0..order - 2 {
+            a[last][j] = a[last - 1][j];
+        }
+        a[last][last - 1] = 0.0;
+    }
+    Matrix::from_dense(&a)
+}
+
+#[test]
+fn nlp_saddle_matrices_with_barrier_spread_are_solved() {
+    for chunks in [5, 60] {
+        for spread in [1.0, 1e6, 1e12] {
+            let matrix = saddle(chunks, spread, 1e-8, false);
+            for (name, mut solver) in matrix.solvers(7) {
+                let inertia = solver.factor(&matrix.values);
+                assert_eq!(
+                    inertia,
+                    Some(Inertia { positive: 4 * chunks, negative: 3 * chunks, zero: 0 }),
+                    "{name}, {chunks} chunks, spread {spread}"
+                );
+                let residual = matrix.residual(solver.as_mut(), 3);
+                assert!(residual < 1e-7, "{name}, {chunks} chunks, spread {spread}: {residual}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nlp_a_singular_matrix_is_never_solved_in_silence() {
+    for chunks in [1, 5, 60] {
+        let matrix = saddle(chunks, 1e3, 0.0, true);
+        for (name, mut solver) in matrix.solvers(7) {
+            let Some(inertia) = solver.factor(&matrix.values) else { continue };
+            let expected = Inertia { positive: 4 * chunks, negative: 3 * chunks, zero: 0 };
+            let residual = matrix.residual(solver.as_mut(), 3);
+            assert!(inertia != expected || residual > 1e-5, "{name}, {chunks} chunks: {inertia:?}, {residual}");
+        }
+    }
+    // All zero, with a coupling in its pattern.
+    let mut zero = Matrix::from_dense(&vec![vec![1.0; 4]; 4]);
+    zero.values.fill(0.0);
+    for (name, mut solver) in zero.solvers(2) {
+        let inertia = solver.factor(&zero.values);
+        assert!(inertia.is_none_or(|i| i.zero > 0), "{name}: {inertia:?}");
+    }
+}
+
+#[test]
+fn nlp_a_factorisation_does_not_depend_on_the_one_before() {
+    let (a, b) = (saddle(20, 1e6, 1e-8, false), saddle(20, 1.0, 1e-8, false));
+    for ((name, mut used), (_, mut fresh)) in a.solvers(7).into_iter().zip(a.solvers(7)) {
+        used.factor(&b.values);
+        used.factor(&vec![f64::NAN; a.values.len()]);
+        assert_eq!(used.factor(&a.values), fresh.factor(&a.values), "{name}");
+        let rhs: Vec<f64> = (0..140).map(f64::from).collect();
+        let (mut x, mut y) = (rhs.clone(), rhs);
+        used.solve(&mut x);
+        fresh.solve(&mut y);
+        assert_eq!(x, y, "{name}");
+    }
+}
+
+#[test]
+fn nlp_threads_do_not_change_a_bit() {
+    // Eight independent chains under one root, large enough for threads.
+    let (chains, length) = (8, 220);
+    let order = chains * length + 40;
+    let mut random = Random(11);
+    let (mut starts, mut rows, mut values, mut front_of) = (vec![0], Vec::new(), Vec::new(), Vec::new());
+    for j in 0..order {
+        let chain = j / length;
+        rows.push(j);
+        values.push(if j % 3 == 0 { -2.0 } else { 2.0 } + random.next());
+        if chain < chains {
+            let end = (chain + 1) * length;
+            for i in j + 1..end.min(j + 100) {
+                rows.push(i);
+                values.push(0.1 * random.next());
+            }
+        }
+        for i in (chains * length).max(j + 1)..order {
+            rows.push(i);
+            values.push(0.1 * random.next());
+        }
+        front_of.push(if chain < chains { 2 * chain + (j % length) / (length / 2) } else { 2 * chains });
+        starts.push(rows.len());
+    }
+    let solve_with = |threads| {
+        let mut solver = Multifrontal::new(&starts, &rows, &front_of, threads).unwrap();
+        let inertia = solver.factor(&values).unwrap();
+        let mut x: Vec<f64> = (0..order).map(|i| (i % 17) as f64).collect();
+        solver.solve(&mut x);
+        (inertia, x)
+    };
+    let one = solve_with(1);
+    for threads in 2..6 {
+        assert!(one == solve_with(threads), "{threads} threads");
+    }
+}
