@@ -3,7 +3,8 @@
 //! It exists for tests of the service alone; nothing it says is about walking.
 
 use gait_optimizer::gait::{Axis, ContactRowName, FootPoint, MuscleTrajectory, Side};
-use gait_optimizer::solve::Phase;
+use gait_optimizer::nlp::WarmPoint;
+use gait_optimizer::solve::{Phase, StartedFrom};
 use gait_optimizer::{
     CancelToken, DomainTrajectory, Gait, IterationRecord, SolveOutcome, SolveReport, SolveStatus, Violation, WarmStart,
 };
@@ -47,7 +48,7 @@ impl Evaluate for Analytic {
         let a = assignment.problem.bounds.to_array();
         // Strange to the last bit on purpose: what is stored must come back exactly.
         let distance = (a[4] - 0.026).abs() * 10.0 + (a[5] - 0.3).abs() + (a[6] - 35.0).abs() / 50.0 + 1.0 / a[0];
-        let warm = assignment.warm_start.as_ref().map_or(0.1, |w| w.variables[0]);
+        let warm = assignment.warm_start.as_ref().map_or(0.1, |w| w.point.x[0]);
         let rmse = 0.1 + distance / 3.0 + warm * 1e-3;
         let mut status = if a[4] > 0.03 && a[5] < 0.15 { SolveStatus::Infeasible } else { SolveStatus::Converged };
         for iteration in 0..ITERATIONS {
@@ -80,6 +81,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
     SolveOutcome {
         report: SolveReport {
             status,
+            started_from: if assignment.warm_start.is_some() { StartedFrom::Warm } else { StartedFrom::Cold },
             iterations: ITERATIONS,
             objective: 0.2 + rmse,
             cost_of_transport: 0.2 + rmse / 10.0,
@@ -99,10 +101,17 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
         },
         gait: gait(assignment, rmse),
         warm_start: WarmStart {
-            variables: vec![rmse; 8],
-            multipliers: vec![rmse / 3.0; 6],
-            lower_bound_multipliers: vec![0.1; 8],
-            upper_bound_multipliers: vec![0.1; 8],
+            muscles: assignment.problem.muscles,
+            mesh: assignment.problem.settings.mesh,
+            point: WarmPoint {
+                x: vec![rmse; 8],
+                row_multipliers: vec![rmse / 3.0; 6],
+                lower_multipliers: vec![0.1; 8],
+                upper_multipliers: vec![0.1; 8],
+                slacks: Vec::new(),
+                slack_lower_multipliers: Vec::new(),
+                slack_upper_multipliers: Vec::new(),
+            },
         },
         violations,
     }
@@ -133,6 +142,7 @@ fn gait(assignment: &Assignment, rmse: f64) -> Gait {
         DomainTrajectory {
             name: (*name).to_owned(),
             duration_s: 0.15,
+            time_s: (0..points).map(|i| 0.15 * (index as f64 + i as f64 / (points - 1) as f64)).collect(),
             q: (0..points).map(q).collect(),
             qd: vec![[0.1; 9]; points],
             qdd: vec![[0.2; 9]; points],

@@ -51,20 +51,10 @@ impl ProblemFlags {
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {
-        let mut options = SolveOptions::default();
-        if let Some(tolerance) = self.tolerance {
-            if !(1e-12..=1e-2).contains(&tolerance) {
-                return Err(Error::invalid("tolerance", tolerance, "1e-12 to 1e-2"));
-            }
-            options.tolerance = tolerance;
-        }
-        if let Some(seconds) = self.time_limit_s
-            && !(seconds.is_finite() && seconds > 0.0)
-        {
-            return Err(Error::invalid("time_limit_s", seconds, "a positive number of seconds"));
-        }
-        options.time_limit_s = self.time_limit_s;
+        let mut options = SolveOptions { time_limit_s: self.time_limit_s, ..SolveOptions::default() };
+        options.tolerance = self.tolerance.unwrap_or(options.tolerance);
         options.max_iterations = self.max_iterations.unwrap_or(options.max_iterations);
+        options.validate()?;
         Ok(options)
     }
 

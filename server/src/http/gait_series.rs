@@ -42,9 +42,7 @@ pub(crate) struct Point<'a> {
 /// between them velocities and forces may jump.
 pub(crate) fn points(gait: &Gait) -> Vec<Point<'_>> {
     let mut points = Vec::new();
-    let mut start = 0.0;
     for domain in &gait.domains {
-        let last = domain.q.len().saturating_sub(1).max(1) as f64;
         let rows = domain.q.iter().zip(&domain.qd).zip(&domain.u).zip(&domain.contact_forces);
         for (i, (((q, qd), u), given)) in rows.enumerate() {
             let mut forces = [0.0; 8];
@@ -55,10 +53,9 @@ pub(crate) fn points(gait: &Gait) -> Vec<Point<'_>> {
                 forces[side + point + axis] = *value;
             }
             let activation = domain.muscles.as_ref().and_then(|muscles| muscles.activation.get(i));
-            let time_s = start + domain.duration_s * i as f64 / last;
+            let time_s = domain.time_s.get(i).copied().unwrap_or_default();
             points.push(Point { time_s, domain: &domain.name, q, qd, u, forces, activation });
         }
-        start += domain.duration_s;
     }
     points
 }

@@ -143,6 +143,7 @@ async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error>
         return Err(Error::invalid("seed", new.seed, &format!("0 to {LARGEST_SEED}")));
     }
     new.gait_settings.validate()?;
+    new.solve_options.validate()?;
     new.base_bounds.validate()?;
     let search_space = match new.search_space {
         Some(space) => space,

@@ -5,6 +5,7 @@ mod events;
 mod gaits;
 pub mod health;
 mod history;
+mod motion;
 mod preferences;
 mod reference_gaits;
 mod studies;
@@ -45,6 +46,7 @@ pub fn routes() -> Router<AppState> {
         .route("/trials/{id}/iterations", get(trials::iterations))
         .route("/trials/{id}/gait", get(gaits::get))
         .route("/trials/{id}/gait.csv", get(gaits::get_csv))
+        .route("/trials/{id}/motion", get(motion::get))
         // answers
         .route("/preferences/{id}", get(preferences::get))
         .route("/preferences/{id}/retract", post(preferences::retract))
