@@ -1,3 +1,7 @@
 //! The gaitwright binary.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    gaitwright::cli::run()
+}

@@ -1,0 +1,44 @@
+//! Flags that say who walks and in which variant.
+
+use crate::error::Error;
+use clap::{Args, ValueEnum};
+use gait_optimizer::Subject;
+
+/// Who walks: one of the paper's subjects, or a height and a mass.
+#[derive(Debug, Clone, Args)]
+pub(super) struct Body {
+    /// Subject of the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg). Default: 1.
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["height_m", "mass_kg"])]
+    subject: Option<u32>,
+    /// Body height, m.
+    #[arg(long, value_name = "METRES", requires = "mass_kg")]
+    height_m: Option<f64>,
+    /// Body mass, kg.
+    #[arg(long, value_name = "KILOGRAMS", requires = "height_m")]
+    mass_kg: Option<f64>,
+}
+
+impl Body {
+    /// The subject, validated.
+    pub(super) fn subject(&self) -> Result<Subject, Error> {
+        Ok(match (self.height_m, self.mass_kg) {
+            (Some(height), Some(mass)) => Subject::new(height, mass)?,
+            _ => Subject::builtin(self.subject.unwrap_or(1))?,
+        })
+    }
+}
+
+/// On or off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Switch {
+    /// Yes.
+    On,
+    /// No.
+    Off,
+}
+
+impl Switch {
+    pub(super) fn is_on(self) -> bool {
+        self == Self::On
+    }
+}

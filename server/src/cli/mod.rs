@@ -1,0 +1,63 @@
+//! The command line. Data goes to stdout, progress and logs to stderr.
+
+mod body;
+mod logging;
+mod problem;
+mod serve;
+mod solve;
+mod sweep;
+mod tune;
+
+use crate::error::Error;
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Exit code when the input is at fault, as with every usage error.
+const INPUT_FAULT: u8 = 2;
+
+/// A preference-learning tuning service for walking gaits of powered prostheses.
+///
+/// Research software; not a medical device.
+#[derive(Debug, Parser)]
+#[command(name = "gaitwright", version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve the pages and the REST interface, and run the studies of a database.
+    Serve(serve::Serve),
+    /// Tune a gait unattended: propose, optimise, compare by Gait RMSE, repeat.
+    Tune(tune::Tune),
+    /// Optimise one gait.
+    Solve(solve::Solve),
+    /// Optimise one gait for each row of a table of actions.
+    Sweep(sweep::Sweep),
+}
+
+/// Runs the program.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    logging::start();
+    let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(error) => return report(&Error::Internal(error.to_string())),
+    };
+    let done = match cli.command {
+        Command::Serve(serve) => runtime.block_on(serve.run()),
+        Command::Tune(tune) => runtime.block_on(tune.run()),
+        Command::Solve(solve) => runtime.block_on(solve.run()),
+        Command::Sweep(sweep) => runtime.block_on(sweep.run()),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => report(&error),
+    }
+}
+
+fn report(error: &Error) -> ExitCode {
+    eprintln!("gaitwright: {error}");
+    if error.is_input() { ExitCode::from(INPUT_FAULT) } else { ExitCode::FAILURE }
+}

@@ -1,0 +1,106 @@
+//! What `solve` and `sweep` share: flags of the gait problem, warm-start files, cancellation.
+
+use super::body::{Body, Switch};
+use super::serve::interrupted;
+use crate::error::Error;
+use clap::Args;
+use gait_optimizer::{
+    CancelToken, Device, GaitProblem, GaitSettings, Mesh, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
+    WarmStart,
+};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Clone, Args)]
+pub(super) struct ProblemFlags {
+    #[command(flatten)]
+    body: Body,
+    /// With muscles (C1-C12) or without (C1-C4).
+    #[arg(long, value_enum, default_value = "on")]
+    muscles: Switch,
+    /// Device file (JSON); default: the built-in AMPRO3.
+    #[arg(long, value_name = "FILE")]
+    device: Option<PathBuf>,
+    /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
+    #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh)]
+    mesh: Option<Mesh>,
+    /// Start from the gait in this file, written by `solve --out`.
+    #[arg(long, value_name = "FILE")]
+    warm: Option<PathBuf>,
+    /// Scaled optimality tolerance.
+    #[arg(long, value_name = "NUMBER")]
+    tolerance: Option<f64>,
+    /// Most iterations of the final phase.
+    #[arg(long, value_name = "NUMBER")]
+    max_iterations: Option<usize>,
+    /// Most seconds for one solve.
+    #[arg(long, value_name = "SECONDS")]
+    time_limit_s: Option<f64>,
+}
+
+impl ProblemFlags {
+    /// The problem with these bounds, validated.
+    pub(super) fn problem(&self, bounds: TunedBounds) -> Result<GaitProblem, Error> {
+        let device = match &self.device {
+            Some(path) => Device::from_json(&read(path)?)?,
+            None => Device::ampro3()?,
+        };
+        let settings = GaitSettings { mesh: self.mesh.unwrap_or_default(), ..GaitSettings::default() };
+        settings.validate()?;
+        let (subject, muscles) = (self.body.subject()?, self.muscles.is_on());
+        Ok(GaitProblem { subject, device, bounds, muscles, settings, reference: ReferenceGait::builtin()? })
+    }
+
+    pub(super) fn options(&self) -> Result<SolveOptions, Error> {
+        let mut options = SolveOptions { time_limit_s: self.time_limit_s, ..SolveOptions::default() };
+        options.tolerance = self.tolerance.unwrap_or(options.tolerance);
+        options.max_iterations = self.max_iterations.unwrap_or(options.max_iterations);
+        options.validate()?;
+        Ok(options)
+    }
+
+    pub(super) fn warm_start(&self) -> Result<Option<WarmStart>, Error> {
+        let Some(path) = &self.warm else { return Ok(None) };
+        let outcome: SolveOutcome = serde_json::from_str(&read(path)?).map_err(|e| {
+            Error::Malformed(format!("{}: not a file of `gaitwright solve --out`: {e}", path.display()))
+        })?;
+        Ok(Some(outcome.warm_start))
+    }
+}
+
+pub(super) fn read(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
+}
+
+/// Writes a file whole or not at all.
+pub(super) fn write(path: &Path, text: &str) -> Result<(), Error> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    let part = PathBuf::from(name);
+    std::fs::write(&part, text)
+        .and_then(|()| std::fs::rename(&part, path))
+        .map_err(|e| Error::Malformed(format!("cannot write {}: {e}", path.display())))
+}
+
+/// A token that the first Ctrl-C cancels.
+pub(super) fn cancelled_by_signal() -> CancelToken {
+    let token = CancelToken::new();
+    let on_signal = token.clone();
+    tokio::spawn(async move {
+        interrupted().await;
+        eprintln!("stopping");
+        on_signal.cancel();
+    });
+    token
+}
+
+fn parse_mesh(text: &str) -> Result<Mesh, String> {
+    let numbers: Result<Vec<usize>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok([ds2, ds3, ss2, ss1]) => {
+            let mesh = Mesh { ds2: *ds2, ds3: *ds3, ss2: *ss2, ss1: *ss1 };
+            mesh.validate().map_err(|e| e.to_string())?;
+            Ok(mesh)
+        }
+        _ => Err("expected four whole numbers DS2,DS3,SS2,SS1, as in 4,4,6,6".to_owned()),
+    }
+}

@@ -1,0 +1,84 @@
+//! `gaitwright solve`: one gait.
+
+use super::problem::{ProblemFlags, cancelled_by_signal, write};
+use crate::error::Error;
+use clap::Args;
+use gait_optimizer::{SolveOutcome, SolveStatus, TunedBounds, solve};
+use indicatif::ProgressBar;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(super) struct Solve {
+    #[command(flatten)]
+    flags: ProblemFlags,
+    /// Bounds that differ from the loosest of Table I, as in a1=20,a5=0.013.
+    #[arg(long, value_name = "NAME=VALUE,...", default_value = "", hide_default_value = true)]
+    bounds: String,
+    /// Write the whole outcome (figures, gait, multipliers) as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print the figures as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Solve {
+    pub(super) async fn run(self) -> Result<(), Error> {
+        let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
+        let (warm, options, cancel) = (self.flags.warm_start()?, self.flags.options()?, cancelled_by_signal());
+        let bar = ProgressBar::new_spinner();
+        let shown = bar.clone();
+        let outcome = tokio::task::spawn_blocking(move || {
+            let mut observer = |record: &gait_optimizer::IterationRecord| {
+                shown.set_message(format!(
+                    "iteration {}, objective {:.6}, violation {:.1e}, barrier {:.1e}",
+                    record.iteration, record.objective, record.constraint_violation, record.barrier
+                ));
+                shown.tick();
+            };
+            solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)
+        })
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))??;
+        bar.finish_and_clear();
+        if let Some(path) = &self.out {
+            let text = serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?;
+            write(path, &text)?;
+        }
+        if self.json {
+            let text = serde_json::to_string_pretty(&outcome.report).map_err(|e| Error::Internal(e.to_string()))?;
+            println!("{text}");
+        } else {
+            print_for_people(&outcome);
+        }
+        Ok(())
+    }
+}
+
+/// A status as in JSON.
+pub(super) fn status_word(status: SolveStatus) -> &'static str {
+    match status {
+        SolveStatus::Converged => "converged",
+        SolveStatus::Infeasible => "infeasible",
+        SolveStatus::Stalled => "stalled",
+        SolveStatus::IterationLimit => "iteration_limit",
+        SolveStatus::TimeLimit => "time_limit",
+        SolveStatus::Cancelled => "cancelled",
+    }
+}
+
+fn print_for_people(outcome: &SolveOutcome) {
+    let r = &outcome.report;
+    println!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total);
+    println!("  cost of transport  {:.5}   objective {:.5}", r.cost_of_transport, r.objective);
+    println!("  Gait RMSE          {:.4} rad", r.gait_rmse_rad);
+    println!("  speed              {:.3} m/s   stride {:.3} m", r.speed_m_s, r.stride_length_m);
+    println!("  largest violation  {:.1e}", r.max_violation);
+    println!(
+        "  problem            {} variables, {} equalities, {} inequalities",
+        r.variables, r.equalities, r.inequalities
+    );
+    for violation in outcome.violations.iter().take(10) {
+        println!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit);
+    }
+}

@@ -1,0 +1,146 @@
+//! `gaitwright sweep`: one gait for each row of a table of actions, in parallel, answers in the order of the rows.
+
+use super::problem::{ProblemFlags, cancelled_by_signal, read, write};
+use super::serve::cores_or;
+use super::solve::status_word;
+use crate::error::Error;
+use clap::Args;
+use gait_optimizer::{CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, TunedBounds, WarmStart, solve};
+use indicatif::ProgressBar;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+#[derive(Debug, Args)]
+pub(super) struct Sweep {
+    #[command(flatten)]
+    flags: ProblemFlags,
+    /// The actions: a CSV file with header a1,a2,a3,a4,a5,a6,a7,a8.
+    #[arg(long, value_name = "FILE.csv")]
+    actions: PathBuf,
+    /// Where the answers go: one row per action, in the same order.
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+    /// How many solves at the same time; default: the number of cores.
+    #[arg(long, value_name = "NUMBER")]
+    workers: Option<usize>,
+}
+
+/// The columns after the action: a contract for scripts.
+const COLUMNS: [&str; 6] =
+    ["status", "iterations", "seconds_total", "cost_of_transport", "gait_rmse_rad", "max_violation"];
+
+type Answer = Result<SolveOutcome, SolveError>;
+
+impl Sweep {
+    pub(super) async fn run(self) -> Result<(), Error> {
+        let actions = actions(&self.actions)?;
+        let problem = self.flags.problem(TunedBounds::default())?;
+        let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
+        let (cancel, workers) = (cancelled_by_signal(), cores_or(self.workers).max(1));
+        let rows = actions.clone();
+        let answers =
+            tokio::task::spawn_blocking(move || solve_all(&problem, &rows, warm.as_ref(), &options, workers, &cancel))
+                .await
+                .map_err(|e| Error::Internal(e.to_string()))?;
+        write(&self.out, &table(&actions, &answers)?)?;
+        let converged =
+            answers.iter().flatten().filter(|o| o.report.status == gait_optimizer::SolveStatus::Converged).count();
+        eprintln!("{converged} of {} converged; written to {}", actions.len(), self.out.display());
+        Ok(())
+    }
+}
+
+/// Reads and checks every row before anything is solved.
+fn actions(path: &Path) -> Result<Vec<TunedBounds>, Error> {
+    let text = read(path)?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let malformed = |reason: String| Error::Malformed(format!("{}: {reason}", path.display()));
+    let header = reader.headers().map_err(|e| malformed(e.to_string()))?.clone();
+    if header.iter().ne(TunedBounds::NAMES) {
+        let found = header.iter().collect::<Vec<_>>().join(",");
+        return Err(malformed(format!("the header is {found:?}, expected {:?}", TunedBounds::NAMES.join(","))));
+    }
+    let mut actions = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| malformed(e.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let mut values = [0.0; 8];
+        for ((value, cell), name) in values.iter_mut().zip(&record).zip(TunedBounds::NAMES) {
+            *value = cell.parse().map_err(|_| malformed(format!("line {line}: {name}: {cell:?} is not a number")))?;
+        }
+        actions.push(TunedBounds::from_array(values).map_err(|e| malformed(format!("line {line}: {e}")))?);
+    }
+    if actions.is_empty() {
+        return Err(malformed("there is no action below the header".to_owned()));
+    }
+    Ok(actions)
+}
+
+fn solve_all(
+    problem: &GaitProblem,
+    actions: &[TunedBounds],
+    warm: Option<&WarmStart>,
+    options: &SolveOptions,
+    workers: usize,
+    cancel: &CancelToken,
+) -> Vec<Answer> {
+    let bar = ProgressBar::new(actions.len() as u64);
+    bar.tick();
+    let next = AtomicUsize::new(0);
+    let (sender, receiver) = mpsc::channel();
+    let mut answers: Vec<(usize, Answer)> = std::thread::scope(|scope| {
+        for _ in 0..workers.min(actions.len()) {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let row = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(action) = actions.get(row) else { return };
+                    let problem = GaitProblem { bounds: *action, ..problem.clone() };
+                    let answer = solve(&problem, warm, options, &mut |_| {}, cancel);
+                    // The receiver lives as long as this scope.
+                    let _ = sender.send((row, answer));
+                }
+            });
+        }
+        drop(sender);
+        receiver.iter().inspect(|_| bar.inc(1)).collect()
+    });
+    bar.finish_and_clear();
+    answers.sort_by_key(|(row, _)| *row);
+    answers.into_iter().map(|(_, answer)| answer).collect()
+}
+
+fn table(actions: &[TunedBounds], answers: &[Answer]) -> Result<String, Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let internal = |e: csv::Error| Error::Internal(e.to_string());
+    writer.write_record(TunedBounds::NAMES.iter().chain(&COLUMNS)).map_err(internal)?;
+    for (action, answer) in actions.iter().zip(answers) {
+        let mut row: Vec<String> = action.to_array().iter().map(f64::to_string).collect();
+        match answer {
+            Ok(outcome) => {
+                let r = &outcome.report;
+                row.extend([
+                    status_word(r.status).to_owned(),
+                    r.iterations.to_string(),
+                    format!("{:.3}", r.seconds_total),
+                    number(r.cost_of_transport),
+                    number(r.gait_rmse_rad),
+                    number(r.max_violation),
+                ]);
+            }
+            Err(error) => {
+                eprintln!("{error}");
+                row.extend(["failed", "", "", "", "", ""].map(str::to_owned));
+            }
+        }
+        writer.write_record(&row).map_err(internal)?;
+    }
+    let bytes = writer.into_inner().map_err(|e| Error::Internal(e.to_string()))?;
+    String::from_utf8(bytes).map_err(|e| Error::Internal(e.to_string()))
+}
+
+/// A number as text; empty when it is not finite.
+fn number(value: f64) -> String {
+    if value.is_finite() { value.to_string() } else { String::new() }
+}

@@ -1,0 +1,268 @@
+//! `gaitwright tune`: an unattended study from the command line.
+
+use super::body::{Body, Switch};
+use super::serve::{cores_or, interrupted};
+use crate::error::Error;
+use crate::store::studies::{Study, StudyState};
+use crate::store::trials::{Trial, TrialState};
+use crate::store::{Store, TrialId, commit, studies, trials};
+use crate::studies::choice::best_trial;
+use crate::studies::director::Director;
+use crate::studies::plan::{self, NewStudy};
+use crate::studies::standing::Standing;
+use crate::studies::{catalogue, search};
+use crate::workers::{Board, GaitSolver, Pool};
+use clap::Args;
+use gait_optimizer::{SolveStatus, TunedBounds};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+#[derive(Debug, Args)]
+pub(super) struct Tune {
+    #[command(flatten)]
+    body: Body,
+    /// With muscles (C1-C12) or without (C1-C4).
+    #[arg(long, value_enum, default_value = "on")]
+    muscles: Switch,
+    /// How many trials.
+    #[arg(long, default_value_t = 10, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    trials: u32,
+    /// Every random draw derives from it.
+    #[arg(long, default_value_t = 1, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(..=plan::LARGEST_SEED))]
+    seed: u64,
+    /// How many trials at the same time; default: the number of cores. 1 is reproducible bit for bit.
+    #[arg(long, value_name = "NUMBER")]
+    workers: Option<usize>,
+    /// The SQLite file; made if it does not exist. An unfinished study of the same kind in it goes on.
+    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
+    database: PathBuf,
+    /// Print one JSON object at the end instead of lines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `tune --json` prints: a contract for scripts.
+#[derive(Debug, Serialize)]
+struct Summary {
+    study_id: String,
+    state: StudyState,
+    best_trial: Option<u32>,
+    best_action: Option<TunedBounds>,
+    best_gait_rmse_rad: Option<f64>,
+    best_cost_of_transport: Option<f64>,
+    trials: Vec<TrialLine>,
+}
+
+#[derive(Debug, Serialize)]
+struct TrialLine {
+    number: u32,
+    trial_id: TrialId,
+    action: TunedBounds,
+    label: Option<TrialState>,
+    state: TrialState,
+    status: Option<SolveStatus>,
+    gait_rmse_rad: Option<f64>,
+    cost_of_transport: Option<f64>,
+    iterations: Option<u32>,
+    seconds_total: Option<f64>,
+    warm_started_from: Option<u32>,
+}
+
+impl Tune {
+    pub(super) async fn run(self) -> Result<(), Error> {
+        let subject = self.body.subject()?;
+        let workers = cores_or(self.workers).clamp(1, 64);
+        let store = Store::open(&self.database).await?;
+        let study = self.study(&store, subject, workers).await?;
+
+        let pool = Pool::new(workers, Arc::new(GaitSolver), Arc::new(Board::default()));
+        let director = Director::new(store.clone(), pool, Some(study.id));
+        let work = tokio::spawn({
+            let director = director.clone();
+            async move { director.run().await }
+        });
+        let ended = tokio::select! {
+            ended = follow(&director, &study, self.json) => Some(ended),
+            () = interrupted() => None,
+        };
+        director.stop();
+        work.await.map_err(|e| Error::Internal(e.to_string()))??;
+        let mut reader = store.read().await?;
+        let study = studies::get(&mut reader, study.id).await?;
+        let standing = Standing::read(&mut reader, study).await?;
+        drop(reader);
+        store.close().await;
+        match ended {
+            Some(ended) => ended?,
+            None => eprintln!("interrupted; the same command goes on from here"),
+        }
+        self.print(&summary(&standing)?)
+    }
+
+    /// The unfinished study of the same kind in the database, or a new one.
+    async fn study(&self, store: &Store, body: gait_optimizer::Subject, workers: usize) -> Result<Study, Error> {
+        let mut writer = store.write().await?;
+        catalogue::ensure(&mut writer).await?;
+        let subject = catalogue::subject_with(&mut writer, body).await?;
+        let space = search::table_i().map_err(Error::Learner)?;
+        let unfinished = studies::active(&mut writer).await?.into_iter().find(|study| {
+            let plan = &study.plan;
+            plan.subject_id == subject.id
+                && plan.muscles == self.muscles.is_on()
+                && plan.trial_budget == self.trials
+                && plan.seed == self.seed
+                && plan.search_space == space
+        });
+        let study = match unfinished {
+            Some(study) => {
+                let done = trials::counts(&mut writer, study.id).await?;
+                eprintln!("going on with study {}: {} of {} trials", study.id, done.total - done.open, self.trials);
+                study
+            }
+            None => {
+                let new = NewStudy {
+                    muscles: self.muscles.is_on(),
+                    trial_budget: self.trials,
+                    parallel_trials: u32::try_from(workers).unwrap_or(1),
+                    seed: self.seed,
+                    ..NewStudy::of(subject.id)
+                };
+                plan::create(&mut writer, new).await?
+            }
+        };
+        commit(writer).await?;
+        Ok(study)
+    }
+
+    fn print(&self, summary: &Summary) -> Result<(), Error> {
+        if self.json {
+            let text = serde_json::to_string_pretty(summary).map_err(|e| Error::Internal(e.to_string()))?;
+            println!("{text}");
+            return Ok(());
+        }
+        match (summary.best_trial, summary.best_action, summary.best_gait_rmse_rad) {
+            (Some(number), Some(action), Some(rmse)) => {
+                println!("best: trial {number} of {}", summary.trials.len());
+                println!("  action            {}", action_line(&action));
+                println!("  Gait RMSE         {rmse:.4} rad");
+                if let Some(cost) = summary.best_cost_of_transport {
+                    println!("  cost of transport {cost:.4}");
+                }
+            }
+            _ => println!("no trial gave a gait"),
+        }
+        eprintln!("look at it: gaitwright serve --database {}", self.database.display());
+        Ok(())
+    }
+}
+
+/// Shows progress until the study ends.
+async fn follow(director: &Director, study: &Study, json: bool) -> Result<(), Error> {
+    let bar = ProgressBar::new(u64::from(study.plan.trial_budget));
+    let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
+    if let Ok(style) = ProgressStyle::with_template(style) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    let mut pulse = director.pulse();
+    let mut progress = director.board().listen();
+    let mut shown = std::collections::HashSet::new();
+    loop {
+        let mut reader = director.store().read().await?;
+        let present = studies::get(&mut reader, study.id).await?;
+        let rows = trials::of_study(&mut reader, study.id).await?;
+        drop(reader);
+        for trial in rows.iter().filter(|trial| !trial.state.is_open()) {
+            if shown.insert(trial.id) {
+                let line = trial_line(trial, &rows);
+                bar.suspend(|| if json { eprintln!("{line}") } else { println!("{line}") });
+            }
+        }
+        bar.set_position(shown.len() as u64);
+        match present.state {
+            StudyState::Running | StudyState::Waiting | StudyState::Draft => {}
+            StudyState::Finished => {
+                bar.finish_and_clear();
+                return Ok(());
+            }
+            StudyState::Paused | StudyState::Stopped => {
+                bar.finish_and_clear();
+                return Err(Error::conflict(format!(
+                    "the study is {}: {}",
+                    present.state.as_str(),
+                    present.state_reason
+                )));
+            }
+        }
+        loop {
+            tokio::select! {
+                changed = pulse.changed() => {
+                    changed.map_err(|e| Error::Internal(e.to_string()))?;
+                    break;
+                }
+                iteration = progress.recv() => if let Ok(p) = iteration {
+                    bar.set_message(format!(
+                        "trial {}: iteration {}, objective {:.4}, violation {:.1e}",
+                        p.number, p.record.iteration, p.record.objective, p.record.constraint_violation
+                    ));
+                },
+            }
+        }
+    }
+}
+
+fn trial_line(trial: &Trial, all: &[Trial]) -> String {
+    let mut line = format!("{:>4}  {:<13}", trial.number, trial.state.as_str());
+    if let (Some(rmse), Some(cost)) = (trial.gait_rmse_rad, trial.cost_of_transport) {
+        line.push_str(&format!("  RMSE {rmse:.4} rad  cost {cost:.4}"));
+    }
+    if let (Some(iterations), Some(seconds)) = (trial.iterations, trial.seconds_total) {
+        line.push_str(&format!("  {iterations:>4} iterations {seconds:>6.1} s"));
+    }
+    match number_of(trial.warm_started_from, all) {
+        Some(from) => line.push_str(&format!("  from {from:<4}")),
+        None => line.push_str("  cold     "),
+    }
+    line.push_str(&format!("  {}", action_line(&trial.action)));
+    if !trial.message.is_empty() {
+        line.push_str(&format!("\n      {}", trial.message));
+    }
+    line
+}
+
+fn action_line(action: &TunedBounds) -> String {
+    let parts: Vec<String> =
+        TunedBounds::NAMES.iter().zip(action.to_array()).map(|(name, value)| format!("{name}={value}")).collect();
+    parts.join(" ")
+}
+
+fn number_of(id: Option<TrialId>, all: &[Trial]) -> Option<u32> {
+    id.and_then(|id| all.iter().find(|trial| trial.id == id)).map(|trial| trial.number)
+}
+
+fn summary(standing: &Standing) -> Result<Summary, Error> {
+    let best = best_trial(standing).map_err(Error::Learner)?.and_then(|id| standing.trial(id));
+    let line = |trial: &Trial| TrialLine {
+        number: trial.number,
+        trial_id: trial.id,
+        action: trial.action,
+        label: Some(trial.state).filter(|state| state.is_result()),
+        state: trial.state,
+        status: trial.status,
+        gait_rmse_rad: trial.gait_rmse_rad,
+        cost_of_transport: trial.cost_of_transport,
+        iterations: trial.iterations,
+        seconds_total: trial.seconds_total,
+        warm_started_from: number_of(trial.warm_started_from, &standing.trials),
+    };
+    Ok(Summary {
+        study_id: standing.study.id.to_string(),
+        state: standing.study.state,
+        best_trial: best.map(|trial| trial.number),
+        best_action: best.map(|trial| trial.action),
+        best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
+        best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        trials: standing.trials.iter().map(line).collect(),
+    })
+}

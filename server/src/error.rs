@@ -1,0 +1,124 @@
+//! What can go wrong in the service. Says nothing of HTTP: one table in `http::problem` does.
+
+use crate::store::StoreError;
+use crate::studies::lifecycle::NotPossible;
+use gait_learner::LearnerError;
+use gait_optimizer::{ModelError, SolveError};
+use serde_json::Value;
+use thiserror::Error;
+
+/// One field that was refused.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldError {
+    /// Its name, as in the request (`height_m`).
+    pub field: String,
+    /// What was given.
+    pub value: Value,
+    /// What would have been accepted, in words or as a range.
+    pub allowed: String,
+    /// The whole sentence.
+    pub message: String,
+}
+
+impl FieldError {
+    /// A field, its value and what would have been accepted.
+    pub fn new(field: &str, value: impl Into<Value>, allowed: &str) -> Self {
+        let value = value.into();
+        let message = format!("{field}: {value} is not accepted; allowed: {allowed}");
+        Self { field: field.to_owned(), value, allowed: allowed.to_owned(), message }
+    }
+}
+
+impl From<ModelError> for FieldError {
+    fn from(error: ModelError) -> Self {
+        let message = error.to_string();
+        match error {
+            ModelError::OutOfRange { field, value, minimum, maximum } => {
+                Self { field, value: value.into(), allowed: format!("{minimum} to {maximum}"), message }
+            }
+            ModelError::Unknown { field, value, known } => Self { field, value: value.into(), allowed: known, message },
+            ModelError::Malformed { what, reason } => {
+                Self { field: what, value: Value::Null, allowed: reason, message }
+            }
+        }
+    }
+}
+
+/// What can go wrong in the service.
+#[derive(Debug, Error)]
+pub enum Error {
+    /// What was asked for does not exist.
+    #[error("{what} {id} does not exist")]
+    NotFound {
+        /// What.
+        what: String,
+        /// Its identifier, as given.
+        id: String,
+    },
+    /// The request cannot be read.
+    #[error("{0}")]
+    Malformed(String),
+    /// The request can be read, but a field is not acceptable.
+    #[error("{}", .0.message)]
+    Invalid(Box<FieldError>),
+    /// The request does not fit the present state.
+    #[error("{0}")]
+    Conflict(String),
+    /// The learner refused.
+    #[error("learner: {0}")]
+    Learner(LearnerError),
+    /// The record.
+    #[error(transparent)]
+    Store(StoreError),
+    /// A fault of the program.
+    #[error("internal: {0}")]
+    Internal(String),
+}
+
+impl Error {
+    /// A request that does not fit the present state.
+    pub fn conflict(reason: impl Into<String>) -> Self {
+        Self::Conflict(reason.into())
+    }
+
+    /// A field that is not acceptable.
+    pub fn invalid(field: &str, value: impl Into<Value>, allowed: &str) -> Self {
+        Self::Invalid(Box::new(FieldError::new(field, value, allowed)))
+    }
+
+    /// Whether the request is at fault, and not the program or the machine.
+    pub fn is_input(&self) -> bool {
+        !matches!(self, Self::Store(_) | Self::Internal(_))
+    }
+}
+
+impl From<StoreError> for Error {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Missing { what, id } => Self::NotFound { what: what.to_owned(), id },
+            other => Self::Store(other),
+        }
+    }
+}
+
+impl From<ModelError> for Error {
+    fn from(error: ModelError) -> Self {
+        Self::Invalid(Box::new(error.into()))
+    }
+}
+
+impl From<SolveError> for Error {
+    fn from(error: SolveError) -> Self {
+        match error {
+            SolveError::Model(error) => error.into(),
+            SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
+            SolveError::ColdStart(_) | SolveError::Solver(_) => Self::Internal(error.to_string()),
+        }
+    }
+}
+
+impl From<NotPossible> for Error {
+    fn from(error: NotPossible) -> Self {
+        Self::Conflict(error.to_string())
+    }
+}

@@ -1,0 +1,111 @@
+//! Live events of a study (Server-Sent Events).
+//!
+//! What is recorded has an id and is replayed after `Last-Event-ID`; iterations of running solves have none: who
+//! misses one sees the next.
+
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Id, Params};
+use crate::store::{StudyId, TrialId, events, studies};
+use crate::workers::Progress;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::sse::{Event, KeepAlive, Sse};
+use futures_util::Stream;
+use serde::Deserialize;
+use std::collections::HashMap;
+use std::convert::Infallible;
+use std::time::{Duration, Instant};
+use tokio::sync::broadcast::error::RecvError;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+
+/// Shortest time between two iterations shown of one solve.
+const THROTTLE: Duration = Duration::from_millis(250);
+/// Events read at a time.
+const BATCH: u32 = 200;
+
+/// Where to begin.
+#[derive(Debug, Deserialize)]
+pub(super) struct From {
+    after: Option<i64>,
+}
+
+/// `GET /studies/{id}/events`.
+pub(super) async fn of_study(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Params(from): Params<From>,
+    headers: HeaderMap,
+) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    let last_seen = headers.get("last-event-id").and_then(|value| value.to_str().ok()?.parse().ok()).or(from.after);
+    let after = match last_seen {
+        Some(seq) => seq,
+        None => events::last(&mut reader, id).await?,
+    };
+    drop(reader);
+    let (sender, receiver) = mpsc::channel(16);
+    tokio::spawn(async move {
+        // Ends when the browser goes away or the server stops; either is the normal end.
+        let _ = follow(&app, id, after, &sender).await;
+    });
+    let stream = futures_util::StreamExt::map(ReceiverStream::new(receiver), Ok);
+    Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))))
+}
+
+/// The listener went away.
+struct Gone;
+
+async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mpsc::Sender<Event>) -> Result<(), Gone> {
+    let mut pulse = app.director.pulse();
+    let mut progress = app.director.board().listen();
+    let stopping = app.director.stopping();
+    let mut shown: HashMap<TrialId, Instant> = HashMap::new();
+    loop {
+        after = replay(app, study, after, sender).await?;
+        loop {
+            tokio::select! {
+                () = stopping.cancelled() => return Ok(()),
+                () = sender.closed() => return Err(Gone),
+                changed = pulse.changed() => {
+                    changed.map_err(|_| Gone)?;
+                    break;
+                }
+                iteration = progress.recv() => match iteration {
+                    Ok(progress) if progress.study_id == study && is_due(&mut shown, &progress) => {
+                        let event = Event::default().event("progress").json_data(progress).map_err(|_| Gone)?;
+                        sender.send(event).await.map_err(|_| Gone)?;
+                    }
+                    Ok(_) | Err(RecvError::Lagged(_)) => {}
+                    Err(RecvError::Closed) => return Err(Gone),
+                },
+            }
+        }
+    }
+}
+
+async fn replay(app: &AppState, study: StudyId, mut after: i64, sender: &mpsc::Sender<Event>) -> Result<i64, Gone> {
+    loop {
+        let mut reader = app.read().await.map_err(|_| Gone)?;
+        let batch = events::after(&mut reader, study, after, BATCH).await.map_err(|_| Gone)?;
+        drop(reader);
+        let Some(last) = batch.last() else { return Ok(after) };
+        after = last.seq;
+        for event in batch {
+            let sent = Event::default().event(&event.kind).id(event.seq.to_string());
+            let sent = sent.json_data(&event).map_err(|_| Gone)?;
+            sender.send(sent).await.map_err(|_| Gone)?;
+        }
+    }
+}
+
+fn is_due(shown: &mut HashMap<TrialId, Instant>, progress: &Progress) -> bool {
+    let now = Instant::now();
+    let due = shown.get(&progress.trial_id).is_none_or(|before| now.duration_since(*before) >= THROTTLE);
+    if due {
+        shown.insert(progress.trial_id, now);
+    }
+    due
+}

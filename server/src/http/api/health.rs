@@ -1,0 +1,30 @@
+//! Whether the service is ready.
+
+use crate::error::Error;
+use crate::http::AppState;
+use crate::store::jobs;
+use axum::Json;
+use axum::extract::State;
+use serde::Serialize;
+
+/// What `/health` answers.
+#[derive(Debug, Serialize)]
+pub struct Health {
+    /// `ready`.
+    pub status: &'static str,
+    /// Version of the program.
+    pub version: &'static str,
+    /// How many solves can run at the same time.
+    pub workers: usize,
+    /// Solves that wait.
+    pub jobs_queued: u32,
+    /// Solves that run.
+    pub jobs_running: u32,
+}
+
+/// `GET /health`: 200 when the database answers.
+pub async fn get(State(app): State<AppState>) -> Result<Json<Health>, Error> {
+    let (jobs_queued, jobs_running) = jobs::depth(&mut *app.read().await?).await?;
+    let version = env!("CARGO_PKG_VERSION");
+    Ok(Json(Health { status: "ready", version, workers: app.director.workers(), jobs_queued, jobs_running }))
+}

@@ -1,0 +1,49 @@
+//! The best action by iteration.
+
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::negotiate::{csv_answer, wants_csv};
+use crate::store::{StudyId, studies};
+use crate::studies::history::{self, Milestone};
+use crate::studies::standing::Standing;
+use axum::Json;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::{IntoResponse, Response};
+
+/// `GET /studies/{id}/history`.
+pub(super) async fn of_study(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    headers: HeaderMap,
+) -> Result<Response, Error> {
+    let history = read(&app, id).await?;
+    if wants_csv(&headers) { table(id, &history) } else { Ok(Json(history).into_response()) }
+}
+
+/// `GET /studies/{id}/history.csv`.
+pub(super) async fn of_study_csv(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Response, Error> {
+    table(id, &read(&app, id).await?)
+}
+
+async fn read(app: &AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let standing = Standing::read(&mut reader, study).await?;
+    drop(reader);
+    tokio::task::spawn_blocking(move || history::of(&standing))
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))?
+        .map_err(Error::Learner)
+}
+
+fn table(study: StudyId, history: &[Milestone]) -> Result<Response, Error> {
+    let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+    let rows = history
+        .iter()
+        .map(|m| vec![m.iteration.to_string(), m.number.to_string(), text(m.gait_rmse_rad), text(m.cost_of_transport)])
+        .collect();
+    let header = ["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"];
+    csv_answer(&format!("history-{}.csv", study.short()), &header, rows)
+}

@@ -1,0 +1,55 @@
+//! The motion of a gait: what an animation draws.
+
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::gait_series::points;
+use crate::store::{TrialId, gaits, trials};
+use axum::Json;
+use axum::extract::State;
+use gait_optimizer::Gait;
+use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
+use serde::Serialize;
+
+/// A gait in motion, over one stride from right heel strike.
+#[derive(Debug, Serialize)]
+pub(super) struct Motion {
+    /// Stride time, s.
+    stride_time_s: f64,
+    /// How far one stride goes, m.
+    stride_length_m: f64,
+    /// Mesh points in time; between two of them positions change evenly.
+    frames: Vec<Frame>,
+}
+
+#[derive(Debug, Serialize)]
+struct Frame {
+    #[serde(flatten)]
+    figure: StickFigure,
+    /// Name of the domain.
+    domain: String,
+    /// Ground forces on left heel, left toe, right heel, right toe: forward and up, N.
+    forces_n: [[f64; 2]; 4],
+}
+
+/// `GET /trials/{id}/motion`.
+pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Motion>, Error> {
+    let mut reader = app.read().await?;
+    trials::get(&mut reader, id).await?;
+    let gait = gaits::get(&mut reader, id).await?;
+    drop(reader);
+    Ok(Json(motion(&gait)?))
+}
+
+fn motion(gait: &Gait) -> Result<Motion, Error> {
+    let frames = stick_figures(gait)?
+        .into_iter()
+        .zip(points(gait))
+        .map(|(figure, point)| {
+            let f = point.forces;
+            let forces_n = [[f[0], f[1]], [f[2], f[3]], [f[4], f[5]], [f[6], f[7]]];
+            Frame { figure, domain: point.domain.to_owned(), forces_n }
+        })
+        .collect();
+    Ok(Motion { stride_time_s: gait.stride_time_s, stride_length_m: gait.stride_length_m, frames })
+}

@@ -1,0 +1,126 @@
+//! Trials.
+
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Id, Params};
+use crate::http::negotiate::{csv_answer, wants_csv};
+use crate::store::trials::{self, Trial};
+use crate::store::{Connection, StudyId, TrialId, gaits, studies};
+use crate::studies::command;
+use axum::Json;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::{IntoResponse, Response};
+use gait_optimizer::{IterationRecord, TunedBounds};
+use serde::{Deserialize, Serialize};
+
+/// A page of trials.
+#[derive(Debug, Serialize)]
+struct TrialPage {
+    trials: Vec<Trial>,
+    /// Give it as `after` to get the next page; absent on the last one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next: Option<u32>,
+}
+
+/// Which page.
+#[derive(Debug, Deserialize)]
+pub(super) struct PageParams {
+    after: Option<u32>,
+    limit: Option<u32>,
+}
+
+/// `GET /studies/{id}/trials`: by number, by pages; all of them as CSV.
+pub(super) async fn of_study(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Params(page): Params<PageParams>,
+    headers: HeaderMap,
+) -> Result<Response, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    if wants_csv(&headers) {
+        return table(&mut reader, id).await;
+    }
+    let limit = page.limit.unwrap_or(200);
+    if !(1..=1000).contains(&limit) {
+        return Err(Error::invalid("limit", limit, "1 to 1000"));
+    }
+    let mut found = trials::page(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
+    let more = found.len() > limit as usize;
+    found.truncate(limit as usize);
+    let next = if more { found.last().map(|trial| trial.number) } else { None };
+    Ok(Json(TrialPage { trials: found, next }).into_response())
+}
+
+/// `GET /studies/{id}/trials.csv`.
+pub(super) async fn of_study_csv(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Response, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    table(&mut reader, id).await
+}
+
+/// `GET /trials/{id}`.
+pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
+    Ok(Json(trials::get(&mut *app.read().await?, id).await?))
+}
+
+/// `POST /trials/{id}/cancel`.
+pub(super) async fn cancel(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
+    Ok(Json(command::cancel(&app.director, id, "cancelled on request").await?))
+}
+
+/// `POST /trials/{id}/retry`.
+pub(super) async fn retry(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
+    Ok(Json(command::retry(&app.director, id).await?))
+}
+
+/// `GET /trials/{id}/iterations`: of the running solve, or as recorded.
+pub(super) async fn iterations(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+) -> Result<Json<Vec<IterationRecord>>, Error> {
+    if let Some(track) = app.director.board().track(id) {
+        return Ok(Json(track.records));
+    }
+    Ok(Json(gaits::iterations(&mut *app.read().await?, id).await?))
+}
+
+async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Error> {
+    let mut header = vec!["number", "trial_id"];
+    header.extend(TunedBounds::NAMES);
+    header.extend([
+        "state",
+        "gait_rmse_rad",
+        "cost_of_transport",
+        "max_violation",
+        "iterations",
+        "seconds_total",
+        "warm_started_from",
+        "reason",
+        "message",
+    ]);
+    let all = trials::of_study(db, study).await?;
+    let number_of = |id: Option<TrialId>| all.iter().find(|t| Some(t.id) == id).map(|t| t.number.to_string());
+    let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+    let rows = all
+        .iter()
+        .map(|t| {
+            let mut row = vec![t.number.to_string(), t.id.to_string()];
+            row.extend(t.action.to_array().iter().map(f64::to_string));
+            row.extend([
+                t.state.as_str().to_owned(),
+                text(t.gait_rmse_rad),
+                text(t.cost_of_transport),
+                text(t.max_violation),
+                t.iterations.map(|n| n.to_string()).unwrap_or_default(),
+                text(t.seconds_total),
+                number_of(t.warm_started_from).unwrap_or_default(),
+                t.reason.clone(),
+                t.message.clone(),
+            ]);
+            row
+        })
+        .collect();
+    csv_answer(&format!("trials-{}.csv", study.short()), &header, rows)
+}

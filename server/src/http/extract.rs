@@ -1,0 +1,85 @@
+//! Extractors whose refusals are problem documents.
+
+use crate::error::Error;
+use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::http::header;
+use axum::http::request::Parts;
+use serde::de::DeserializeOwned;
+use std::fmt::Display;
+use std::str::FromStr;
+
+/// A JSON body.
+#[derive(Debug)]
+pub(crate) struct Body<T>(pub(crate) T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
+    type Rejection = Error;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Error> {
+        let kind = request.headers().get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("").to_owned();
+        if !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
+            return Err(Error::Malformed(format!("content type {kind:?}: this needs application/json")));
+        }
+        let bytes = axum::body::Bytes::from_request(request, state)
+            .await
+            .map_err(|e| Error::Malformed(format!("the body cannot be read: {}", e.body_text())))?;
+        let mut reader = serde_json::Deserializer::from_slice(&bytes);
+        let value = serde_path_to_error::deserialize(&mut reader).map_err(|e| {
+            let (path, inner) = (e.path().to_string(), e.into_inner());
+            if inner.is_data() && path != "." {
+                Error::Malformed(format!("field {path}: {inner}"))
+            } else {
+                Error::Malformed(format!("not the JSON that is expected here: {inner}"))
+            }
+        })?;
+        reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
+        Ok(Self(value))
+    }
+}
+
+/// The identifier in the path.
+#[derive(Debug)]
+pub(crate) struct Id<T>(pub(crate) T);
+
+impl<T, S> FromRequestParts<S> for Id<T>
+where
+    T: FromStr,
+    T::Err: Display,
+    S: Send + Sync,
+{
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Error> {
+        let Path(text) =
+            Path::<String>::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+        text.parse().map(Self).map_err(|_| Error::NotFound { what: "an identifier like".to_owned(), id: text })
+    }
+}
+
+/// The query string.
+#[derive(Debug)]
+pub(crate) struct Params<T>(pub(crate) T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Error> {
+        let Query(value) =
+            Query::<T>::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+        Ok(Self(value))
+    }
+}
+
+/// A submitted form.
+#[derive(Debug)]
+pub(crate) struct Form<T>(pub(crate) T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Form<T> {
+    type Rejection = super::pages::error::PageError;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Self::Rejection> {
+        let axum::Form(value) =
+            axum::Form::<T>::from_request(request, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+        Ok(Self(value))
+    }
+}

@@ -1,0 +1,61 @@
+//! A gait as one series of points over the stride, for tables and plots.
+
+use gait_optimizer::Gait;
+use gait_optimizer::gait::{Axis, FootPoint, Side};
+
+/// Ground force components: point, side, axis.
+pub(crate) const FORCE_NAMES: [&str; 8] = [
+    "heel_left_x",
+    "heel_left_z",
+    "toe_left_x",
+    "toe_left_z",
+    "heel_right_x",
+    "heel_right_z",
+    "toe_right_x",
+    "toe_right_z",
+];
+
+/// The ten muscles, in the order of the optimizer.
+pub(crate) const MUSCLES: [&str; 10] =
+    ["HAM_L", "GLU_L", "HFL_L", "GAS_L", "VAS_L", "SOL_L", "TA_L", "HAM_R", "GLU_R", "HFL_R"];
+
+/// One mesh point.
+#[derive(Debug)]
+pub(crate) struct Point<'a> {
+    /// Time since right heel strike, s.
+    pub(crate) time_s: f64,
+    /// Name of the domain.
+    pub(crate) domain: &'a str,
+    /// Coordinates.
+    pub(crate) q: &'a [f64; 9],
+    /// Velocities.
+    pub(crate) qd: &'a [f64; 9],
+    /// Torques, N m.
+    pub(crate) u: &'a [f64; 6],
+    /// Ground forces in the order of [`FORCE_NAMES`], N.
+    pub(crate) forces: [f64; 8],
+    /// Activations.
+    pub(crate) activation: Option<&'a [f64; 10]>,
+}
+
+/// The mesh points of all domains, in time. A domain's last point and the next one's first have the same time:
+/// between them velocities and forces may jump.
+pub(crate) fn points(gait: &Gait) -> Vec<Point<'_>> {
+    let mut points = Vec::new();
+    for domain in &gait.domains {
+        let rows = domain.q.iter().zip(&domain.qd).zip(&domain.u).zip(&domain.contact_forces);
+        for (i, (((q, qd), u), given)) in rows.enumerate() {
+            let mut forces = [0.0; 8];
+            for (name, value) in domain.contact_rows.iter().zip(given) {
+                let side = if name.side == Side::Left { 0 } else { 4 };
+                let point = if name.point == FootPoint::Heel { 0 } else { 2 };
+                let axis = if name.axis == Axis::X { 0 } else { 1 };
+                forces[side + point + axis] = *value;
+            }
+            let activation = domain.muscles.as_ref().and_then(|muscles| muscles.activation.get(i));
+            let time_s = domain.time_s.get(i).copied().unwrap_or_default();
+            points.push(Point { time_s, domain: &domain.name, q, qd, u, forces, activation });
+        }
+    }
+    points
+}

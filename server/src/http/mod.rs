@@ -1,0 +1,14 @@
+//! The HTTP face: REST under `/api/v1`, pages for people, static files.
+
+pub mod api;
+mod extract;
+mod gait_series;
+mod negotiate;
+pub mod pages;
+mod problem;
+mod router;
+mod state;
+mod static_files;
+
+pub use router::router;
+pub use state::AppState;

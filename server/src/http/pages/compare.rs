@@ -1,0 +1,141 @@
+//! The form for a preference between two gaits of a study.
+
+use super::error::{Page, PageError, page};
+use super::study::answer_in_words;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Form, Id, Params};
+use crate::store::feedback::Source;
+use crate::store::studies::Study;
+use crate::store::trials::TrialState;
+use crate::store::{FeedbackId, StudyId, TrialId, commit, feedback, studies};
+use crate::studies::answer::{self, Answer, Verdict};
+use crate::studies::comparison::open_question;
+use crate::studies::standing::Standing;
+use askama::Template;
+use axum::extract::State;
+use axum::response::Redirect;
+use serde::Deserialize;
+
+/// Which gaits to offer, and what was just saved.
+#[derive(Debug, Deserialize)]
+pub(super) struct Choice {
+    a: Option<TrialId>,
+    b: Option<TrialId>,
+    saved: Option<FeedbackId>,
+}
+
+#[derive(Template)]
+#[template(path = "compare.html")]
+struct ComparePage {
+    study: Study,
+    trials: Vec<Offered>,
+    saved: Option<Saved>,
+}
+
+/// A gait that can be compared.
+struct Offered {
+    id: TrialId,
+    number: u32,
+    as_a: bool,
+    as_b: bool,
+}
+
+/// An answer as read back from the record.
+struct Saved {
+    id: FeedbackId,
+    text: String,
+    at: String,
+    retracted: bool,
+}
+
+/// `GET /studies/{id}/compare`.
+pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>, Params(choice): Params<Choice>) -> Page {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let standing = Standing::read(&mut reader, study).await?;
+    let saved = match choice.saved {
+        Some(saved) => Some(feedback::get(&mut reader, saved).await?),
+        None => None,
+    };
+    drop(reader);
+    let question = open_question(&standing).map_err(Error::Learner)?;
+    let mut trials: Vec<Offered> = standing
+        .trials
+        .iter()
+        .filter(|trial| trial.state == TrialState::Converged)
+        .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
+        .collect();
+    let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
+    let (a, b) = match (choice.a, choice.b, question) {
+        (Some(a), Some(b), _) => (Some(a), Some(b)),
+        (_, _, Some((new, old))) => (Some(old), Some(new)),
+        _ => (newest(2), newest(1)),
+    };
+    for trial in &mut trials {
+        (trial.as_a, trial.as_b) = (a == Some(trial.id), b == Some(trial.id));
+    }
+    let saved = saved.and_then(|row| {
+        Some(Saved {
+            id: row.id,
+            text: answer_in_words(&row, &standing)?,
+            at: row.created_at.minute(),
+            retracted: row.retraction.is_some(),
+        })
+    });
+    page(&ComparePage { study: standing.study, trials, saved })
+}
+
+/// The form as submitted.
+#[derive(Debug, Deserialize)]
+pub(super) struct Submitted {
+    a: TrialId,
+    b: TrialId,
+    answer: Verdict,
+    source: Source,
+    author: String,
+    #[serde(default)]
+    note: String,
+}
+
+/// `POST /studies/{id}/compare`.
+pub(super) async fn post(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Form(form): Form<Submitted>,
+) -> Result<Redirect, PageError> {
+    let answer = Answer {
+        trial_a: form.a,
+        trial_b: form.b,
+        answer: form.answer,
+        source: form.source,
+        author: form.author,
+        note: form.note,
+    };
+    let mut writer = app.write().await?;
+    let saved = answer::give(&mut writer, id, &answer).await?;
+    commit(writer).await?;
+    app.director.changed();
+    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")))
+}
+
+/// Taking an answer back.
+#[derive(Debug, Deserialize)]
+pub(super) struct Retract {
+    feedback: FeedbackId,
+    author: String,
+    reason: String,
+}
+
+/// `POST /studies/{id}/retract`.
+pub(super) async fn retract(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Form(form): Form<Retract>,
+) -> Result<Redirect, PageError> {
+    let mut writer = app.write().await?;
+    answer::retract(&mut writer, form.feedback, &form.author, &form.reason).await?;
+    commit(writer).await?;
+    app.director.changed();
+    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.feedback)))
+}

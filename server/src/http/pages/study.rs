@@ -1,0 +1,283 @@
+//! A study: where it stands, live.
+
+use super::error::{Page, PageError, page};
+use super::format::{self, Bound, words};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Form, Id};
+use crate::plots::{Chart, Stroke};
+use crate::store::feedback::{FeedbackRow, Said, Source};
+use crate::store::studies::{FeedbackMode, Study, StudyState};
+use crate::store::trials::{Trial, TrialCounts, TrialState};
+use crate::store::{StudyId, TrialId, devices, events, reference_gaits, studies, subjects, trials};
+use crate::studies::choice::best_trial;
+use crate::studies::comparison::open_question;
+use crate::studies::history::{self, Milestone};
+use crate::studies::lifecycle::{Act, acts_of_people};
+use crate::studies::standing::Standing;
+use crate::studies::{command, lifecycle};
+use crate::workers::Track;
+use askama::Template;
+use axum::extract::State;
+use axum::response::Redirect;
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "study.html")]
+struct StudyPage {
+    study: Study,
+    subject: String,
+    device: String,
+    reference: String,
+    live: String,
+    last_event: i64,
+}
+
+/// The part that changes while the study runs.
+#[derive(Template)]
+#[template(path = "study_live.html")]
+struct Live {
+    study: Study,
+    state: String,
+    acts: Vec<ActButton>,
+    counts: TrialCounts,
+    running: Vec<RunningRow>,
+    best: Option<Best>,
+    chart: Option<String>,
+    legend: Vec<(String, String)>,
+    trials: Vec<TrialRow>,
+    answers: Vec<AnswerRow>,
+    question: bool,
+    can_compare: bool,
+}
+
+struct ActButton {
+    act: &'static str,
+    label: &'static str,
+}
+
+struct RunningRow {
+    id: TrialId,
+    number: u32,
+    text: String,
+}
+
+struct Best {
+    id: TrialId,
+    number: u32,
+    rmse: String,
+    cost: String,
+    bounds: Vec<Bound>,
+}
+
+struct TrialRow {
+    id: TrialId,
+    number: u32,
+    state: &'static str,
+    state_words: String,
+    rmse: String,
+    cost: String,
+    iterations: String,
+    seconds: String,
+    from: Option<(TrialId, u32)>,
+    action: Vec<String>,
+    reason: String,
+    message: String,
+    is_best: bool,
+}
+
+struct AnswerRow {
+    row: FeedbackRow,
+    text: String,
+    source: String,
+    at: String,
+}
+
+/// `GET /studies/{id}`.
+pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let last_event = events::last(&mut reader, id).await?;
+    let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
+    let device = devices::get(&mut reader, study.plan.device_id).await?.name;
+    let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
+    drop(reader);
+    let live = read_live(&app, id).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
+    let subject = format!("{} ({} m, {} kg)", subject.pseudonym, subject.height_m, subject.body_mass_kg);
+    page(&StudyPage { study, subject, device, reference, live, last_event })
+}
+
+/// `GET /studies/{id}/live`: the changing part alone, for the script.
+pub(super) async fn live(State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+    page(&read_live(&app, id).await?)
+}
+
+/// What a button does.
+#[derive(Debug, Deserialize)]
+pub(super) struct Do {
+    act: String,
+}
+
+/// `POST /studies/{id}/do`.
+pub(super) async fn post(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Form(form): Form<Do>,
+) -> Result<Redirect, PageError> {
+    let act = lifecycle::Act::ALL
+        .into_iter()
+        .find(|act| button(*act).is_some_and(|b| b.act == form.act))
+        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop"))?;
+    command::act(&app.director, id, act, "").await?;
+    Ok(Redirect::to(&format!("/studies/{id}")))
+}
+
+fn button(act: Act) -> Option<ActButton> {
+    match act {
+        Act::Start => Some(ActButton { act: "start", label: "Start" }),
+        Act::Pause => Some(ActButton { act: "pause", label: "Pause" }),
+        Act::Resume => Some(ActButton { act: "resume", label: "Resume" }),
+        Act::Stop => Some(ActButton { act: "stop", label: "Stop" }),
+        _ => None,
+    }
+}
+
+/// What is computed from the standing: CPU work.
+struct Figures {
+    best: Option<TrialId>,
+    history: Vec<Milestone>,
+    question: bool,
+}
+
+async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let counts = trials::counts(&mut reader, id).await?;
+    let standing = Standing::read(&mut reader, study).await?;
+    drop(reader);
+    let (standing, figures) = tokio::task::spawn_blocking(move || {
+        let figures = figures(&standing);
+        (standing, figures)
+    })
+    .await
+    .map_err(|e| Error::Internal(e.to_string()))?;
+    let figures = figures.map_err(Error::Learner)?;
+    let running = standing
+        .trials
+        .iter()
+        .filter(|trial| trial.state == TrialState::Running)
+        .map(|trial| running_row(trial, app.director.board().track(trial.id)))
+        .collect();
+    Ok(view(standing, counts, &figures, running))
+}
+
+fn figures(standing: &Standing) -> Result<Figures, gait_learner::LearnerError> {
+    let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
+    Ok(Figures { best: best_trial(standing)?, history: history::of(standing)?, question })
+}
+
+fn running_row(trial: &Trial, track: Option<Track>) -> RunningRow {
+    let text = track.and_then(|track| track.records.last().copied()).map_or_else(
+        || "starting".to_owned(),
+        |r| {
+            format!("iteration {}, objective {:.4}, violation {:.1e}", r.iteration, r.objective, r.constraint_violation)
+        },
+    );
+    RunningRow { id: trial.id, number: trial.number, text }
+}
+
+fn view(standing: Standing, counts: TrialCounts, figures: &Figures, running: Vec<RunningRow>) -> Live {
+    let best = figures.best.and_then(|id| standing.trial(id)).map(|trial| Best {
+        id: trial.id,
+        number: trial.number,
+        rmse: format::figure(trial.gait_rmse_rad),
+        cost: format::figure(trial.cost_of_transport),
+        bounds: format::bounds(&trial.action),
+    });
+    let number_of = |id: TrialId| standing.trial(id).map(|trial| (id, trial.number));
+    let trials = standing.trials.iter().rev().map(|trial| trial_row(trial, number_of, figures.best)).collect();
+    let answers = standing.feedback.iter().rev().filter_map(|row| answer_row(row, &standing)).collect();
+    let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
+    let chart = chart(&standing, &figures.history);
+    let (chart, legend) = match chart {
+        Some(chart) => {
+            let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
+            (Some(chart.svg()), legend)
+        }
+        None => (None, Vec::new()),
+    };
+    Live {
+        state: words(standing.study.state.as_str()),
+        acts: acts_of_people(standing.study.state).into_iter().filter_map(button).collect(),
+        counts,
+        running,
+        best,
+        chart,
+        legend,
+        trials,
+        answers,
+        question: figures.question && standing.study.state != StudyState::Stopped,
+        can_compare: converged >= 2,
+        study: standing.study,
+    }
+}
+
+fn trial_row(trial: &Trial, number_of: impl Fn(TrialId) -> Option<(TrialId, u32)>, best: Option<TrialId>) -> TrialRow {
+    TrialRow {
+        id: trial.id,
+        number: trial.number,
+        state: trial.state.as_str(),
+        state_words: words(trial.state.as_str()),
+        rmse: format::figure(trial.gait_rmse_rad),
+        cost: format::figure(trial.cost_of_transport),
+        iterations: trial.iterations.map_or_else(|| "–".to_owned(), |n| n.to_string()),
+        seconds: format::seconds(trial.seconds_total),
+        from: trial.warm_started_from.and_then(number_of),
+        action: trial.action.to_array().iter().map(f64::to_string).collect(),
+        reason: trial.reason.clone(),
+        message: trial.message.clone(),
+        is_best: best == Some(trial.id),
+    }
+}
+
+/// Answers that people gave; those of Gait RMSE are in the table of trials already.
+fn answer_row(row: &FeedbackRow, standing: &Standing) -> Option<AnswerRow> {
+    if matches!(row.source, Source::GaitRmse | Source::Convergence) {
+        return None;
+    }
+    Some(AnswerRow {
+        text: answer_in_words(row, standing)?,
+        source: words(row.source.as_str()),
+        at: row.created_at.minute(),
+        row: row.clone(),
+    })
+}
+
+/// `trial 3 over trial 2`.
+pub(super) fn answer_in_words(row: &FeedbackRow, standing: &Standing) -> Option<String> {
+    let name = |id| standing.trial(id).map(|trial| format!("trial {}", trial.number));
+    match row.said {
+        Said::Preference { winner, loser } => Some(format!("{} over {}", name(winner)?, name(loser)?)),
+        Said::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
+        Said::Label { .. } | Said::Suggestion { .. } => None,
+    }
+}
+
+fn chart(standing: &Standing, history: &[Milestone]) -> Option<Chart> {
+    let best: Vec<(f64, f64)> =
+        history.iter().filter_map(|m| Some((f64::from(m.iteration), m.gait_rmse_rad?))).collect();
+    if best.is_empty() {
+        return None;
+    }
+    let converged: Vec<(f64, f64)> = standing
+        .trials
+        .iter()
+        .filter(|t| t.state == TrialState::Converged)
+        .filter_map(|t| Some((f64::from(t.number), t.gait_rmse_rad?)))
+        .collect();
+    let mut chart = Chart::new("Gait RMSE of the best action by iteration", "iteration (trial)", "Gait RMSE, rad")
+        .with("trial", 7, Stroke::Points, converged)
+        .with("best action so far", 0, Stroke::Steps, best);
+    chart.whole_x = true;
+    Some(chart)
+}

@@ -1,0 +1,96 @@
+//! Problem documents (RFC 9457): the one table from errors to answers.
+
+use crate::error::Error;
+use axum::Json;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::Value;
+
+/// Media type of a problem document.
+pub const PROBLEM_JSON: &str = "application/problem+json";
+
+/// A problem document.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Problem {
+    /// What kind of problem: stable, for programs.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// The kind in words.
+    pub title: &'static str,
+    /// The HTTP status.
+    pub status: u16,
+    /// This occurrence in words.
+    pub detail: String,
+    /// The field that was refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
+    /// The value that was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<Value>,
+    /// What would have been accepted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub allowed: Option<String>,
+}
+
+impl Problem {
+    fn new(status: StatusCode, kind: &'static str, title: &'static str, detail: String) -> Self {
+        Self { kind, title, status: status.as_u16(), detail, field: None, value: None, allowed: None }
+    }
+}
+
+impl From<&Error> for Problem {
+    fn from(error: &Error) -> Self {
+        let detail = error.to_string();
+        match error {
+            Error::NotFound { .. } => {
+                Self::new(StatusCode::NOT_FOUND, "/problems/not-found", "There is no such thing", detail)
+            }
+            Error::Malformed(_) => {
+                Self::new(StatusCode::BAD_REQUEST, "/problems/malformed", "The request cannot be read", detail)
+            }
+            Error::Invalid(field) => Self {
+                field: Some(field.field.clone()),
+                value: Some(field.value.clone()),
+                allowed: Some(field.allowed.clone()),
+                ..Self::new(
+                    StatusCode::UNPROCESSABLE_ENTITY,
+                    "/problems/invalid-field",
+                    "A field is not acceptable",
+                    detail,
+                )
+            },
+            Error::Conflict(_) => {
+                Self::new(StatusCode::CONFLICT, "/problems/conflict", "Not possible in the present state", detail)
+            }
+            Error::Learner(_) => Self::new(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "/problems/learner",
+                "The learner cannot work with this",
+                detail,
+            ),
+            Error::Store(_) | Error::Internal(_) => Self::new(
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "/problems/internal",
+                "The program failed",
+                "the failure was logged; nothing was changed".to_owned(),
+            ),
+        }
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(self)).into_response()
+    }
+}
+
+impl IntoResponse for Error {
+    fn into_response(self) -> Response {
+        if !self.is_input() {
+            tracing::error!(error = %self, "a request failed");
+        }
+        Problem::from(&self).into_response()
+    }
+}

@@ -1,0 +1,30 @@
+//! Styles, scripts and images, embedded into the binary.
+
+use crate::error::Error;
+use axum::extract::Path;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use rust_embed::Embed;
+use std::fmt::Write;
+
+#[derive(Embed)]
+#[folder = "../web/static"]
+struct Files;
+
+/// `GET /static/{path}`: revalidated by content hash, so that a new version is seen at once.
+pub async fn get(Path(path): Path<String>, headers: HeaderMap) -> Result<Response, Error> {
+    let file = Files::get(&path).ok_or_else(|| Error::NotFound { what: "file".to_owned(), id: path })?;
+    let mut tag = String::from("\"");
+    for byte in &file.metadata.sha256_hash()[..16] {
+        // Writing to a String cannot fail.
+        let _ = write!(tag, "{byte:02x}");
+    }
+    tag.push('"');
+    let known = headers.get(header::IF_NONE_MATCH).is_some_and(|value| value.as_bytes() == tag.as_bytes());
+    if known {
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
+    }
+    let kind = file.metadata.mimetype().to_owned();
+    let headers = [(header::CONTENT_TYPE, kind), (header::ETAG, tag), (header::CACHE_CONTROL, "no-cache".to_owned())];
+    Ok((headers, file.data).into_response())
+}

@@ -1,0 +1,13 @@
+//! Gaitwright: a preference-learning tuning service for walking gaits of powered prostheses.
+//!
+//! Arrows point down: [`cli`] -> `http` -> [`studies`] -> [`workers`], [`store`].
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod cli;
+pub mod error;
+pub mod http;
+pub mod plots;
+pub mod store;
+pub mod studies;
+pub mod workers;

@@ -1,0 +1,125 @@
+//! Axes: round ticks over a range.
+
+/// A range of values with round ticks.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Axis {
+    /// Smallest value shown.
+    pub(super) from: f64,
+    /// Largest value shown.
+    pub(super) to: f64,
+    /// Where the ticks are.
+    pub(super) ticks: Vec<f64>,
+    decimals: usize,
+}
+
+impl Axis {
+    /// An axis over all values, widened to whole ticks unless `exact`; about `count` ticks.
+    pub(super) fn over(values: impl Iterator<Item = f64>, count: usize, exact: bool) -> Self {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for value in values.filter(|value| value.is_finite()) {
+            low = low.min(value);
+            high = high.max(value);
+        }
+        if low > high {
+            (low, high) = (0.0, 1.0);
+        }
+        if high - low < 1e-12 * low.abs().max(1e-9) {
+            let half = if low == 0.0 { 0.5 } else { low.abs() * 0.1 };
+            (low, high) = (low - half, high + half);
+        }
+        let step = round_step((high - low) / count as f64);
+        let (first, last) = ((low / step).floor(), (high / step).ceil());
+        let (from, to) = if exact { (low, high) } else { (first * step, last * step) };
+        let mut ticks = Vec::new();
+        let mut index = first;
+        while index <= last {
+            let tick = index * step;
+            if tick >= from - 1e-9 * step && tick <= to + 1e-9 * step {
+                // No tick is written as -0.
+                ticks.push(if tick.abs() < step * 1e-9 { 0.0 } else { tick });
+            }
+            index += 1.0;
+        }
+        Self { from, to, ticks, decimals: decimals_of(step) }
+    }
+
+    /// Drops the ticks between whole numbers.
+    pub(super) fn keep_whole_ticks(&mut self) {
+        self.ticks.retain(|tick| tick.fract() == 0.0);
+        self.decimals = 0;
+    }
+
+    /// Where a value lies between the ends, 0 to 1.
+    pub(super) fn place(&self, value: f64) -> f64 {
+        (value - self.from) / (self.to - self.from)
+    }
+
+    /// A tick as text, all with the same decimals.
+    pub(super) fn text(&self, tick: f64) -> String {
+        format!("{tick:.*}", self.decimals).replace('-', "\u{2212}")
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, not smaller than `raw`.
+fn round_step(raw: f64) -> f64 {
+    let power = 10_f64.powf(raw.log10().floor());
+    let scaled = raw / power;
+    let round = if scaled <= 1.0 {
+        1.0
+    } else if scaled <= 2.0 {
+        2.0
+    } else if scaled <= 5.0 {
+        5.0
+    } else {
+        10.0
+    };
+    round * power
+}
+
+fn decimals_of(step: f64) -> usize {
+    let digits = -(step * 1.0001).log10().floor();
+    if digits <= 0.0 {
+        0
+    } else if digits >= 12.0 {
+        12
+    } else {
+        (1..=12).find(|n| f64::from(*n) >= digits).unwrap_or(12) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn ticks_are_round() {
+        let axis = Axis::over([0.03, 0.41].into_iter(), 5, false);
+        assert_eq!(
+            axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(),
+            ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
+        );
+        let axis = Axis::over([-40.0, 60.0].into_iter(), 5, false);
+        assert_eq!(axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(), ["−40", "−20", "0", "20", "40", "60"]);
+    }
+
+    proptest! {
+        #[test]
+        fn every_value_lies_on_the_axis(values in proptest::collection::vec(-1e6_f64..1e6, 1..20), count in 2_usize..10) {
+            let axis = Axis::over(values.iter().copied(), count, false);
+            prop_assert!(axis.ticks.len() >= 2 && axis.ticks.len() <= count + 3);
+            for value in values {
+                let place = axis.place(value);
+                prop_assert!((-1e-9..=1.0 + 1e-9).contains(&place));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_and_nonsense_make_an_axis_too() {
+        for values in [vec![], vec![f64::NAN], vec![3.0], vec![0.0, 0.0]] {
+            let axis = Axis::over(values.into_iter(), 5, false);
+            assert!(axis.from < axis.to && axis.ticks.len() >= 2, "{axis:?}");
+        }
+    }
+}

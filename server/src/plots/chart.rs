@@ -1,0 +1,197 @@
+//! Line charts.
+
+use super::axis::Axis;
+use std::fmt::Write;
+
+/// How a series is drawn. Lines differ by dash and not by colour alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// A line.
+    Solid,
+    /// A dashed line.
+    Dashed,
+    /// Points only.
+    Points,
+    /// A line that holds its value until the next point, with a mark at each.
+    Steps,
+}
+
+/// One line of a chart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Its name in the legend.
+    pub label: String,
+    /// Its points; one that is not finite interrupts the line.
+    pub points: Vec<(f64, f64)>,
+    /// Colour of the palette, 0 to 9.
+    pub colour: usize,
+    /// How it is drawn.
+    pub stroke: Stroke,
+}
+
+/// A chart of lines over one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// What it shows.
+    pub title: String,
+    /// What is to the right, with its unit.
+    pub x_label: String,
+    /// What is up, with its unit.
+    pub y_label: String,
+    /// The lines.
+    pub series: Vec<Series>,
+    /// Vertical lines with names: where one phase ends.
+    pub marks: Vec<(f64, String)>,
+    /// Whether the x axis shows whole numbers only.
+    pub whole_x: bool,
+}
+
+/// Size of the drawing and of its margins, in its own units.
+const WIDTH: f64 = 640.0;
+const HEIGHT: f64 = 300.0;
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 30.0;
+const BOTTOM: f64 = 44.0;
+
+impl Chart {
+    /// A chart without lines.
+    pub fn new(title: &str, x_label: &str, y_label: &str) -> Self {
+        Self {
+            title: title.to_owned(),
+            x_label: x_label.to_owned(),
+            y_label: y_label.to_owned(),
+            series: Vec::new(),
+            marks: Vec::new(),
+            whole_x: false,
+        }
+    }
+
+    /// Adds a line.
+    #[must_use]
+    pub fn with(mut self, label: &str, colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
+        self.series.push(Series { label: label.to_owned(), points, colour, stroke });
+        self
+    }
+
+    /// The chart as an SVG element.
+    pub fn svg(&self) -> String {
+        let all = || self.series.iter().flat_map(|series| series.points.iter());
+        let mut x = Axis::over(all().map(|p| p.0), 8, true);
+        if self.whole_x {
+            x.keep_whole_ticks();
+        }
+        let y = Axis::over(all().map(|p| p.1), 5, false);
+        let mut svg = String::with_capacity(16 * 1024);
+        // Writing to a String cannot fail.
+        let _ = self.draw(&mut svg, &x, &y);
+        svg
+    }
+
+    /// The names of the lines, for a legend in HTML: class, label.
+    pub fn legend(&self) -> Vec<(String, &str)> {
+        self.series.iter().map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.as_str())).collect()
+    }
+
+    fn draw(&self, svg: &mut String, x: &Axis, y: &Axis) -> std::fmt::Result {
+        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+        let px = |value: f64| LEFT + x.place(value) * (right - LEFT);
+        let py = |value: f64| bottom - y.place(value) * (bottom - TOP);
+        write!(
+            svg,
+            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">",
+            escape(&format!("{}: {} over {}", self.title, self.y_label, self.x_label))
+        )?;
+        for &tick in &y.ticks {
+            let at = py(tick);
+            write!(svg, "<path class=\"grid\" d=\"M{LEFT} {at:.1}H{right}\"/>")?;
+            write!(svg, "<text class=\"tick y\" x=\"{}\" y=\"{:.1}\">{}</text>", LEFT - 8.0, at + 4.0, y.text(tick))?;
+        }
+        for &tick in &x.ticks {
+            let at = px(tick);
+            write!(svg, "<path class=\"grid\" d=\"M{at:.1} {bottom}v5\"/>")?;
+            write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 19.0, x.text(tick))?;
+        }
+        for (value, name) in &self.marks {
+            let at = px(*value);
+            write!(svg, "<path class=\"mark\" d=\"M{at:.1} {TOP}V{bottom}\"/>")?;
+            if name.is_empty() {
+                continue;
+            }
+            write!(svg, "<text class=\"mark\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", at + 3.0, TOP + 10.0, escape(name))?;
+        }
+        write!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>")?;
+        for series in &self.series {
+            series.draw(svg, &px, &py)?;
+        }
+        write!(
+            svg,
+            "<text class=\"label\" x=\"{:.1}\" y=\"{}\">{}</text>",
+            (LEFT + right) / 2.0,
+            HEIGHT - 6.0,
+            escape(&self.x_label)
+        )?;
+        write!(svg, "<text class=\"label start\" x=\"4\" y=\"13\">{}</text>", escape(&self.y_label))?;
+        write!(svg, "</svg>")
+    }
+}
+
+impl Stroke {
+    fn class(self) -> &'static str {
+        match self {
+            Self::Solid | Self::Steps => "solid",
+            Self::Dashed => "dashed",
+            Self::Points => "points",
+        }
+    }
+}
+
+impl Series {
+    fn draw(&self, svg: &mut String, px: &impl Fn(f64) -> f64, py: &impl Fn(f64) -> f64) -> std::fmt::Result {
+        let colour = self.colour % 10;
+        if self.stroke != Stroke::Points {
+            write!(svg, "<path class=\"line c{colour} {}\" d=\"", self.stroke.class())?;
+            let mut pen_down = false;
+            for &(x, y) in &self.points {
+                if !(x.is_finite() && y.is_finite()) {
+                    pen_down = false;
+                } else if !pen_down {
+                    write!(svg, "M{:.1} {:.1}", px(x), py(y))?;
+                    pen_down = true;
+                } else if self.stroke == Stroke::Steps {
+                    write!(svg, "H{:.1}V{:.1}", px(x), py(y))?;
+                } else {
+                    write!(svg, "L{:.1} {:.1}", px(x), py(y))?;
+                }
+            }
+            write!(svg, "\"/>")?;
+        }
+        if matches!(self.stroke, Stroke::Points | Stroke::Steps) {
+            for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+                write!(svg, "<circle class=\"dot c{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\"/>", px(x), py(y))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_is_one_element_and_text_cannot_leave_it() {
+        let chart = Chart::new("a<b>\"c\"", "x & y", "<script>")
+            .with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)])
+            .with("two", 1, Stroke::Steps, vec![(0.0, 2.0), (2.0, 1.0)]);
+        let svg = chart.svg();
+        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>"));
+        assert!(!svg.contains("<script>") && !svg.contains("NaN"));
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert_eq!(chart.legend().len(), 2);
+    }
+}

@@ -1,0 +1,75 @@
+//! Devices: prosthesis models.
+
+use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json, now};
+use gait_optimizer::Device as Definition;
+use serde::Serialize;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+/// A device of the record. A changed definition is a new row: studies keep what they used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Device {
+    /// Identifier.
+    pub id: DeviceId,
+    /// Name shown to people.
+    pub name: String,
+    /// The device itself.
+    pub definition: Definition,
+    /// When the row was written.
+    pub created_at: Instant,
+}
+
+/// The row with this very definition, added if it is not there yet.
+///
+/// # Errors
+/// What the database reports.
+pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<Device> {
+    let text = json::to_text("device", definition)?;
+    let hash = json::sha256(text.as_bytes());
+    let found = sqlx::query("select * from devices where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
+    if let Some(row) = found {
+        return from_row(&row);
+    }
+    let added = Device {
+        id: DeviceId::fresh(),
+        name: definition.name.clone(),
+        definition: definition.clone(),
+        created_at: now(),
+    };
+    sqlx::query("insert into devices (id, name, definition, sha256, created_at) values (?, ?, ?, ?, ?)")
+        .bind(added.id)
+        .bind(&added.name)
+        .bind(text)
+        .bind(hash)
+        .bind(added.created_at)
+        .execute(db)
+        .await?;
+    Ok(added)
+}
+
+/// The device with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: DeviceId) -> StoreResult<Device> {
+    let row = sqlx::query("select * from devices where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "device", id: id.to_string() })
+}
+
+/// Every device, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<Device>> {
+    let rows = sqlx::query("select * from devices order by id desc").fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Device> {
+    Ok(Device {
+        id: row.try_get("id")?,
+        name: row.try_get("name")?,
+        definition: json::column(row, "definition")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

@@ -1,0 +1,80 @@
+//! What can go wrong with the record.
+
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Result of a store function.
+pub type StoreResult<T> = Result<T, StoreError>;
+
+/// What can go wrong with the record.
+#[derive(Debug, Error)]
+pub enum StoreError {
+    /// The file cannot be opened or created.
+    #[error("cannot open the database {}: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system reports.
+        source: std::io::Error,
+    },
+    /// Another process owns the file.
+    #[error("the database {} is in use by another gaitwright process; stop it first or choose another --database", path.display())]
+    InUse {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A newer version of the program wrote the file.
+    #[error(
+        "the database {} has schema version {found}, this program knows up to {known}: use a newer gaitwright; nothing was changed",
+        path.display()
+    )]
+    NewerSchema {
+        /// The file.
+        path: PathBuf,
+        /// Its schema version.
+        found: i64,
+        /// The newest version this program knows.
+        known: i64,
+    },
+    /// The schema could not be brought up to date.
+    #[error("migrating the database: {0}")]
+    Migrate(#[from] sqlx::migrate::MigrateError),
+    /// A row that must exist does not.
+    #[error("{what} {id} does not exist")]
+    Missing {
+        /// What was looked for.
+        what: &'static str,
+        /// Its identifier.
+        id: String,
+    },
+    /// A stored value cannot be understood: the file was damaged or edited.
+    #[error("the record is damaged: {what}: {reason}")]
+    Damaged {
+        /// Which value.
+        what: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// Anything else the database reports.
+    #[error("database: {0}")]
+    Database(#[from] sqlx::Error),
+}
+
+/// Turns the violation of a named constraint into a specific error.
+pub trait OnConstraint<T> {
+    /// Replaces the error when it says that `name` was violated. For a CHECK, `name` is its name; for a
+    /// UNIQUE, SQLite reports the columns (`subjects.pseudonym`).
+    ///
+    /// # Errors
+    /// `error()` on that violation, otherwise the error as it was.
+    fn on_constraint<E: From<StoreError>>(self, name: &str, error: impl FnOnce() -> E) -> Result<T, E>;
+}
+
+impl<T> OnConstraint<T> for StoreResult<T> {
+    fn on_constraint<E: From<StoreError>>(self, name: &str, error: impl FnOnce() -> E) -> Result<T, E> {
+        self.map_err(|e| match &e {
+            StoreError::Database(sqlx::Error::Database(d)) if d.message().contains(name) => error(),
+            _ => e.into(),
+        })
+    }
+}

@@ -1,0 +1,74 @@
+//! Events: what happened in a study, for people who watch; replayed from any point.
+
+use super::{Connection, Instant, StoreResult, StudyId, json, now};
+use serde::Serialize;
+use sqlx::Row;
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Event {
+    /// Order over all studies.
+    pub seq: i64,
+    /// The study.
+    pub study_id: StudyId,
+    /// `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`, `feedback_retracted`.
+    pub kind: String,
+    /// What exactly, as JSON.
+    pub payload: serde_json::Value,
+    /// When.
+    pub created_at: Instant,
+}
+
+/// Appends an event to the transaction that makes it true.
+///
+/// # Errors
+/// What the database reports.
+pub async fn append<P: Serialize>(
+    db: &mut Connection,
+    study: StudyId,
+    kind: &'static str,
+    payload: &P,
+) -> StoreResult<()> {
+    sqlx::query("insert into events (study_id, kind, payload, created_at) values (?, ?, ?, ?)")
+        .bind(study)
+        .bind(kind)
+        .bind(json::to_text("event", payload)?)
+        .bind(now())
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// At most `limit` events of a study after a sequence number, in order.
+///
+/// # Errors
+/// What the database reports.
+pub async fn after(db: &mut Connection, study: StudyId, seq: i64, limit: u32) -> StoreResult<Vec<Event>> {
+    let rows = sqlx::query("select * from events where study_id = ? and seq > ? order by seq limit ?")
+        .bind(study)
+        .bind(seq)
+        .bind(limit)
+        .fetch_all(db)
+        .await?;
+    rows.iter()
+        .map(|row| {
+            Ok(Event {
+                seq: row.try_get("seq")?,
+                study_id: row.try_get("study_id")?,
+                kind: row.try_get("kind")?,
+                payload: json::column(row, "payload")?,
+                created_at: row.try_get("created_at")?,
+            })
+        })
+        .collect()
+}
+
+/// The sequence number of the last event of a study; 0 when there is none.
+///
+/// # Errors
+/// What the database reports.
+pub async fn last(db: &mut Connection, study: StudyId) -> StoreResult<i64> {
+    let row =
+        sqlx::query("select coalesce(max(seq), 0) from events where study_id = ?").bind(study).fetch_one(db).await?;
+    Ok(row.try_get(0)?)
+}

@@ -1,0 +1,289 @@
+//! Feedback: everything the learner ever hears, append-only, in the order it was heard.
+
+use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
+use gait_learner::ActionIndex;
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+
+/// Where an answer comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// Whether the solver converged.
+    Convergence,
+    /// The smaller Gait RMSE wins.
+    GaitRmse,
+    /// The subject said so.
+    Subject,
+    /// A clinician said so.
+    Clinician,
+    /// A program of the lab said so.
+    Script,
+}
+
+impl Source {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Convergence => "convergence",
+            Self::GaitRmse => "gait_rmse",
+            Self::Subject => "subject",
+            Self::Clinician => "clinician",
+            Self::Script => "script",
+        }
+    }
+}
+
+impl FromStr for Source {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Convergence, Self::GaitRmse, Self::Subject, Self::Clinician, Self::Script]
+            .into_iter()
+            .find(|source| source.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "feedback source", reason: text.to_owned() })
+    }
+}
+
+/// What was said, in terms of trials.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Said {
+    /// The trial falls into this ordinal category (0: not converged, 1: converged).
+    Label {
+        /// The trial.
+        trial: TrialId,
+        /// Its category.
+        category: u32,
+    },
+    /// One trial is better than another.
+    Preference {
+        /// The better one.
+        winner: TrialId,
+        /// The other.
+        loser: TrialId,
+    },
+    /// No difference between two trials.
+    Tie {
+        /// One.
+        a: TrialId,
+        /// The other.
+        b: TrialId,
+    },
+    /// This action would have been better than that trial.
+    Suggestion {
+        /// The action, as a grid index.
+        suggested: ActionIndex,
+        /// The trial.
+        over: TrialId,
+    },
+}
+
+/// A row of feedback.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FeedbackRow {
+    /// Order in which it was heard.
+    pub seq: i64,
+    /// Identifier.
+    pub id: FeedbackId,
+    /// The study.
+    pub study_id: StudyId,
+    /// What was said.
+    #[serde(flatten)]
+    pub said: Said,
+    /// Where it comes from.
+    pub source: Source,
+    /// Who said it.
+    pub author: String,
+    /// Free text.
+    pub note: String,
+    /// When it was written.
+    pub created_at: Instant,
+    /// Set when it was taken back.
+    pub retraction: Option<Retraction>,
+}
+
+/// Who took an answer back, when and why.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Retraction {
+    /// Who.
+    pub author: String,
+    /// Why: never empty.
+    pub reason: String,
+    /// When.
+    pub created_at: Instant,
+}
+
+/// Who says something.
+#[derive(Debug, Clone, Copy)]
+pub struct Voice<'a> {
+    /// Where it comes from.
+    pub source: Source,
+    /// Who.
+    pub author: &'a str,
+    /// Free text.
+    pub note: &'a str,
+}
+
+/// Appends a row.
+///
+/// # Errors
+/// A violated constraint or trigger, or what the database reports.
+pub async fn append(db: &mut Connection, study: StudyId, said: &Said, voice: Voice<'_>) -> StoreResult<FeedbackId> {
+    let id = FeedbackId::fresh();
+    let (kind, a, b, category, suggested) = match *said {
+        Said::Label { trial, category } => ("label", trial, None, Some(category), None),
+        Said::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
+        Said::Tie { a, b } => ("tie", a, Some(b), None, None),
+        Said::Suggestion { suggested, over } => {
+            ("suggestion", over, None, None, Some(i64::try_from(suggested.0).unwrap_or(i64::MAX)))
+        }
+    };
+    sqlx::query(
+        "insert into feedback (id, study_id, kind, trial_a, trial_b, category, suggested, source, author, note, \
+         created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(study)
+    .bind(kind)
+    .bind(a)
+    .bind(b)
+    .bind(category)
+    .bind(suggested)
+    .bind(voice.source.as_str())
+    .bind(voice.author)
+    .bind(voice.note)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// Takes a row back: it stays, the learner does not hear it any more. `false`: it was taken back already.
+///
+/// # Errors
+/// What the database reports.
+pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reason: &str) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into retractions (feedback_seq, author, reason, created_at) values (?, ?, ?, ?) \
+         on conflict (feedback_seq) do nothing",
+    )
+    .bind(row.seq)
+    .bind(author)
+    .bind(reason)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// The row with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow> {
+    let row = sqlx::query(
+        "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
+         from feedback f left join retractions r on r.feedback_seq = f.seq where f.id = ?",
+    )
+    .bind(id)
+    .fetch_optional(db)
+    .await?;
+    row.as_ref()
+        .map(from_row)
+        .transpose()?
+        .ok_or_else(|| StoreError::Missing { what: "preference", id: id.to_string() })
+}
+
+/// Every row of a study with a sequence number above `after`, retracted ones included, as heard.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreResult<Vec<FeedbackRow>> {
+    let rows = sqlx::query(
+        "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
+         from feedback f left join retractions r on r.feedback_seq = f.seq \
+         where f.study_id = ? and f.seq > ? order by f.seq",
+    )
+    .bind(study)
+    .bind(after)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The version of what a study has heard: changes with every row and every retraction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct LogVersion {
+    last: i64,
+    retracted: i64,
+}
+
+/// The present version.
+///
+/// # Errors
+/// What the database reports.
+pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<LogVersion> {
+    let row = sqlx::query(
+        "select coalesce(max(f.seq), 0) as last, count(r.feedback_seq) as retracted \
+         from feedback f left join retractions r on r.feedback_seq = f.seq where f.study_id = ?",
+    )
+    .bind(study)
+    .fetch_one(db)
+    .await?;
+    Ok(LogVersion { last: row.try_get("last")?, retracted: row.try_get("retracted")? })
+}
+
+/// The converged trial of a study that was recorded last, before the trial `except`.
+///
+/// # Errors
+/// What the database reports.
+pub async fn last_converged(db: &mut Connection, study: StudyId, except: TrialId) -> StoreResult<Option<TrialId>> {
+    let row = sqlx::query(
+        "select trial_a from feedback where study_id = ? and kind = 'label' and category > 0 and trial_a <> ? \
+         order by seq desc limit 1",
+    )
+    .bind(study)
+    .bind(except)
+    .fetch_optional(db)
+    .await?;
+    Ok(row.map(|r| r.try_get(0)).transpose()?)
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
+    let a: TrialId = row.try_get("trial_a")?;
+    let b: Option<TrialId> = row.try_get("trial_b")?;
+    let category: Option<u32> = row.try_get("category")?;
+    let suggested: Option<i64> = row.try_get("suggested")?;
+    let kind: &str = row.try_get("kind")?;
+    let said = match (kind, b, category, suggested) {
+        ("label", None, Some(category), None) => Said::Label { trial: a, category },
+        ("preference", Some(loser), None, None) => Said::Preference { winner: a, loser },
+        ("tie", Some(b), None, None) => Said::Tie { a, b },
+        ("suggestion", None, None, Some(index)) => {
+            Said::Suggestion { suggested: ActionIndex(u64::try_from(index).unwrap_or(0)), over: a }
+        }
+        _ => return Err(StoreError::Damaged { what: "feedback", reason: format!("a {kind} with other columns") }),
+    };
+    let retracted_at: Option<Instant> = row.try_get("retracted_at")?;
+    let retraction = match retracted_at {
+        None => None,
+        Some(created_at) => Some(Retraction {
+            author: row.try_get("retracted_by")?,
+            reason: row.try_get("retracted_because")?,
+            created_at,
+        }),
+    };
+    Ok(FeedbackRow {
+        seq: row.try_get("seq")?,
+        id: row.try_get("id")?,
+        study_id: row.try_get("study_id")?,
+        said,
+        source: row.try_get::<&str, _>("source")?.parse()?,
+        author: row.try_get("author")?,
+        note: row.try_get("note")?,
+        created_at: row.try_get("created_at")?,
+        retraction,
+    })
+}

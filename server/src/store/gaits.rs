@@ -1,0 +1,130 @@
+//! Gaits: the trajectory of a finished solve, kept as the optimiser wrote it.
+
+use super::{Connection, StoreError, StoreResult, TrialId, json, now};
+use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
+use sqlx::Row;
+
+/// A gait made ready to be written: compressing takes CPU time and happens outside any transaction.
+#[derive(Debug)]
+pub struct PackedGait {
+    format_version: u32,
+    speed_m_s: Option<f64>,
+    stride_length_m: Option<f64>,
+    stride_time_s: Option<f64>,
+    gait: Vec<u8>,
+    warm_start: Vec<u8>,
+    iterations: Vec<u8>,
+    sha256: String,
+}
+
+impl PackedGait {
+    /// Serialises and compresses what a solve gave. `None` when it holds numbers that are not finite: the
+    /// last iterate of a diverging solve is nothing to show or to start from.
+    ///
+    /// # Errors
+    /// When serialising fails.
+    pub fn new(outcome: &SolveOutcome, iterations: &[IterationRecord]) -> StoreResult<Option<Self>> {
+        let gait = json::to_text("gait", &outcome.gait)?;
+        let warm_start = json::to_text("warm start", &outcome.warm_start)?;
+        // JSON has no word for such numbers: they are written as null and cannot be read back.
+        if serde_json::from_str::<Gait>(&gait).is_err() || serde_json::from_str::<WarmStart>(&warm_start).is_err() {
+            return Ok(None);
+        }
+        let finite: Vec<&IterationRecord> = iterations.iter().filter(|record| is_finite(record)).collect();
+        Ok(Some(Self {
+            format_version: outcome.gait.format_version,
+            speed_m_s: Some(outcome.gait.speed_m_s),
+            stride_length_m: Some(outcome.gait.stride_length_m),
+            stride_time_s: Some(outcome.gait.stride_time_s),
+            sha256: json::sha256(gait.as_bytes()),
+            gait: json::compress("gait", gait.as_bytes())?,
+            warm_start: json::compress("warm start", warm_start.as_bytes())?,
+            iterations: json::compress("iterations", json::to_text("iterations", &finite)?.as_bytes())?,
+        }))
+    }
+}
+
+fn is_finite(record: &IterationRecord) -> bool {
+    [record.objective, record.constraint_violation, record.dual_infeasibility, record.barrier, record.step]
+        .iter()
+        .all(|x| x.is_finite())
+}
+
+/// Writes the gait of a trial.
+///
+/// # Errors
+/// A violated constraint when it has one already, or what the database reports.
+pub async fn insert(db: &mut Connection, trial: TrialId, packed: &PackedGait) -> StoreResult<()> {
+    sqlx::query(
+        "insert into gaits (trial_id, format_version, speed_m_s, stride_length_m, stride_time_s, gait, warm_start, \
+         iterations, gait_sha256, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(trial)
+    .bind(packed.format_version)
+    .bind(packed.speed_m_s)
+    .bind(packed.stride_length_m)
+    .bind(packed.stride_time_s)
+    .bind(&packed.gait[..])
+    .bind(&packed.warm_start[..])
+    .bind(&packed.iterations[..])
+    .bind(&packed.sha256)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// The gait of a trial, as JSON text.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has none, [`StoreError::Damaged`] when its hash is wrong.
+pub async fn json_of(db: &mut Connection, trial: TrialId) -> StoreResult<String> {
+    let row = sqlx::query("select gait, gait_sha256 from gaits where trial_id = ?")
+        .bind(trial)
+        .fetch_optional(db)
+        .await?
+        .ok_or_else(|| missing(trial))?;
+    let bytes = json::decompress("gait", row.try_get("gait")?)?;
+    if json::sha256(&bytes) != row.try_get::<&str, _>("gait_sha256")? {
+        return Err(StoreError::Damaged { what: "gait", reason: format!("the gait of trial {trial} has changed") });
+    }
+    String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
+}
+
+/// The gait of a trial.
+///
+/// # Errors
+/// As [`json_of`].
+pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Gait> {
+    json::from_text("gait", &json_of(db, trial).await?)
+}
+
+/// What another solve can start from.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<WarmStart> {
+    parse_column(db, trial, "select warm_start from gaits where trial_id = ?").await
+}
+
+/// The iterations of the solve.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<IterationRecord>> {
+    parse_column(db, trial, "select iterations from gaits where trial_id = ?").await
+}
+
+async fn parse_column<T: serde::de::DeserializeOwned>(
+    db: &mut Connection,
+    trial: TrialId,
+    sql: &'static str,
+) -> StoreResult<T> {
+    let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?.ok_or_else(|| missing(trial))?;
+    let bytes = json::decompress("gait", row.try_get(0)?)?;
+    serde_json::from_slice(&bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
+}
+
+fn missing(trial: TrialId) -> StoreError {
+    StoreError::Missing { what: "gait of trial", id: trial.to_string() }
+}

@@ -1,0 +1,73 @@
+//! Identifiers: UUIDv7, one type per noun, so that a trial is never taken for a study.
+
+use serde::{Deserialize, Serialize};
+use sqlx::encode::IsNull;
+use sqlx::error::BoxDynError;
+use sqlx::{Decode, Encode, Sqlite, Type};
+use std::fmt;
+use std::str::FromStr;
+use uuid::Uuid;
+
+macro_rules! identifier {
+    ($name:ident, $what:literal) => {
+        #[doc = concat!("Identifier of a ", $what, ".")]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        #[serde(transparent)]
+        pub struct $name(Uuid);
+
+        impl $name {
+            /// A fresh identifier, later than every earlier one of this process.
+            pub fn fresh() -> Self {
+                Self(Uuid::now_v7())
+            }
+
+            /// The last characters: enough for people to tell rows apart.
+            pub fn short(self) -> String {
+                let text = self.0.simple().to_string();
+                text[text.len() - 8..].to_owned()
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.hyphenated().fmt(f)
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = uuid::Error;
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                Uuid::parse_str(text).map(Self)
+            }
+        }
+
+        impl Type<Sqlite> for $name {
+            fn type_info() -> sqlx::sqlite::SqliteTypeInfo {
+                <String as Type<Sqlite>>::type_info()
+            }
+        }
+
+        impl Encode<'_, Sqlite> for $name {
+            fn encode_by_ref(
+                &self,
+                buffer: &mut <Sqlite as sqlx::Database>::ArgumentBuffer,
+            ) -> Result<IsNull, BoxDynError> {
+                <String as Encode<'_, Sqlite>>::encode(self.to_string(), buffer)
+            }
+        }
+
+        impl Decode<'_, Sqlite> for $name {
+            fn decode(value: <Sqlite as sqlx::Database>::ValueRef<'_>) -> Result<Self, BoxDynError> {
+                Ok(<&str as Decode<'_, Sqlite>>::decode(value)?.parse()?)
+            }
+        }
+    };
+}
+
+identifier!(SubjectId, "subject");
+identifier!(DeviceId, "device");
+identifier!(ReferenceGaitId, "reference gait");
+identifier!(StudyId, "study");
+identifier!(TrialId, "trial");
+identifier!(FeedbackId, "feedback row");
+identifier!(JobId, "job");

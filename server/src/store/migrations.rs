@@ -1,0 +1,39 @@
+//! The schema: numbered SQL files, embedded, applied at start in one go.
+
+use super::{StoreError, StoreResult};
+use sqlx::migrate::{Migration, MigrationType, Migrator};
+use sqlx::{Row, SqlSafeStr, SqlitePool};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Version, description and text of each migration. An applied file is never edited: add the next one.
+const FILES: [(i64, &str, &str); 1] = [(1, "studies", include_str!("../../../migrations/0001_studies.sql"))];
+
+pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
+    let known = FILES[FILES.len() - 1].0;
+    let found = version(pool).await?;
+    if found > known {
+        return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
+    }
+    let migrations = FILES
+        .into_iter()
+        .map(|(version, description, sql)| {
+            let description = Cow::Borrowed(description);
+            Migration::new(version, description, MigrationType::Simple, sql.into_sql_str(), false)
+        })
+        .collect();
+    Migrator::with_migrations(migrations).run(pool).await?;
+    Ok(())
+}
+
+/// The newest migration that was applied; 0 for a fresh file.
+async fn version(pool: &SqlitePool) -> StoreResult<i64> {
+    let table = sqlx::query("select 1 from sqlite_master where type = 'table' and name = '_sqlx_migrations'")
+        .fetch_optional(pool)
+        .await?;
+    if table.is_none() {
+        return Ok(0);
+    }
+    let row = sqlx::query("select coalesce(max(version), 0) from _sqlx_migrations").fetch_one(pool).await?;
+    Ok(row.try_get(0)?)
+}

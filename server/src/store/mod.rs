@@ -1,0 +1,127 @@
+//! The record: one SQLite file, owned by one process.
+//!
+//! Only this module names SQL. Reads go through a small pool of read-only connections that never block;
+//! writes go through one connection with `BEGIN IMMEDIATE`, so that no writer ever meets `SQLITE_BUSY`.
+//! A transaction never spans CPU or network work.
+
+pub mod devices;
+mod error;
+pub mod events;
+pub mod feedback;
+pub mod gaits;
+mod id;
+pub mod jobs;
+mod json;
+mod migrations;
+pub mod reference_gaits;
+pub mod studies;
+pub mod subjects;
+mod time;
+pub mod trials;
+
+pub use error::{OnConstraint, StoreError, StoreResult};
+pub use id::{DeviceId, FeedbackId, JobId, ReferenceGaitId, StudyId, SubjectId, TrialId};
+pub use time::{Instant, now};
+
+use sqlx::pool::PoolConnection;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A connection to read with. Sees one consistent state per statement.
+pub type Reader = PoolConnection<Sqlite>;
+
+/// A write transaction: everything in it happens, or nothing.
+pub type Writer = Transaction<'static, Sqlite>;
+
+/// The open record.
+#[derive(Debug, Clone)]
+pub struct Store {
+    /// Read-only connections.
+    readers: SqlitePool,
+    /// The one connection that writes.
+    writer: SqlitePool,
+    /// Where the file is, for messages.
+    path: PathBuf,
+    /// Held as long as any clone lives: a second process that opens the file for writing is refused.
+    _owner: Arc<File>,
+}
+
+impl Store {
+    /// Opens or creates the file, takes ownership of it and brings its schema up to date.
+    ///
+    /// # Errors
+    /// [`StoreError::InUse`] when another process owns the file, [`StoreError::NewerSchema`] when a newer
+    /// version of the program wrote it, otherwise what the database reports.
+    pub async fn open(path: &Path) -> StoreResult<Self> {
+        let owner = take_ownership(path)?;
+        let options = SqliteConnectOptions::new()
+            .filename(path)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .synchronous(SqliteSynchronous::Full)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(10));
+        let writer = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
+        migrations::apply(&writer, path).await?;
+        let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
+        Ok(Self { readers, writer, path: path.to_owned(), _owner: Arc::new(owner) })
+    }
+
+    /// A connection to read with.
+    ///
+    /// # Errors
+    /// When no connection can be had.
+    pub async fn read(&self) -> StoreResult<Reader> {
+        Ok(self.readers.acquire().await?)
+    }
+
+    /// Begins a write transaction; dropped without [`commit`], it leaves no trace.
+    ///
+    /// # Errors
+    /// When no transaction can be begun.
+    pub async fn write(&self) -> StoreResult<Writer> {
+        Ok(self.writer.begin_with("begin immediate").await?)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Closes every connection, folding the write-ahead log into the file.
+    pub async fn close(&self) {
+        self.readers.close().await;
+        self.writer.close().await;
+    }
+}
+
+/// Makes the changes of a transaction durable.
+///
+/// # Errors
+/// When the database cannot; nothing has happened then.
+pub async fn commit(writer: Writer) -> StoreResult<()> {
+    Ok(writer.commit().await?)
+}
+
+/// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].
+pub type Connection = SqliteConnection;
+
+fn take_ownership(path: &Path) -> StoreResult<File> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".lock");
+    let file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(PathBuf::from(name))
+        .map_err(|source| StoreError::Open { path: path.to_owned(), source })?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::InUse { path: path.to_owned() }),
+        Err(TryLockError::Error(source)) => Err(StoreError::Open { path: path.to_owned(), source }),
+    }
+}

@@ -1,0 +1,79 @@
+//! Reference gaits: what Gait RMSE is measured against.
+
+use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json, now};
+use gait_optimizer::ReferenceGait as Definition;
+use serde::Serialize;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+/// A reference gait of the record. A changed definition is a new row: studies keep what they used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReferenceGait {
+    /// Identifier.
+    pub id: ReferenceGaitId,
+    /// Name shown to people.
+    pub name: String,
+    /// The reference gait itself.
+    pub definition: Definition,
+    /// When the row was written.
+    pub created_at: Instant,
+}
+
+/// The row with this very definition, added if it is not there yet.
+///
+/// # Errors
+/// What the database reports.
+pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<ReferenceGait> {
+    let text = json::to_text("reference gait", definition)?;
+    let hash = json::sha256(text.as_bytes());
+    let found =
+        sqlx::query("select * from reference_gaits where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
+    if let Some(row) = found {
+        return from_row(&row);
+    }
+    let added = ReferenceGait {
+        id: ReferenceGaitId::fresh(),
+        name: definition.name.clone(),
+        definition: definition.clone(),
+        created_at: now(),
+    };
+    sqlx::query("insert into reference_gaits (id, name, definition, sha256, created_at) values (?, ?, ?, ?, ?)")
+        .bind(added.id)
+        .bind(&added.name)
+        .bind(text)
+        .bind(hash)
+        .bind(added.created_at)
+        .execute(db)
+        .await?;
+    Ok(added)
+}
+
+/// The reference gait with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: ReferenceGaitId) -> StoreResult<ReferenceGait> {
+    let row = sqlx::query("select * from reference_gaits where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref()
+        .map(from_row)
+        .transpose()?
+        .ok_or_else(|| StoreError::Missing { what: "reference gait", id: id.to_string() })
+}
+
+/// Every reference gait, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<ReferenceGait>> {
+    let rows = sqlx::query("select * from reference_gaits order by id desc").fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<ReferenceGait> {
+    Ok(ReferenceGait {
+        id: row.try_get("id")?,
+        name: row.try_get("name")?,
+        definition: json::column(row, "definition")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

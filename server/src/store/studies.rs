@@ -1,0 +1,264 @@
+//! Studies: one tuning each.
+
+use super::{Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now};
+use gait_learner::{LearnerSettings, SearchSpace};
+use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+
+/// Where a study stands. Which change is allowed is decided in `studies::lifecycle`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StudyState {
+    /// Being set up: nothing runs.
+    Draft,
+    /// Proposing and evaluating.
+    Running,
+    /// Waiting for a person's answer.
+    Waiting,
+    /// Held by a person.
+    Paused,
+    /// Reached its budget or its stopping rule.
+    Finished,
+    /// Ended by a person before that.
+    Stopped,
+}
+
+impl StudyState {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Running => "running",
+            Self::Waiting => "waiting",
+            Self::Paused => "paused",
+            Self::Finished => "finished",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+impl FromStr for StudyState {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Draft, Self::Running, Self::Waiting, Self::Paused, Self::Finished, Self::Stopped]
+            .into_iter()
+            .find(|state| state.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "study state", reason: text.to_owned() })
+    }
+}
+
+/// Who answers the comparisons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FeedbackMode {
+    /// Gait RMSE answers every comparison.
+    Automatic,
+    /// People answer; the study waits for them.
+    Human,
+    /// Gait RMSE answers, people may add answers of their own.
+    Mixed,
+}
+
+impl FeedbackMode {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Automatic => "automatic",
+            Self::Human => "human",
+            Self::Mixed => "mixed",
+        }
+    }
+}
+
+impl FromStr for FeedbackMode {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Automatic, Self::Human, Self::Mixed]
+            .into_iter()
+            .find(|mode| mode.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "feedback mode", reason: text.to_owned() })
+    }
+}
+
+/// What a study is made of; fixed once it has left `draft`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StudyPlan {
+    /// Name shown to people.
+    pub name: String,
+    /// Who walks.
+    pub subject_id: SubjectId,
+    /// With which device.
+    pub device_id: DeviceId,
+    /// What Gait RMSE is measured against.
+    pub reference_gait_id: ReferenceGaitId,
+    /// With muscles (C1-C12) or without (C1-C4).
+    pub muscles: bool,
+    /// Settings of the gait problem.
+    pub gait_settings: GaitSettings,
+    /// Limits of one solve.
+    pub solve_options: SolveOptions,
+    /// Values of the bounds that are not tuned.
+    pub base_bounds: TunedBounds,
+    /// What is tuned: dimensions named `a1`..`a8`.
+    pub search_space: SearchSpace,
+    /// Settings of the learner.
+    pub learner: LearnerSettings,
+    /// Who answers the comparisons.
+    pub feedback_mode: FeedbackMode,
+    /// How many trials.
+    pub trial_budget: u32,
+    /// How many trials at the same time; 1 is the published, reproducible order.
+    pub parallel_trials: u32,
+    /// Higher runs first.
+    pub priority: i32,
+    /// Every random draw of the study derives from it.
+    pub seed: u64,
+}
+
+/// A study of the record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Study {
+    /// Identifier.
+    pub id: StudyId,
+    /// What it is made of.
+    #[serde(flatten)]
+    pub plan: StudyPlan,
+    /// Where it stands.
+    pub state: StudyState,
+    /// Why it stands there, in words; may be empty.
+    pub state_reason: String,
+    /// Counts the changes of the row.
+    pub revision: i64,
+    /// When it was made.
+    pub created_at: Instant,
+    /// When it last changed.
+    pub updated_at: Instant,
+}
+
+/// Adds a study.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn insert(db: &mut Connection, plan: &StudyPlan, state: StudyState) -> StoreResult<Study> {
+    let at = now();
+    let id = StudyId::fresh();
+    sqlx::query(
+        "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
+         solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
+         seed, state, created_at, updated_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(&plan.name)
+    .bind(plan.subject_id)
+    .bind(plan.device_id)
+    .bind(plan.reference_gait_id)
+    .bind(plan.muscles)
+    .bind(json::to_text("gait settings", &plan.gait_settings)?)
+    .bind(json::to_text("solve options", &plan.solve_options)?)
+    .bind(json::to_text("base bounds", &plan.base_bounds)?)
+    .bind(json::to_text("search space", &plan.search_space)?)
+    .bind(json::to_text("learner settings", &plan.learner)?)
+    .bind(plan.feedback_mode.as_str())
+    .bind(plan.trial_budget)
+    .bind(plan.parallel_trials)
+    .bind(plan.priority)
+    .bind(i64::try_from(plan.seed).unwrap_or(i64::MAX))
+    .bind(state.as_str())
+    .bind(at)
+    .bind(at)
+    .execute(db)
+    .await?;
+    Ok(Study {
+        id,
+        plan: plan.clone(),
+        state,
+        state_reason: String::new(),
+        revision: 1,
+        created_at: at,
+        updated_at: at,
+    })
+}
+
+/// The study with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
+    let row = sqlx::query("select * from studies where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "study", id: id.to_string() })
+}
+
+/// At most `limit` studies older than `before`, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn page(db: &mut Connection, before: Option<StudyId>, limit: u32) -> StoreResult<Vec<Study>> {
+    let rows = sqlx::query("select * from studies where ? is null or id < ? order by id desc limit ?")
+        .bind(before)
+        .bind(before)
+        .bind(limit)
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Every study that proposes trials by itself, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
+    let rows = sqlx::query("select * from studies where state in ('running', 'waiting') order by priority desc, id")
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Moves a study to another state, if it still is in the state it was read in. `false`: it was not.
+///
+/// # Errors
+/// What the database reports.
+pub async fn set_state(db: &mut Connection, study: &Study, state: StudyState, reason: &str) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "update studies set state = ?, state_reason = ?, revision = revision + 1, updated_at = ? \
+         where id = ? and state = ?",
+    )
+    .bind(state.as_str())
+    .bind(reason)
+    .bind(now())
+    .bind(study.id)
+    .bind(study.state.as_str())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Study> {
+    Ok(Study {
+        id: row.try_get("id")?,
+        plan: StudyPlan {
+            name: row.try_get("name")?,
+            subject_id: row.try_get("subject_id")?,
+            device_id: row.try_get("device_id")?,
+            reference_gait_id: row.try_get("reference_gait_id")?,
+            muscles: row.try_get("muscles")?,
+            gait_settings: json::column(row, "gait_settings")?,
+            solve_options: json::column(row, "solve_options")?,
+            base_bounds: json::column(row, "base_bounds")?,
+            search_space: json::column(row, "search_space")?,
+            learner: json::column(row, "learner")?,
+            feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
+            trial_budget: row.try_get("trial_budget")?,
+            parallel_trials: row.try_get("parallel_trials")?,
+            priority: row.try_get("priority")?,
+            seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),
+        },
+        state: row.try_get::<&str, _>("state")?.parse()?,
+        state_reason: row.try_get("state_reason")?,
+        revision: row.try_get("revision")?,
+        created_at: row.try_get("created_at")?,
+        updated_at: row.try_get("updated_at")?,
+    })
+}

@@ -1,0 +1,99 @@
+//! Subjects: people, by pseudonym only.
+
+use super::{Connection, Instant, StoreError, StoreResult, SubjectId, now};
+use gait_optimizer::Subject as Body;
+use serde::Serialize;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+/// A person who walks, under a pseudonym that the site gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Subject {
+    /// Identifier.
+    pub id: SubjectId,
+    /// Site-given pseudonym, unique.
+    pub pseudonym: String,
+    /// Body height, m.
+    pub height_m: f64,
+    /// Body mass, kg.
+    pub body_mass_kg: f64,
+    /// Free text.
+    pub notes: String,
+    /// When the row was written.
+    pub created_at: Instant,
+}
+
+impl Subject {
+    /// What the walking model is scaled by.
+    pub fn body(&self) -> Body {
+        Body { height_m: self.height_m, body_mass_kg: self.body_mass_kg }
+    }
+}
+
+/// The unique pseudonym, as SQLite names it in a violation.
+pub const PSEUDONYM_UNIQUE: &str = "subjects.pseudonym";
+
+/// Adds a subject.
+///
+/// # Errors
+/// A violated constraint ([`PSEUDONYM_UNIQUE`]), or what the database reports.
+pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &str) -> StoreResult<Subject> {
+    let subject = Subject {
+        id: SubjectId::fresh(),
+        pseudonym: pseudonym.to_owned(),
+        height_m: body.height_m,
+        body_mass_kg: body.body_mass_kg,
+        notes: notes.to_owned(),
+        created_at: now(),
+    };
+    sqlx::query(
+        "insert into subjects (id, pseudonym, height_m, body_mass_kg, notes, created_at) values (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(subject.id)
+    .bind(&subject.pseudonym)
+    .bind(subject.height_m)
+    .bind(subject.body_mass_kg)
+    .bind(&subject.notes)
+    .bind(subject.created_at)
+    .execute(db)
+    .await?;
+    Ok(subject)
+}
+
+/// The subject with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
+    let row = sqlx::query("select * from subjects where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "subject", id: id.to_string() })
+}
+
+/// The subject with this pseudonym, if there is one.
+///
+/// # Errors
+/// What the database reports.
+pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<Option<Subject>> {
+    let row = sqlx::query("select * from subjects where pseudonym = ?").bind(pseudonym).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// Every subject, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
+    let rows = sqlx::query("select * from subjects order by id desc").fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Subject> {
+    Ok(Subject {
+        id: row.try_get("id")?,
+        pseudonym: row.try_get("pseudonym")?,
+        height_m: row.try_get("height_m")?,
+        body_mass_kg: row.try_get("body_mass_kg")?,
+        notes: row.try_get("notes")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

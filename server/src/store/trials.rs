@@ -1,0 +1,343 @@
+//! Trials: one action of a study and what it gave.
+
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json, now};
+use gait_learner::ActionIndex;
+use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+
+/// Where a trial stands. Which change is allowed is decided in `studies::trial_state`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TrialState {
+    /// Waiting for a worker.
+    Queued,
+    /// A worker solves it.
+    Running,
+    /// The solver found a gait: a result.
+    Converged,
+    /// The solver ended without a gait: also a result.
+    NotConverged,
+    /// The program failed (panic, error, time limit): not a result, the learner never hears of it.
+    Failed,
+    /// Its workers were not heard of again: not a result.
+    Lost,
+    /// Ended by a person.
+    Cancelled,
+}
+
+impl TrialState {
+    /// Every state.
+    pub const ALL: [Self; 7] =
+        [Self::Queued, Self::Running, Self::Converged, Self::NotConverged, Self::Failed, Self::Lost, Self::Cancelled];
+
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Converged => "converged",
+            Self::NotConverged => "not_converged",
+            Self::Failed => "failed",
+            Self::Lost => "lost",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// Waiting or being solved.
+    pub fn is_open(self) -> bool {
+        matches!(self, Self::Queued | Self::Running)
+    }
+
+    /// Converged or not converged: what the learner hears.
+    pub fn is_result(self) -> bool {
+        matches!(self, Self::Converged | Self::NotConverged)
+    }
+}
+
+impl FromStr for TrialState {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|state| state.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "trial state", reason: text.to_owned() })
+    }
+}
+
+/// A trial of the record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trial {
+    /// Identifier.
+    pub id: TrialId,
+    /// The study it belongs to.
+    pub study_id: StudyId,
+    /// 1, 2, ... within the study, in the order of proposal.
+    pub number: u32,
+    /// The action as a grid index of the study's search space.
+    pub action_index: ActionIndex,
+    /// The action as bounds.
+    pub action: TunedBounds,
+    /// Why the learner chose it.
+    pub reason: String,
+    /// The best trial when this one was proposed.
+    pub best_before: Option<TrialId>,
+    /// The trial whose gait its solve starts from; `None`: cold start.
+    pub warm_started_from: Option<TrialId>,
+    /// Where it stands.
+    pub state: TrialState,
+    /// How the solve ended.
+    pub status: Option<SolveStatus>,
+    /// Gait RMSE, rad.
+    pub gait_rmse_rad: Option<f64>,
+    /// Cost of transport, dimensionless.
+    pub cost_of_transport: Option<f64>,
+    /// Objective of the solve.
+    pub objective: Option<f64>,
+    /// Largest violation, scaled.
+    pub max_violation: Option<f64>,
+    /// Interior-point iterations.
+    pub iterations: Option<u32>,
+    /// Wall time of the solve, s.
+    pub seconds_total: Option<f64>,
+    /// All figures of the solve.
+    pub report: Option<SolveReport>,
+    /// The most violated rows, worst first.
+    pub violations: Vec<Violation>,
+    /// What to tell people about how it ended; may be empty.
+    pub message: String,
+    /// When it was proposed.
+    pub created_at: Instant,
+    /// When a worker first took it.
+    pub started_at: Option<Instant>,
+    /// When it ended.
+    pub finished_at: Option<Instant>,
+}
+
+/// A proposal: what a new trial is.
+#[derive(Debug, Clone)]
+pub struct NewTrial {
+    /// 1, 2, ... within the study.
+    pub number: u32,
+    /// The action as a grid index.
+    pub action_index: ActionIndex,
+    /// The action as bounds.
+    pub action: TunedBounds,
+    /// Why the learner chose it.
+    pub reason: String,
+    /// The best trial so far.
+    pub best_before: Option<TrialId>,
+    /// Whose gait to start from.
+    pub warm_started_from: Option<TrialId>,
+}
+
+/// How a trial ended.
+#[derive(Debug, Clone)]
+pub struct TrialEnd {
+    /// One of the states that are not open.
+    pub state: TrialState,
+    /// The figures, for a finished solve.
+    pub report: Option<SolveReport>,
+    /// The most violated rows.
+    pub violations: Vec<Violation>,
+    /// What to tell people; may be empty.
+    pub message: String,
+}
+
+/// Adds a trial in state `queued`.
+///
+/// # Errors
+/// A violated constraint (`trials_number_unique`), or what the database reports.
+pub async fn insert(db: &mut Connection, study: StudyId, new: &NewTrial) -> StoreResult<TrialId> {
+    let id = TrialId::fresh();
+    sqlx::query(
+        "insert into trials (id, study_id, number, action_index, action, reason, best_before, warm_started_from, \
+         state, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, 'queued', ?)",
+    )
+    .bind(id)
+    .bind(study)
+    .bind(new.number)
+    .bind(i64::try_from(new.action_index.0).unwrap_or(i64::MAX))
+    .bind(json::to_text("action", &new.action)?)
+    .bind(&new.reason)
+    .bind(new.best_before)
+    .bind(new.warm_started_from)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// The trial with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: TrialId) -> StoreResult<Trial> {
+    let row = sqlx::query("select * from trials where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "trial", id: id.to_string() })
+}
+
+/// Every trial of a study, by number.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Trial>> {
+    page(db, study, 0, u32::MAX).await
+}
+
+/// At most `limit` trials of a study with numbers above `after`, by number.
+///
+/// # Errors
+/// What the database reports.
+pub async fn page(db: &mut Connection, study: StudyId, after: u32, limit: u32) -> StoreResult<Vec<Trial>> {
+    let rows = sqlx::query("select * from trials where study_id = ? and number > ? order by number limit ?")
+        .bind(study)
+        .bind(after)
+        .bind(limit)
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Moves a trial to `running`.
+///
+/// # Errors
+/// What the database reports.
+pub async fn start(db: &mut Connection, id: TrialId) -> StoreResult<()> {
+    sqlx::query("update trials set state = 'running', started_at = coalesce(started_at, ?) where id = ?")
+        .bind(now())
+        .bind(id)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Puts a trial back into the queue.
+///
+/// # Errors
+/// What the database reports.
+pub async fn requeue(db: &mut Connection, id: TrialId, message: &str) -> StoreResult<()> {
+    sqlx::query("update trials set state = 'queued', message = ?, finished_at = null where id = ?")
+        .bind(message)
+        .bind(id)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Writes how a trial ended.
+///
+/// # Errors
+/// A trigger's refusal when the trial already has a result, or what the database reports.
+pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreResult<()> {
+    let figures = end.report.as_ref();
+    // A figure that is not a number stays out of the record (the column is null).
+    let finite = |f: fn(&SolveReport) -> f64| figures.map(f).filter(|x| x.is_finite());
+    let status = figures.map(|r| json::to_text("status", &r.status)).transpose()?;
+    // JSON has no word for numbers that are not finite: such a document could not be read back.
+    let report = figures.map(|r| json::to_text("report", r)).transpose()?;
+    let report = report.filter(|text| serde_json::from_str::<SolveReport>(text).is_ok());
+    let violations: Vec<&Violation> = end.violations.iter().filter(|v| v.amount.is_finite()).collect();
+    sqlx::query(
+        "update trials set state = ?, status = ?, gait_rmse_rad = ?, cost_of_transport = ?, objective = ?, \
+         max_violation = ?, iterations = ?, seconds_total = ?, report = ?, violations = ?, message = ?, \
+         finished_at = ? where id = ?",
+    )
+    .bind(end.state.as_str())
+    .bind(status)
+    .bind(finite(|r| r.gait_rmse_rad))
+    .bind(finite(|r| r.cost_of_transport))
+    .bind(finite(|r| r.objective))
+    .bind(finite(|r| r.max_violation))
+    .bind(figures.map(|r| i64::try_from(r.iterations).unwrap_or(i64::MAX)))
+    .bind(finite(|r| r.seconds_total))
+    .bind(report)
+    .bind(json::to_text("violations", &violations)?)
+    .bind(&end.message)
+    .bind(now())
+    .bind(id)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// How many trials of a study are in each state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct TrialCounts {
+    /// All of them.
+    pub total: u32,
+    /// Queued or running.
+    pub open: u32,
+    /// Converged.
+    pub converged: u32,
+    /// Not converged.
+    pub not_converged: u32,
+    /// Failed, lost or cancelled.
+    pub without_result: u32,
+}
+
+/// Counts the trials of a study.
+///
+/// # Errors
+/// What the database reports.
+pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCounts> {
+    let row = sqlx::query(
+        "select count(*) as total, \
+         coalesce(sum(state in ('queued', 'running')), 0) as open, \
+         coalesce(sum(state = 'converged'), 0) as converged, \
+         coalesce(sum(state = 'not_converged'), 0) as not_converged, \
+         coalesce(sum(state in ('failed', 'lost', 'cancelled')), 0) as without_result \
+         from trials where study_id = ?",
+    )
+    .bind(study)
+    .fetch_one(db)
+    .await?;
+    Ok(TrialCounts {
+        total: row.try_get("total")?,
+        open: row.try_get("open")?,
+        converged: row.try_get("converged")?,
+        not_converged: row.try_get("not_converged")?,
+        without_result: row.try_get("without_result")?,
+    })
+}
+
+/// The smallest Gait RMSE of the converged trials of a study, rad.
+///
+/// # Errors
+/// What the database reports.
+pub async fn smallest_rmse(db: &mut Connection, study: StudyId) -> StoreResult<Option<f64>> {
+    let row = sqlx::query("select min(gait_rmse_rad) from trials where study_id = ? and state = 'converged'")
+        .bind(study)
+        .fetch_one(db)
+        .await?;
+    Ok(row.try_get(0)?)
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
+    Ok(Trial {
+        id: row.try_get("id")?,
+        study_id: row.try_get("study_id")?,
+        number: row.try_get("number")?,
+        action_index: ActionIndex(u64::try_from(row.try_get::<i64, _>("action_index")?).unwrap_or(0)),
+        action: json::column(row, "action")?,
+        reason: row.try_get("reason")?,
+        best_before: row.try_get("best_before")?,
+        warm_started_from: row.try_get("warm_started_from")?,
+        state: row.try_get::<&str, _>("state")?.parse()?,
+        status: json::optional_column(row, "status")?,
+        gait_rmse_rad: row.try_get("gait_rmse_rad")?,
+        cost_of_transport: row.try_get("cost_of_transport")?,
+        objective: row.try_get("objective")?,
+        max_violation: row.try_get("max_violation")?,
+        iterations: row.try_get("iterations")?,
+        seconds_total: row.try_get("seconds_total")?,
+        report: json::optional_column(row, "report")?,
+        violations: json::optional_column(row, "violations")?.unwrap_or_default(),
+        message: row.try_get("message")?,
+        created_at: row.try_get("created_at")?,
+        started_at: row.try_get("started_at")?,
+        finished_at: row.try_get("finished_at")?,
+    })
+}

@@ -1,0 +1,115 @@
+//! A person's or a script's answer to a comparison: one way in for the form and the REST interface.
+
+use crate::error::Error;
+use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
+use crate::store::trials::{Trial, TrialState};
+use crate::store::{FeedbackId, StudyId, TrialId, Writer, events, feedback, studies, trials};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+/// Which of two gaits is better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The first.
+    A,
+    /// The second.
+    B,
+    /// Neither.
+    NoDifference,
+}
+
+/// An answer.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Answer {
+    /// The first gait.
+    pub trial_a: TrialId,
+    /// The second gait.
+    pub trial_b: TrialId,
+    /// Which is better.
+    pub answer: Verdict,
+    /// Who says so: `subject`, `clinician` or `script`.
+    #[serde(default = "clinician")]
+    pub source: Source,
+    /// Name or pseudonym of who says so.
+    #[serde(default = "unnamed")]
+    pub author: String,
+    /// Free text.
+    #[serde(default)]
+    pub note: String,
+}
+
+fn clinician() -> Source {
+    Source::Clinician
+}
+
+fn unnamed() -> String {
+    "not signed in".to_owned()
+}
+
+/// Writes an answer.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
+pub async fn give(writer: &mut Writer, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
+    let study = studies::get(writer, study).await?;
+    if answer.trial_a == answer.trial_b {
+        let allowed = "another trial than trial_a: a gait cannot be compared with itself";
+        return Err(Error::invalid("trial_b", answer.trial_b.to_string(), allowed));
+    }
+    comparable(writer, study.id, "trial_a", answer.trial_a).await?;
+    comparable(writer, study.id, "trial_b", answer.trial_b).await?;
+    if !matches!(answer.source, Source::Subject | Source::Clinician | Source::Script) {
+        return Err(Error::invalid("source", answer.source.as_str(), "subject, clinician, script"));
+    }
+    let author = answer.author.trim();
+    if author.is_empty() || author.chars().count() > 80 {
+        return Err(Error::invalid("author", author, "1 to 80 characters"));
+    }
+    if answer.note.chars().count() > 2000 {
+        return Err(Error::invalid("note", answer.note.chars().count(), "at most 2000 characters"));
+    }
+    let (a, b) = (answer.trial_a, answer.trial_b);
+    let said = match answer.answer {
+        Verdict::A => Said::Preference { winner: a, loser: b },
+        Verdict::B => Said::Preference { winner: b, loser: a },
+        Verdict::NoDifference => Said::Tie { a, b },
+    };
+    let voice = Voice { source: answer.source, author, note: &answer.note };
+    let id = feedback::append(writer, study.id, &said, voice).await?;
+    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
+    Ok(id)
+}
+
+/// Takes an answer back.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when it was taken back already or is not a comparison.
+pub async fn retract(writer: &mut Writer, id: FeedbackId, author: &str, reason: &str) -> Result<FeedbackRow, Error> {
+    let row = feedback::get(writer, id).await?;
+    if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
+        return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
+    }
+    let reason = reason.trim();
+    if reason.is_empty() || reason.chars().count() > 2000 {
+        return Err(Error::invalid("reason", reason, "1 to 2000 characters: why it is taken back"));
+    }
+    if !feedback::retract(writer, &row, author, reason).await? {
+        return Err(Error::conflict("this answer was taken back already"));
+    }
+    events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": id })).await?;
+    Ok(feedback::get(writer, id).await?)
+}
+
+async fn comparable(writer: &mut Writer, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
+    let trial = trials::get(writer, id).await?;
+    if trial.study_id != study {
+        return Err(Error::invalid(field, id.to_string(), "a trial of this study"));
+    }
+    if trial.state != TrialState::Converged {
+        let allowed = format!("a converged trial; trial {} is {}", trial.number, trial.state.as_str());
+        return Err(Error::invalid(field, id.to_string(), &allowed));
+    }
+    Ok(trial)
+}

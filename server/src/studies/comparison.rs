@@ -1,0 +1,42 @@
+//! Whom to compare a new trial with, and what Gait RMSE answers.
+
+use super::standing::Standing;
+use crate::store::TrialId;
+use crate::store::feedback::Said;
+use crate::store::trials::TrialState;
+use gait_learner::{LearnerError, comparisons_to_ask, what_to_ask};
+
+/// The earlier converged trials that a new converged trial is compared with: with LineCoSpar, the last
+/// `buffer` of them. `standing` is read before the new trial's result is in it.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn partners(standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
+    let Some(new) = standing.trial(new) else { return Ok(Vec::new()) };
+    let plan = &standing.study.plan;
+    let questions =
+        comparisons_to_ask(&plan.search_space, &standing.log_of_converged(), new.action_index, &plan.learner)?;
+    Ok(questions.into_iter().filter_map(|q| standing.trial_of(q.against)).map(|trial| trial.id).collect())
+}
+
+/// What Gait RMSE says about two gaits: the smaller one is better, equal ones tie.
+pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> Said {
+    if new.1 < old.1 {
+        Said::Preference { winner: new.0, loser: old.0 }
+    } else if old.1 < new.1 {
+        Said::Preference { winner: old.0, loser: new.0 }
+    } else {
+        Said::Tie { a: new.0, b: old.0 }
+    }
+}
+
+/// The pair of trials that a person should compare now, newest first, if there is one that nobody answered.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
+    let plan = &standing.study.plan;
+    let question = what_to_ask(&plan.search_space, &standing.log_of_converged(), &plan.learner)?;
+    let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
+    Ok(question.and_then(|q| Some((converged(q.action)?, converged(q.against)?))))
+}

@@ -1,0 +1,21 @@
+//! Studies: the tuning loop, and the rules of what may happen to a study and to a trial.
+//!
+//! The rules ([`lifecycle`], [`trial_state`], [`choice`], [`comparison`]) are pure functions of the record.
+//! The [`Director`](director::Director) applies them: it proposes, dispatches, records; it keeps no state that the
+//! record does not have, so that a process that ends at any instant is continued by the next one.
+
+pub mod answer;
+pub mod catalogue;
+pub mod choice;
+pub mod command;
+pub mod comparison;
+pub mod director;
+pub mod history;
+pub mod lifecycle;
+pub mod person;
+pub mod plan;
+pub mod record;
+pub mod search;
+pub mod seed;
+pub mod standing;
+pub mod trial_state;

@@ -1,0 +1,54 @@
+//! Adding a subject: one way in for the form and the REST interface.
+
+use crate::error::Error;
+use crate::store::subjects::{self, PSEUDONYM_UNIQUE, Subject};
+use crate::store::{OnConstraint, Writer};
+use gait_optimizer::Subject as Body;
+use serde::Deserialize;
+
+/// A subject to add.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NewSubject {
+    /// Site-given pseudonym: never a name.
+    pub pseudonym: String,
+    /// Body height, m.
+    pub height_m: f64,
+    /// Body mass, kg.
+    pub body_mass_kg: f64,
+    /// Free text.
+    #[serde(default)]
+    pub notes: String,
+}
+
+/// Checks a subject and writes it.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the pseudonym is taken.
+pub async fn add(writer: &mut Writer, new: &NewSubject) -> Result<Subject, Error> {
+    let pseudonym = new.pseudonym.trim();
+    check_pseudonym(pseudonym)?;
+    let body = Body::new(new.height_m, new.body_mass_kg)?;
+    if new.notes.chars().count() > 4000 {
+        return Err(Error::invalid("notes", new.notes.chars().count(), "at most 4000 characters"));
+    }
+    subjects::insert(writer, pseudonym, body, &new.notes)
+        .await
+        .on_constraint(PSEUDONYM_UNIQUE, || Error::conflict(format!("there is a subject {pseudonym:?} already")))
+}
+
+/// A pseudonym that could be a person's address, number or date of birth is refused.
+fn check_pseudonym(pseudonym: &str) -> Result<(), Error> {
+    let refuse = |allowed| Err(Error::invalid("pseudonym", pseudonym, allowed));
+    if pseudonym.is_empty() || pseudonym.chars().count() > 40 {
+        return refuse("1 to 40 characters");
+    }
+    if pseudonym.chars().any(char::is_control) {
+        return refuse("printable characters");
+    }
+    let digits = pseudonym.chars().filter(char::is_ascii_digit).count();
+    if pseudonym.contains('@') || digits > 5 {
+        return refuse("a code of the site such as S01: no address, no date, no long number");
+    }
+    Ok(())
+}

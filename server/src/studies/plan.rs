@@ -1,0 +1,183 @@
+//! Making a study: one way in for the form, the REST interface and the command line.
+
+use super::{catalogue, search};
+use crate::error::Error;
+use crate::store::studies::{FeedbackMode, Study, StudyPlan, StudyState};
+use crate::store::{DeviceId, ReferenceGaitId, SubjectId, Writer, devices, events, reference_gaits, studies, subjects};
+use gait_learner::{LearnerSettings, SearchSpace};
+use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use serde::Deserialize;
+use serde_json::json;
+
+/// A study to make. Everything but the subject has a default.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NewStudy {
+    /// Who walks.
+    pub subject_id: SubjectId,
+    /// Name shown to people; by default made from subject and variant.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// With which device; by default the built-in one.
+    #[serde(default)]
+    pub device_id: Option<DeviceId>,
+    /// What Gait RMSE is measured against; by default the built-in reference.
+    #[serde(default)]
+    pub reference_gait_id: Option<ReferenceGaitId>,
+    /// With muscles (C1-C12) or without (C1-C4).
+    #[serde(default = "yes")]
+    pub muscles: bool,
+    /// Settings of the gait problem.
+    #[serde(default)]
+    pub gait_settings: GaitSettings,
+    /// Limits of one solve.
+    #[serde(default)]
+    pub solve_options: SolveOptions,
+    /// Values of the bounds that are not tuned.
+    #[serde(default)]
+    pub base_bounds: TunedBounds,
+    /// What is tuned; by default Table I.
+    #[serde(default)]
+    pub search_space: Option<SearchSpace>,
+    /// Settings of the learner.
+    #[serde(default)]
+    pub learner: LearnerSettings,
+    /// Who answers the comparisons.
+    #[serde(default = "automatic")]
+    pub feedback_mode: FeedbackMode,
+    /// How many trials.
+    #[serde(default = "fifteen")]
+    pub trial_budget: u32,
+    /// How many trials at the same time.
+    #[serde(default = "one")]
+    pub parallel_trials: u32,
+    /// Higher runs first.
+    #[serde(default)]
+    pub priority: i32,
+    /// Every random draw derives from it.
+    #[serde(default = "one_seed")]
+    pub seed: u64,
+    /// Whether to start at once.
+    #[serde(default = "yes")]
+    pub start: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+fn automatic() -> FeedbackMode {
+    FeedbackMode::Automatic
+}
+fn fifteen() -> u32 {
+    15
+}
+fn one() -> u32 {
+    1
+}
+fn one_seed() -> u64 {
+    1
+}
+
+impl NewStudy {
+    /// A study of this subject with every default.
+    pub fn of(subject_id: SubjectId) -> Self {
+        Self {
+            subject_id,
+            name: None,
+            device_id: None,
+            reference_gait_id: None,
+            muscles: true,
+            gait_settings: GaitSettings::default(),
+            solve_options: SolveOptions::default(),
+            base_bounds: TunedBounds::default(),
+            search_space: None,
+            learner: LearnerSettings::default(),
+            feedback_mode: FeedbackMode::Automatic,
+            trial_budget: fifteen(),
+            parallel_trials: one(),
+            priority: 0,
+            seed: one_seed(),
+            start: true,
+        }
+    }
+}
+
+/// The largest seed: JSON readers keep 53 bits of an integer.
+pub const LARGEST_SEED: u64 = (1 << 53) - 1;
+
+/// Checks a study and writes it.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference.
+pub async fn create(writer: &mut Writer, new: NewStudy) -> Result<Study, Error> {
+    let state = if new.start { StudyState::Running } else { StudyState::Draft };
+    let plan = checked(writer, new).await?;
+    let study = studies::insert(writer, &plan, state).await?;
+    let payload = json!({ "state": study.state, "reason": "created" });
+    events::append(writer, study.id, "study_changed", &payload).await?;
+    Ok(study)
+}
+
+async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
+    let subject = subjects::get(writer, new.subject_id).await?;
+    let device_id = match new.device_id {
+        Some(id) => devices::get(writer, id).await?.id,
+        None => catalogue::device(writer).await?.id,
+    };
+    let reference_gait_id = match new.reference_gait_id {
+        Some(id) => reference_gaits::get(writer, id).await?.id,
+        None => catalogue::reference_gait(writer).await?.id,
+    };
+    let variant = if new.muscles { "with muscles" } else { "without muscles" };
+    let name = match new.name.as_deref().map(str::trim) {
+        None | Some("") => format!("{}, {variant}, seed {}", subject.pseudonym, new.seed),
+        Some(name) => name.to_owned(),
+    };
+    if name.chars().count() > 120 {
+        return Err(Error::invalid("name", name, "at most 120 characters"));
+    }
+    check_range("trial_budget", i64::from(new.trial_budget), 1, 10_000)?;
+    check_range("parallel_trials", i64::from(new.parallel_trials), 1, 64)?;
+    check_range("priority", i64::from(new.priority), -10, 10)?;
+    if new.seed > LARGEST_SEED {
+        return Err(Error::invalid("seed", new.seed, &format!("0 to {LARGEST_SEED}")));
+    }
+    new.gait_settings.validate()?;
+    new.solve_options.validate()?;
+    new.base_bounds.validate()?;
+    let search_space = match new.search_space {
+        Some(space) => space,
+        None => search::table_i().map_err(Error::Learner)?,
+    };
+    search::validate(&search_space, new.base_bounds)?;
+    new.learner.validate().map_err(Error::Learner)?;
+    if new.learner.categories() != 2 {
+        let allowed = "one threshold: a trial is converged or not converged";
+        return Err(Error::invalid("learner.ordinal_thresholds", json!(new.learner.ordinal_thresholds), allowed));
+    }
+    Ok(StudyPlan {
+        name,
+        subject_id: subject.id,
+        device_id,
+        reference_gait_id,
+        muscles: new.muscles,
+        gait_settings: new.gait_settings,
+        solve_options: new.solve_options,
+        base_bounds: new.base_bounds,
+        search_space,
+        learner: new.learner,
+        feedback_mode: new.feedback_mode,
+        trial_budget: new.trial_budget,
+        parallel_trials: new.parallel_trials,
+        priority: new.priority,
+        seed: new.seed,
+    })
+}
+
+fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {
+    if (minimum..=maximum).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, value, &format!("{minimum} to {maximum}")))
+    }
+}

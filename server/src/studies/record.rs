@@ -1,0 +1,206 @@
+//! Recording what a trial gave: its state, label, gait and the answers that Gait RMSE implies, exactly once, in
+//! one transaction.
+
+use super::comparison::{by_gait_rmse, partners};
+use super::standing::Standing;
+use super::trial_state::{self, Happening};
+use crate::error::Error;
+use crate::store::feedback::{Said, Source, Voice};
+use crate::store::gaits::PackedGait;
+use crate::store::jobs::{Lease, Troubles};
+use crate::store::studies::FeedbackMode;
+use crate::store::trials::{TrialEnd, TrialState};
+use crate::store::{Store, TrialId, Writer, commit, events, feedback, gaits, jobs, studies, trials};
+use gait_optimizer::{SolveOutcome, SolveStatus};
+use serde_json::json;
+
+/// Author of what the program itself says.
+const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"));
+
+/// Records a solve that ended by itself. `false`: the lease was not ours any more, nothing was recorded.
+///
+/// # Errors
+/// What the database or the learner reports; nothing is recorded then.
+pub async fn ended(
+    store: &Store,
+    lease: &Lease,
+    outcome: &SolveOutcome,
+    gait: Option<&PackedGait>,
+) -> Result<bool, Error> {
+    let Some(state) = trial_state::result_of(outcome.report.status) else {
+        return match outcome.report.status {
+            SolveStatus::Cancelled => interrupted(store, lease).await,
+            _ => broke(store, lease, "the solve ran out of time").await,
+        };
+    };
+    let end = TrialEnd {
+        state,
+        report: Some(outcome.report.clone()),
+        violations: outcome.violations.clone(),
+        message: message_of(outcome),
+    };
+    loop {
+        let mut reader = store.read().await?;
+        let study = studies::get(&mut reader, lease.study).await?;
+        let standing = Standing::read(&mut reader, study).await?;
+        drop(reader);
+        let answers = answers(&standing, lease.trial, &end).await?;
+
+        let mut writer = store.write().await?;
+        if feedback::version(&mut writer, lease.study).await? != standing.version {
+            continue;
+        }
+        if !jobs::finish(&mut writer, lease).await? {
+            return Ok(false);
+        }
+        trials::finish(&mut writer, lease.trial, &end).await?;
+        if let Some(gait) = gait {
+            gaits::insert(&mut writer, lease.trial, gait).await?;
+        }
+        let label = Said::Label { trial: lease.trial, category: u32::from(state == TrialState::Converged) };
+        let voice = |source| Voice { source, author: PROGRAM, note: "" };
+        feedback::append(&mut writer, lease.study, &label, voice(Source::Convergence)).await?;
+        for answer in &answers {
+            feedback::append(&mut writer, lease.study, answer, voice(Source::GaitRmse)).await?;
+        }
+        tell(&mut writer, lease, state).await?;
+        commit(writer).await?;
+        return Ok(true);
+    }
+}
+
+/// Records a failure of the program: the job runs again at most twice, then the trial is `failed`.
+///
+/// # Errors
+/// What the database reports.
+pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, Error> {
+    tracing::warn!(trial = %lease.trial, attempt = lease.attempt, reason, "a solve failed");
+    let mut writer = store.write().await?;
+    let before = jobs::troubles(&mut writer, lease.job).await?;
+    let after = Troubles { failures: before.failures + 1, ..before };
+    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Broke(before), after, reason).await?;
+    commit(writer).await?;
+    Ok(recorded)
+}
+
+/// Records a lease that ran out.
+///
+/// # Errors
+/// What the database reports.
+pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
+    let mut writer = store.write().await?;
+    let before = jobs::troubles(&mut writer, lease.job).await?;
+    let after = Troubles { losses: before.losses + 1, ..before };
+    let reason = "its worker was not heard of again";
+    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Silent(before), after, reason).await?;
+    commit(writer).await?;
+    Ok(recorded)
+}
+
+/// Gives an interrupted trial back to the queue, uncounted.
+///
+/// # Errors
+/// What the database reports.
+pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
+    let mut writer = store.write().await?;
+    let same = jobs::troubles(&mut writer, lease.job).await?;
+    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Interrupted, same, "").await?;
+    commit(writer).await?;
+    Ok(recorded)
+}
+
+/// Cancels an open trial on a person's order.
+///
+/// # Errors
+/// A conflict when the trial has ended, or what the database reports.
+pub async fn cancelled(store: &Store, trial: TrialId, reason: &str) -> Result<(), Error> {
+    let mut writer = store.write().await?;
+    let row = trials::get(&mut writer, trial).await?;
+    let state = trial_state::after(row.state, Happening::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
+    jobs::cancel(&mut writer, trial).await?;
+    let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
+    trials::finish(&mut writer, trial, &end).await?;
+    let payload = json!({ "trial_id": trial, "number": row.number, "state": state });
+    events::append(&mut writer, row.study_id, "trial_ended", &payload).await?;
+    commit(writer).await?;
+    Ok(())
+}
+
+/// Lets a trial that gave no result run once more.
+///
+/// # Errors
+/// A conflict when the trial has a result or is open, or what the database reports.
+pub async fn retried(store: &Store, trial: TrialId) -> Result<(), Error> {
+    let mut writer = store.write().await?;
+    let row = trials::get(&mut writer, trial).await?;
+    trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
+    jobs::reopen(&mut writer, trial).await?;
+    trials::requeue(&mut writer, trial, "").await?;
+    let payload = json!({ "trial_id": trial, "number": row.number, "state": TrialState::Queued });
+    events::append(&mut writer, row.study_id, "trial_queued", &payload).await?;
+    commit(writer).await?;
+    Ok(())
+}
+
+async fn give_up_or_requeue(
+    writer: &mut Writer,
+    lease: &Lease,
+    happening: Happening,
+    after: Troubles,
+    reason: &str,
+) -> Result<bool, Error> {
+    if !jobs::finish(writer, lease).await? {
+        return Ok(false);
+    }
+    let state = trial_state::after(TrialState::Running, happening).map_err(|e| Error::Internal(e.to_string()))?;
+    if state == TrialState::Queued {
+        jobs::requeue(writer, lease.job, after).await?;
+        trials::requeue(writer, lease.trial, reason).await?;
+    } else {
+        let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
+        trials::finish(writer, lease.trial, &end).await?;
+    }
+    tell(writer, lease, state).await?;
+    Ok(true)
+}
+
+/// What Gait RMSE answers about the new trial, unless the study leaves the answers to people.
+async fn answers(standing: &Standing, new: TrialId, end: &TrialEnd) -> Result<Vec<Said>, Error> {
+    let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
+    let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
+    if standing.study.plan.feedback_mode == FeedbackMode::Human {
+        return Ok(Vec::new());
+    }
+    let standing_there = standing.clone();
+    let partners = tokio::task::spawn_blocking(move || partners(&standing_there, new))
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))?
+        .map_err(Error::Learner)?;
+    Ok(partners
+        .into_iter()
+        .filter_map(|id| standing.trial(id)?.gait_rmse_rad.map(|old| by_gait_rmse((new, rmse), (id, old))))
+        .collect())
+}
+
+async fn tell(writer: &mut Writer, lease: &Lease, state: TrialState) -> Result<(), Error> {
+    let trial = trials::get(writer, lease.trial).await?;
+    let kind = if state == TrialState::Queued { "trial_queued" } else { "trial_ended" };
+    let payload = json!({ "trial_id": lease.trial, "number": trial.number, "state": state });
+    Ok(events::append(writer, lease.study, kind, &payload).await?)
+}
+
+fn message_of(outcome: &SolveOutcome) -> String {
+    let worst = outcome.violations.first();
+    let cause = match outcome.report.status {
+        SolveStatus::Converged => return String::new(),
+        SolveStatus::Infeasible => "no gait meets all constraints near the point that was reached",
+        SolveStatus::Stalled => "the solver made no further progress",
+        SolveStatus::IterationLimit => "the iteration limit was reached",
+        SolveStatus::TimeLimit => "the time limit was reached",
+        SolveStatus::Cancelled => "cancelled",
+    };
+    match worst {
+        Some(row) => format!("{cause}; least satisfied: {} by {:.3e} {}", row.row, row.amount, row.unit),
+        None => cause.to_owned(),
+    }
+}

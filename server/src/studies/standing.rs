@@ -1,0 +1,100 @@
+//! Where a study stands, as its learner sees it: the log of results and answers, by action.
+
+use crate::store::feedback::{FeedbackRow, LogVersion, Said};
+use crate::store::studies::Study;
+use crate::store::trials::{Trial, TrialState};
+use crate::store::{Connection, StoreResult, TrialId, feedback, trials};
+use gait_learner::{ActionIndex, Feedback, FeedbackLog};
+use std::collections::HashMap;
+
+/// Everything that the next decision of a study depends on, read in one go.
+#[derive(Debug, Clone)]
+pub struct Standing {
+    /// The study.
+    pub study: Study,
+    /// Its trials, by number.
+    pub trials: Vec<Trial>,
+    /// Its feedback, as heard, retracted rows included.
+    pub feedback: Vec<FeedbackRow>,
+    /// The version of the feedback: a decision is written only if it is still current.
+    pub version: LogVersion,
+}
+
+impl Standing {
+    /// Reads the standing of a study.
+    ///
+    /// # Errors
+    /// What the database reports.
+    pub async fn read(db: &mut Connection, study: Study) -> StoreResult<Self> {
+        let version = feedback::version(db, study.id).await?;
+        let trials = trials::of_study(db, study.id).await?;
+        let feedback = feedback::of_study(db, study.id, 0).await?;
+        Ok(Self { study, trials, feedback, version })
+    }
+
+    /// The trial with this identifier.
+    pub fn trial(&self, id: TrialId) -> Option<&Trial> {
+        self.trials.iter().find(|trial| trial.id == id)
+    }
+
+    /// The trial that gave the result of an action.
+    pub fn trial_of(&self, action: ActionIndex) -> Option<&Trial> {
+        self.trials.iter().find(|trial| trial.state.is_result() && trial.action_index == action)
+    }
+
+    /// How many trials are queued or running.
+    pub fn open(&self) -> usize {
+        self.trials.iter().filter(|trial| trial.state.is_open()).count()
+    }
+
+    /// What the learner hears: results in the order in which they were recorded, and every answer that was
+    /// not taken back.
+    pub fn log(&self) -> FeedbackLog {
+        self.log_where(|_| true)
+    }
+
+    /// The log of the converged trials alone, for choosing whom to compare with: a gait that does not exist
+    /// cannot be compared, and its label has said so already.
+    pub fn log_of_converged(&self) -> FeedbackLog {
+        self.log_where(|trial| trial.state == TrialState::Converged)
+    }
+
+    fn log_where(&self, visited: impl Fn(&Trial) -> bool) -> FeedbackLog {
+        let by_id: HashMap<TrialId, &Trial> = self.trials.iter().map(|trial| (trial.id, trial)).collect();
+        let action = |id: TrialId| by_id.get(&id).map(|trial| trial.action_index);
+        let mut log = FeedbackLog::default();
+        for row in &self.feedback {
+            if let Said::Label { trial, .. } = row.said
+                && let Some(trial) = by_id.get(&trial)
+                && visited(trial)
+            {
+                log.visited.push(trial.action_index);
+            }
+            if row.retraction.is_none() {
+                log.feedback.extend(heard(&row.said, action));
+            }
+        }
+        log
+    }
+
+    /// Actions that may not be proposed though they gave no result: being solved, or given up.
+    pub fn taken_without_result(&self) -> Vec<ActionIndex> {
+        self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index).collect()
+    }
+}
+
+/// An answer about trials as an answer about actions. `None` when it speaks of one action only.
+fn heard(said: &Said, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
+    let feedback = match *said {
+        Said::Label { trial, category } => {
+            Feedback::Label { action: action(trial)?, category: usize::try_from(category).ok()? }
+        }
+        Said::Preference { winner, loser } => Feedback::Preference { winner: action(winner)?, loser: action(loser)? },
+        Said::Tie { a, b } => Feedback::Tie { a: action(a)?, b: action(b)? },
+        Said::Suggestion { suggested, over } => Feedback::Suggestion { suggested, over: action(over)? },
+    };
+    match feedback.actions() {
+        (a, Some(b)) if a == b => None,
+        _ => Some(feedback),
+    }
+}

@@ -1,0 +1,51 @@
+//! The seam between the service and the optimizer.
+
+use crate::store::{StudyId, TrialId};
+use gait_optimizer::{CancelToken, GaitProblem, IterationRecord, SolveOptions, SolveOutcome, WarmStart, solve};
+
+/// One solve to run.
+#[derive(Debug, Clone)]
+pub struct Assignment {
+    /// The study.
+    pub study: StudyId,
+    /// The trial.
+    pub trial: TrialId,
+    /// Its number within the study.
+    pub number: u32,
+    /// What to solve.
+    pub problem: GaitProblem,
+    /// What to start from; `None`: cold.
+    pub warm_start: Option<WarmStart>,
+    /// Limits of the solve.
+    pub options: SolveOptions,
+}
+
+/// Runs a solve on the calling thread.
+pub trait Evaluate: Send + Sync + 'static {
+    /// Runs the solve, calling `observer` at every iteration and stopping within one of `cancel`.
+    ///
+    /// # Errors
+    /// Text for people when the solve could not even be tried: a failure of the program, not of the action.
+    fn evaluate(
+        &self,
+        assignment: &Assignment,
+        observer: &mut dyn FnMut(&IterationRecord),
+        cancel: &CancelToken,
+    ) -> Result<SolveOutcome, String>;
+}
+
+/// The real thing: `gait_optimizer::solve`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct GaitSolver;
+
+impl Evaluate for GaitSolver {
+    fn evaluate(
+        &self,
+        assignment: &Assignment,
+        observer: &mut dyn FnMut(&IterationRecord),
+        cancel: &CancelToken,
+    ) -> Result<SolveOutcome, String> {
+        solve(&assignment.problem, assignment.warm_start.as_ref(), &assignment.options, observer, cancel)
+            .map_err(|e| e.to_string())
+    }
+}

@@ -1,0 +1,22 @@
+//! The service with the analytic solver, as a process: for tests that kill it and for looking at pages.
+//!
+//! `serve-analytic DATABASE ADDRESS:PORT [MILLISECONDS_PER_ITERATION]`
+
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use std::path::PathBuf;
+use std::time::Duration;
+
+#[tokio::main]
+async fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let database = PathBuf::from(arguments.next().expect("a database"));
+    let address = arguments.next().expect("an address");
+    let pause = arguments.next().map_or(0, |text| text.parse().expect("milliseconds"));
+    let service = Service::start(&database, Analytic::slow(Duration::from_millis(pause)), 1).await;
+    let listener = tokio::net::TcpListener::bind(address).await.unwrap();
+    println!("http://{}", listener.local_addr().unwrap());
+    axum::serve(listener, service.router()).await.unwrap();
+}

@@ -1,0 +1,171 @@
+//! A service on a temporary record.
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{HeaderMap, Method, Request, StatusCode, header};
+use gaitwright::http::{AppState, router};
+use gaitwright::store::feedback::FeedbackRow;
+use gaitwright::store::studies::{Study, StudyState};
+use gaitwright::store::trials::Trial;
+use gaitwright::store::{Store, StudyId, SubjectId, commit, feedback, studies, subjects, trials};
+use gaitwright::studies::catalogue;
+use gaitwright::studies::director::Director;
+use gaitwright::studies::plan::{self, NewStudy};
+use gaitwright::workers::{Board, Evaluate, Pool};
+use http_body_util::BodyExt;
+use serde_json::Value;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::task::JoinHandle;
+use tower::ServiceExt;
+
+/// A running service.
+pub struct Service {
+    /// The record.
+    pub store: Store,
+    /// What runs its studies.
+    pub director: Director,
+    work: JoinHandle<()>,
+}
+
+/// An answer of the service.
+#[derive(Debug)]
+pub struct Answer {
+    /// Its status.
+    pub status: StatusCode,
+    /// Its headers.
+    pub headers: HeaderMap,
+    /// Its body.
+    pub text: String,
+}
+
+impl Answer {
+    /// The body as JSON.
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.text).unwrap_or_else(|e| panic!("not JSON ({e}): {}", self.text))
+    }
+
+    /// The content type.
+    pub fn content_type(&self) -> &str {
+        self.headers.get(header::CONTENT_TYPE).map_or("", |v| v.to_str().unwrap())
+    }
+}
+
+impl Service {
+    /// Starts a service with a solver and so many workers.
+    pub async fn start(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
+        let store = Store::open(database).await.unwrap();
+        let mut writer = store.write().await.unwrap();
+        catalogue::ensure(&mut writer).await.unwrap();
+        commit(writer).await.unwrap();
+        let pool = Pool::new(workers, Arc::new(solver), Arc::new(Board::default()));
+        let director = Director::new(store.clone(), pool, None);
+        let work = tokio::spawn({
+            let director = director.clone();
+            async move { director.run().await.unwrap() }
+        });
+        Self { store, director, work }
+    }
+
+    /// Stops it and closes the record.
+    pub async fn stop(self) {
+        self.director.stop();
+        self.work.await.unwrap();
+        self.store.close().await;
+    }
+
+    /// The paper's first subject.
+    pub async fn subject(&self) -> SubjectId {
+        let mut reader = self.store.read().await.unwrap();
+        subjects::by_pseudonym(&mut reader, "paper-1").await.unwrap().unwrap().id
+    }
+
+    /// Makes and starts a study of that subject.
+    pub async fn study(&self, change: impl FnOnce(&mut NewStudy)) -> StudyId {
+        let mut new = NewStudy::of(self.subject().await);
+        change(&mut new);
+        let mut writer = self.store.write().await.unwrap();
+        let study = plan::create(&mut writer, new).await.unwrap();
+        commit(writer).await.unwrap();
+        self.director.changed();
+        study.id
+    }
+
+    /// The study as it stands.
+    pub async fn get(&self, study: StudyId) -> Study {
+        studies::get(&mut self.store.read().await.unwrap(), study).await.unwrap()
+    }
+
+    /// Its trials.
+    pub async fn trials(&self, study: StudyId) -> Vec<Trial> {
+        trials::of_study(&mut self.store.read().await.unwrap(), study).await.unwrap()
+    }
+
+    /// Its feedback.
+    pub async fn feedback(&self, study: StudyId) -> Vec<FeedbackRow> {
+        feedback::of_study(&mut self.store.read().await.unwrap(), study, 0).await.unwrap()
+    }
+
+    /// Waits until the study is in one of these states.
+    pub async fn wait_for(&self, study: StudyId, states: &[StudyState]) -> Study {
+        for _ in 0..6000 {
+            let present = self.get(study).await;
+            if states.contains(&present.state) {
+                return present;
+            }
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        panic!("the study did not reach {states:?}: {:?}", self.get(study).await);
+    }
+
+    /// Waits until so many trials have ended.
+    pub async fn wait_for_trials(&self, study: StudyId, ended: usize) {
+        for _ in 0..6000 {
+            if self.trials(study).await.iter().filter(|t| !t.state.is_open()).count() >= ended {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+        panic!("the study did not reach {ended} trials");
+    }
+
+    /// The router.
+    pub fn router(&self) -> Router {
+        router(AppState { director: self.director.clone() })
+    }
+
+    /// `GET`.
+    pub async fn fetch(&self, path: &str) -> Answer {
+        self.send(Request::get(path).body(Body::empty()).unwrap()).await
+    }
+
+    /// `GET` with an Accept header.
+    pub async fn fetch_as(&self, path: &str, accept: &str) -> Answer {
+        self.send(Request::get(path).header(header::ACCEPT, accept).body(Body::empty()).unwrap()).await
+    }
+
+    /// `POST` of a JSON document.
+    pub async fn post(&self, path: &str, body: &Value) -> Answer {
+        self.post_text(path, "application/json", &body.to_string()).await
+    }
+
+    /// `POST` of a text.
+    pub async fn post_text(&self, path: &str, kind: &str, body: &str) -> Answer {
+        let request = Request::builder()
+            .method(Method::POST)
+            .uri(path)
+            .header(header::CONTENT_TYPE, kind)
+            .body(Body::from(body.to_owned()))
+            .unwrap();
+        self.send(request).await
+    }
+
+    /// Any request.
+    pub async fn send(&self, request: Request<Body>) -> Answer {
+        let response = self.router().oneshot(request).await.unwrap();
+        let (status, headers) = (response.status(), response.headers().clone());
+        let bytes = response.into_body().collect().await.unwrap().to_bytes();
+        Answer { status, headers, text: String::from_utf8(bytes.to_vec()).unwrap() }
+    }
+}

@@ -1,0 +1,368 @@
+//! The REST interface and the pages, through the router.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::store::StudyId;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const PROBLEM: &str = "application/problem+json";
+
+async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    (folder, service)
+}
+
+async fn finished(service: &Service, trials: u32) -> StudyId {
+    let study = service.study(|new| new.trial_budget = trials).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    study
+}
+
+#[track_caller]
+fn is_problem(answer: &Answer, status: StatusCode, kind: &str, detail: &str) {
+    assert_eq!(answer.status, status, "{}", answer.text);
+    assert_eq!(answer.content_type(), PROBLEM);
+    let body = answer.json();
+    assert_eq!(body["type"], kind);
+    assert_eq!(body["status"], status.as_u16());
+    assert!(body["detail"].as_str().unwrap().contains(detail), "{body}");
+}
+
+#[tokio::test]
+async fn health_is_ready() {
+    let (_folder, service) = service().await;
+    let answer = service.fetch("/health").await;
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.json()["status"], "ready");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn subjects_are_made_listed_and_refused() {
+    let (_folder, service) = service().await;
+    let body = json!({"pseudonym": "S01", "height_m": 1.8, "body_mass_kg": 70.5, "notes": "left-handed"});
+    let made = service.post("/api/v1/subjects", &body).await;
+    assert_eq!(made.status, StatusCode::CREATED);
+    let location = made.headers["location"].to_str().unwrap().to_owned();
+    assert_eq!(service.fetch(&location).await.json(), made.json());
+    assert_eq!(service.fetch("/api/v1/subjects").await.json().as_array().unwrap().len(), 3);
+
+    is_problem(&service.post("/api/v1/subjects", &body).await, StatusCode::CONFLICT, "/problems/conflict", "S01");
+    let with = |field: &str, value: Value| {
+        let mut body = json!({"pseudonym": "S02", "height_m": 1.8, "body_mass_kg": 70.5});
+        body[field] = value;
+        body
+    };
+    let invalid = "/problems/invalid-field";
+    for (field, value, detail) in [
+        ("height_m", json!(17.27), "[1.4, 2.2]"),
+        ("body_mass_kg", json!(-1), "[35, 160]"),
+        ("pseudonym", json!("jane@example.org"), "no address"),
+        ("pseudonym", json!("1980-02-03"), "no date"),
+        ("pseudonym", json!(" "), "1 to 40"),
+    ] {
+        let answer = service.post("/api/v1/subjects", &with(field, value.clone())).await;
+        is_problem(&answer, StatusCode::UNPROCESSABLE_ENTITY, invalid, detail);
+        assert_eq!(answer.json()["field"], field);
+    }
+    for (body, detail) in [
+        (with("height_m", json!("tall")), "field height_m"),
+        (with("name", json!("Jane")), "unknown field `name`"),
+        (json!({"pseudonym": "S03"}), "missing field `height_m`"),
+        (json!("a subject"), "not the JSON that is expected here"),
+    ] {
+        is_problem(
+            &service.post("/api/v1/subjects", &body).await,
+            StatusCode::BAD_REQUEST,
+            "/problems/malformed",
+            detail,
+        );
+    }
+    let answer = service.post_text("/api/v1/subjects", "application/json", "{\"pseudonym\": ").await;
+    is_problem(&answer, StatusCode::BAD_REQUEST, "/problems/malformed", "EOF");
+    let answer = service.post_text("/api/v1/subjects", "text/plain", "{}").await;
+    is_problem(&answer, StatusCode::BAD_REQUEST, "/problems/malformed", "application/json");
+    assert_eq!(service.fetch("/api/v1/subjects").await.json().as_array().unwrap().len(), 3, "nothing changed");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn unknown_things_are_not_found() {
+    let (_folder, service) = service().await;
+    let unknown = "01890000-0000-7000-8000-000000000000";
+    for path in [
+        format!("/api/v1/trials/{unknown}"),
+        format!("/api/v1/trials/{unknown}/gait"),
+        format!("/api/v1/studies/{unknown}"),
+        format!("/api/v1/studies/{unknown}/trials"),
+        format!("/api/v1/studies/{unknown}/history"),
+        format!("/api/v1/studies/{unknown}/preferences"),
+        format!("/api/v1/studies/{unknown}/events"),
+        format!("/api/v1/subjects/{unknown}"),
+        "/api/v1/trials/seven".to_owned(),
+        "/api/v1/nothing".to_owned(),
+    ] {
+        let answer = service.fetch(&path).await;
+        is_problem(&answer, StatusCode::NOT_FOUND, "/problems/not-found", "does not exist");
+    }
+    for path in [format!("/studies/{unknown}"), format!("/trials/{unknown}"), "/nothing".to_owned()] {
+        let answer = service.fetch(&path).await;
+        assert_eq!(answer.status, StatusCode::NOT_FOUND);
+        assert!(answer.content_type().starts_with("text/html"));
+    }
+    let body = json!({"subject_id": unknown});
+    is_problem(&service.post("/api/v1/studies", &body).await, StatusCode::NOT_FOUND, "/problems/not-found", "subject");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_study_is_made_run_and_read_as_json_and_csv() {
+    let (_folder, service) = service().await;
+    let body = json!({"subject_id": service.subject().await, "trial_budget": 5, "seed": 3, "name": "First"});
+    let made = service.post("/api/v1/studies", &body).await;
+    assert_eq!(made.status, StatusCode::CREATED, "{}", made.text);
+    let study: StudyId = made.json()["id"].as_str().unwrap().parse().unwrap();
+    service.wait_for(study, &[StudyState::Finished]).await;
+
+    let read = service.fetch(&format!("/api/v1/studies/{study}")).await.json();
+    assert_eq!((&read["name"], &read["trials"]["total"]), (&json!("First"), &json!(5)));
+    let page = service.fetch(&format!("/api/v1/studies/{study}/trials?limit=3")).await.json();
+    assert_eq!((page["trials"].as_array().unwrap().len(), &page["next"]), (3, &json!(3)));
+    let page = service.fetch(&format!("/api/v1/studies/{study}/trials?limit=3&after=3")).await.json();
+    assert_eq!((page["trials"].as_array().unwrap().len(), &page["next"]), (2, &Value::Null));
+
+    let csv = service.fetch_as(&format!("/api/v1/studies/{study}/trials"), "text/csv").await;
+    assert!(csv.content_type().starts_with("text/csv"));
+    assert_eq!(csv.text.lines().count(), 6);
+    assert!(csv.text.starts_with("number,trial_id,a1,a2,a3,a4,a5,a6,a7,a8,state,gait_rmse_rad"));
+    assert_eq!(csv.text, service.fetch(&format!("/api/v1/studies/{study}/trials.csv")).await.text);
+
+    let history = service.fetch(&format!("/api/v1/studies/{study}/history")).await.json();
+    assert_eq!(history.as_array().unwrap().last().unwrap()["iteration"], 5);
+
+    let trial = page["trials"][1]["id"].as_str().unwrap().to_owned();
+    let gait = service.fetch(&format!("/api/v1/trials/{trial}/gait")).await;
+    assert_eq!(gait.json()["domains"].as_array().unwrap().len(), 8);
+    let csv = service.fetch(&format!("/api/v1/trials/{trial}/gait.csv")).await;
+    assert_eq!(csv.text.lines().count(), 1 + 8 * 9);
+    assert_eq!(csv.text, service.fetch_as(&format!("/api/v1/trials/{trial}/gait"), "text/csv").await.text);
+    let iterations = service.fetch(&format!("/api/v1/trials/{trial}/iterations")).await.json();
+    assert_eq!(iterations.as_array().unwrap().len(), 12);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn studies_that_cannot_be_are_refused_by_field() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
+    for (field, value, named) in [
+        ("trial_budget", json!(0), "trial_budget"),
+        ("parallel_trials", json!(65), "parallel_trials"),
+        ("priority", json!(11), "priority"),
+        ("seed", json!(9_007_199_254_740_992_u64), "seed"),
+        ("name", json!("x".repeat(121)), "name"),
+        ("base_bounds", json!({"a1": 1e9}), "a1"),
+        ("gait_settings", json!({"mesh": {"ds2": 0}}), "mesh.ds2"),
+        ("search_space", json!({"dimensions": [{"name": "a9", "values": [1.0], "lengthscale": 1.0}]}), "bounds"),
+        ("learner", json!({"ordinal_thresholds": [0.0, 1.0]}), "learner.ordinal_thresholds"),
+    ] {
+        let mut body = json!({"subject_id": subject});
+        body[field] = value;
+        let answer = service.post("/api/v1/studies", &body).await;
+        assert_eq!(answer.status, unprocessable, "{field}: {}", answer.text);
+        assert_eq!(answer.json()["field"], named);
+    }
+    let learner = json!({"subject_id": subject, "learner": {"preference_noise": -1.0}});
+    let answer = service.post("/api/v1/studies", &learner).await;
+    is_problem(&answer, unprocessable, "/problems/learner", "preference_noise");
+    assert_eq!(service.fetch("/api/v1/studies").await.json()["studies"], json!([]));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn preferences_are_given_read_back_and_taken_back() {
+    let (_folder, service) = service().await;
+    let study = finished(&service, 4).await;
+    let trials = service.trials(study).await;
+    let converged: Vec<_> = trials.iter().filter(|t| t.state == TrialState::Converged).map(|t| t.id).collect();
+    let path = format!("/api/v1/studies/{study}/preferences");
+    let before = service.fetch(&path).await.json().as_array().unwrap().len();
+
+    let body = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "b", "author": "Dr K"});
+    let given = service.post(&path, &body).await;
+    assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
+    let row = given.json();
+    assert_eq!((&row["kind"], &row["winner"]), (&json!("preference"), &json!(converged[1])));
+    assert_eq!(service.fetch(given.headers["location"].to_str().unwrap()).await.json(), row);
+
+    let tie = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "no_difference"});
+    assert_eq!(service.post(&path, &tie).await.json()["kind"], "tie");
+
+    let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
+    let itself = json!({"trial_a": converged[0], "trial_b": converged[0], "answer": "a"});
+    is_problem(&service.post(&path, &itself).await, unprocessable, "/problems/invalid-field", "itself");
+    let unknown = json!({"trial_a": converged[0], "trial_b": "01890000-0000-7000-8000-000000000000", "answer": "a"});
+    is_problem(&service.post(&path, &unknown).await, StatusCode::NOT_FOUND, "/problems/not-found", "trial");
+    let neither = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "both"});
+    is_problem(&service.post(&path, &neither).await, StatusCode::BAD_REQUEST, "/problems/malformed", "answer");
+    let other = finished(&service, 2).await;
+    let foreign = service.trials(other).await[0].id;
+    let mixed = json!({"trial_a": converged[0], "trial_b": foreign, "answer": "a"});
+    is_problem(&service.post(&path, &mixed).await, unprocessable, "/problems/invalid-field", "of this study");
+    let machine = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "a", "source": "gait_rmse"});
+    is_problem(&service.post(&path, &machine).await, unprocessable, "/problems/invalid-field", "source");
+    assert_eq!(service.fetch(&path).await.json().as_array().unwrap().len(), before + 2);
+
+    let retract = format!("/api/v1/preferences/{}/retract", row["id"].as_str().unwrap());
+    let without = service.post(&retract, &json!({"reason": " "})).await;
+    is_problem(&without, unprocessable, "/problems/invalid-field", "why");
+    let done = service.post(&retract, &json!({"reason": "wrong button", "author": "Dr K"})).await.json();
+    assert_eq!(done["retraction"]["reason"], "wrong button");
+    let again = service.post(&retract, &json!({"reason": "wrong button"})).await;
+    is_problem(&again, StatusCode::CONFLICT, "/problems/conflict", "already");
+    assert_eq!(service.fetch(&path).await.json().as_array().unwrap().len(), before + 2, "the row stays");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_effect() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let mut through_form = false;
+    loop {
+        let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
+        if present.state == StudyState::Finished {
+            break;
+        }
+        let trials = service.trials(study).await;
+        let newest = trials.last().unwrap().id;
+        let before = trials[trials.len() - 2].id;
+        if through_form {
+            let form = format!("a={newest}&b={before}&answer=a&source=clinician&author=K&note=");
+            let path = format!("/studies/{study}/compare");
+            let saved = service.post_text(&path, "application/x-www-form-urlencoded", &form).await;
+            assert_eq!(saved.status, StatusCode::SEE_OTHER, "{}", saved.text);
+            let page = service.fetch(saved.headers["location"].to_str().unwrap()).await;
+            assert!(page.text.contains("Recorded"), "the answer is read back");
+        } else {
+            let body = json!({"trial_a": newest, "trial_b": before, "answer": "a", "author": "K"});
+            let path = format!("/api/v1/studies/{study}/preferences");
+            assert_eq!(service.post(&path, &body).await.status, StatusCode::CREATED);
+        }
+        through_form = !through_form;
+        // The director hears of the answer a moment later.
+        while service.get(study).await.state == StudyState::Waiting && service.trials(study).await.len() == trials.len()
+        {
+            tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+        }
+    }
+    let rows = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.json();
+    let rows = rows.as_array().unwrap();
+    assert_eq!(rows.len(), 3);
+    for row in rows {
+        assert_eq!(
+            (&row["kind"], &row["source"], &row["author"], &row["note"]),
+            (&json!("preference"), &json!("clinician"), &json!("K"), &json!(""))
+        );
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_study_is_paused_resumed_and_stopped_and_refuses_what_makes_no_sense() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = Analytic::slow(std::time::Duration::from_millis(10));
+    let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
+    let study = service.study(|new| new.trial_budget = 50).await;
+    let act = |act: &str| format!("/api/v1/studies/{study}/{act}");
+    let nothing = json!({});
+    assert_eq!(service.post(&act("pause"), &nothing).await.json()["state"], "paused");
+    let twice = service.post(&act("pause"), &nothing).await;
+    is_problem(&twice, StatusCode::CONFLICT, "/problems/conflict", "possible from here: resume, stop");
+    assert_eq!(service.post(&act("resume"), &nothing).await.json()["state"], "running");
+    service.wait_for_trials(study, 2).await;
+    assert_eq!(service.post(&act("stop"), &nothing).await.json()["state"], "stopped");
+    let trials = service.trials(study).await;
+    assert!(trials.iter().all(|trial| !trial.state.is_open()), "{trials:?}");
+    assert!(trials.len() < 50);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_trial_is_cancelled_and_run_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = Analytic::slow(std::time::Duration::from_millis(20));
+    let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    while service.trials(study).await.first().is_none_or(|t| t.state != TrialState::Running) {
+        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    }
+    let trial = service.trials(study).await[0].id;
+    let cancelled = service.post(&format!("/api/v1/trials/{trial}/cancel"), &json!({})).await;
+    assert_eq!(cancelled.json()["state"], "cancelled");
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let again = service.post(&format!("/api/v1/trials/{trial}/cancel"), &json!({})).await;
+    is_problem(&again, StatusCode::CONFLICT, "/problems/conflict", "cancelled");
+    assert!(service.feedback(study).await.is_empty(), "the learner does not hear of it");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn pages_answer_and_let_nothing_in_from_elsewhere() {
+    let (_folder, service) = service().await;
+    let empty = service.fetch("/").await;
+    assert!(empty.text.contains("There is no study yet"));
+    let study = finished(&service, 4).await;
+    let trial = service.trials(study).await[2].id;
+    for path in [
+        "/".to_owned(),
+        "/studies/new".to_owned(),
+        format!("/studies/{study}"),
+        format!("/studies/{study}/compare"),
+        format!("/trials/{trial}"),
+    ] {
+        let page = service.fetch(&path).await;
+        assert_eq!(page.status, StatusCode::OK, "{path}: {}", page.text);
+        let policy = page.headers["content-security-policy"].to_str().unwrap();
+        assert!(policy.contains("default-src 'self'") && !policy.contains("unsafe"));
+        for foreign in ["src=\"http", "href=\"http", "src=\"//", "style=\"", "onclick", "javascript:"] {
+            assert!(!page.text.contains(foreign), "{path} holds {foreign}");
+        }
+    }
+    for file in ["gaitwright.css", "live.mjs", "icon.svg"] {
+        assert_eq!(service.fetch(&format!("/static/{file}")).await.status, StatusCode::OK);
+    }
+    assert_eq!(service.fetch("/static/../Cargo.toml").await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_form_for_a_new_study_comes_back_with_what_was_wrong() {
+    let (_folder, service) = service().await;
+    let form = |height: &str, trials: &str| {
+        format!(
+            "subject=new&pseudonym=S07&height_m={height}&body_mass_kg=70&muscles=on&feedback_mode=automatic\
+             &trial_budget={trials}&parallel_trials=1&seed=1&name="
+        )
+    };
+    let kind = "application/x-www-form-urlencoded";
+    let refused = service.post_text("/studies/new", kind, &form("17.27", "3")).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(refused.text.contains("height_m = 17.27 is outside the allowed range [1.4, 2.2]"));
+    assert!(refused.text.contains("value=\"17.27\""), "what was typed is kept");
+    let refused = service.post_text("/studies/new", kind, &form("1.7", "many")).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert_eq!(service.fetch("/api/v1/subjects").await.json().as_array().unwrap().len(), 2, "nothing is left of it");
+    let made = service.post_text("/studies/new", kind, &form("1.7", "3")).await;
+    assert_eq!(made.status, StatusCode::SEE_OTHER);
+    assert!(service.fetch(made.headers["location"].to_str().unwrap()).await.text.contains("S07"));
+    service.stop().await;
+}

@@ -1,0 +1,162 @@
+//! The process is killed (SIGKILL) at arbitrary instants, while others write too.
+//!
+//! `GAITWRIGHT_KILLS=200` makes it long.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright_tests::client::{get, post};
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::Duration;
+
+const TRIALS: u32 = 15;
+
+/// A service as a process, killed when dropped.
+struct Process {
+    child: Child,
+    address: String,
+}
+
+impl Process {
+    fn start(database: &Path) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_serve-analytic"))
+            .arg(database)
+            .args(["127.0.0.1:0", "4"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        Self { child, address: line.trim().trim_start_matches("http://").to_owned() }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+}
+
+/// Numbers that look random and are the same every time.
+fn splitmix(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+fn start_study(address: &str) -> String {
+    let subjects = get(address, "/api/v1/subjects").unwrap().json();
+    let subject = subjects.as_array().unwrap().iter().find(|s| s["pseudonym"] == "paper-1").unwrap()["id"].clone();
+    let made = post(address, "/api/v1/studies", &json!({"subject_id": subject, "trial_budget": TRIALS, "seed": 11}));
+    made.unwrap().json()["id"].as_str().unwrap().to_owned()
+}
+
+fn wait_until_finished(address: &str, study: &str) {
+    for _ in 0..3000 {
+        if get(address, &format!("/api/v1/studies/{study}")).unwrap().json()["state"] == "finished" {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("the study does not finish");
+}
+
+/// Everything but identifiers and times.
+fn essence(address: &str, study: &str) -> Vec<String> {
+    let page = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().json();
+    let trials = page["trials"].as_array().unwrap();
+    let number = |id: &Value| trials.iter().find(|t| t["id"] == *id).map(|t| t["number"].clone());
+    trials
+        .iter()
+        .map(|t| {
+            let from = number(&t["warm_started_from"]);
+            format!("{} {} {} {} {from:?}", t["number"], t["action_index"], t["state"], t["gait_rmse_rad"])
+        })
+        .collect()
+}
+
+fn labels(address: &str, study: &str) -> usize {
+    let answers = get(address, &format!("/api/v1/studies/{study}/preferences")).unwrap().json();
+    answers.as_array().unwrap().len()
+}
+
+#[test]
+fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_write_is_lost() {
+    let kills: u32 = std::env::var("GAITWRIGHT_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(12);
+    let folder = tempfile::tempdir().unwrap();
+
+    let quiet = Process::start(&folder.path().join("quiet.db"));
+    let undisturbed = start_study(&quiet.address);
+    wait_until_finished(&quiet.address, &undisturbed);
+    let expected = essence(&quiet.address, &undisturbed);
+    let expected_answers = labels(&quiet.address, &undisturbed);
+    assert_eq!(expected.len(), TRIALS as usize);
+    drop(quiet);
+
+    let database = folder.path().join("killed.db");
+    let mut random = 20_261_121;
+    let mut study: Option<String> = None;
+    let address = Mutex::new(String::new());
+    let acknowledged = Mutex::new(Vec::<String>::new());
+    let (stop, counter) = (AtomicBool::new(false), AtomicU32::new(0));
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while !stop.load(Ordering::Relaxed) {
+                    let pseudonym = format!("W{}", counter.fetch_add(1, Ordering::Relaxed));
+                    let body = json!({"pseudonym": pseudonym, "height_m": 1.7, "body_mass_kg": 70.0});
+                    let present = address.lock().unwrap().clone();
+                    if post(&present, "/api/v1/subjects", &body).is_ok_and(|reply| reply.status == 201) {
+                        acknowledged.lock().unwrap().push(pseudonym);
+                    }
+                    std::thread::sleep(Duration::from_millis(3));
+                }
+            });
+        }
+        for _ in 0..kills {
+            let process = Process::start(&database);
+            address.lock().unwrap().clone_from(&process.address);
+            if study.is_none() {
+                study = Some(start_study(&process.address));
+            }
+            std::thread::sleep(Duration::from_millis(splitmix(&mut random) % 120));
+        }
+        stop.store(true, Ordering::Relaxed);
+    });
+
+    let study = study.unwrap();
+    let process = Process::start(&database);
+    wait_until_finished(&process.address, &study);
+    assert_eq!(essence(&process.address, &study), expected);
+    assert_eq!(labels(&process.address, &study), expected_answers, "no answer is given twice");
+    let subjects = get(&process.address, "/api/v1/subjects").unwrap().json();
+    let present: Vec<&str> = subjects.as_array().unwrap().iter().map(|s| s["pseudonym"].as_str().unwrap()).collect();
+    let acknowledged = acknowledged.into_inner().unwrap();
+    assert!(!acknowledged.is_empty());
+    for pseudonym in &acknowledged {
+        assert!(present.contains(&pseudonym.as_str()), "{pseudonym} was acknowledged and is lost");
+    }
+    println!("{kills} kills, {} acknowledged writes, all there", acknowledged.len());
+}
+
+#[test]
+fn a_second_process_is_refused_while_the_first_owns_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let _first = Process::start(&database);
+    let second = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"))
+        .args(["serve", "--listen", "127.0.0.1:0", "--database"])
+        .arg(&database)
+        .output()
+        .unwrap();
+    assert!(!second.status.success());
+    let text = String::from_utf8_lossy(&second.stderr);
+    assert!(text.contains("in use by another gaitwright process"), "{text}");
+}

@@ -1,0 +1,205 @@
+// @ts-check
+// The animated stick figure of a gait. Positions come from the server; here they are only drawn.
+
+/**
+ * @typedef {[number, number]} Place
+ * @typedef {{knee: Place, ankle: Place, heel: Place, toe: Place}} Leg
+ * @typedef {{time_s: number, hip: Place, shoulder: Place, left: Leg, right: Leg, domain: string, forces_n: Place[]}} Frame
+ * @typedef {{stride_time_s: number, stride_length_m: number, frames: Frame[]}} Motion
+ */
+
+/** Newtons per metre of a drawn force. */
+const FORCE_SCALE = 1600;
+
+/** @type {(a: Place, b: Place, share: number) => Place} */
+const between = (a, b, share) => [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
+
+/** @type {(a: Leg, b: Leg, share: number) => Leg} */
+const legBetween = (a, b, share) => ({
+  knee: between(a.knee, b.knee, share),
+  ankle: between(a.ankle, b.ankle, share),
+  heel: between(a.heel, b.heel, share),
+  toe: between(a.toe, b.toe, share),
+});
+
+/**
+ * The figure at a time within the stride.
+ * @param {Motion} motion
+ * @param {number} time
+ * @returns {Frame}
+ */
+export function frameAt(motion, time) {
+  const frames = motion.frames;
+  let after = frames.findIndex((frame) => frame.time_s > time);
+  if (after < 0) after = frames.length - 1;
+  const [a, b] = [frames[Math.max(after - 1, 0)], frames[after]];
+  const span = b.time_s - a.time_s;
+  const share = span > 0 ? Math.min(Math.max((time - a.time_s) / span, 0), 1) : 0;
+  return {
+    time_s: time,
+    hip: between(a.hip, b.hip, share),
+    shoulder: between(a.shoulder, b.shoulder, share),
+    left: legBetween(a.left, b.left, share),
+    right: legBetween(a.right, b.right, share),
+    domain: a.domain,
+    forces_n: a.forces_n.map((force, i) => between(force, b.forces_n[i], share)),
+  };
+}
+
+/** A walker in a box: canvas and controls. */
+class Walker {
+  /**
+   * @param {HTMLElement} box
+   * @param {Motion} motion
+   */
+  constructor(box, motion) {
+    this.motion = motion;
+    this.time = 0;
+    this.strides = 0;
+    this.last = 0;
+    this.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.canvas = document.createElement("canvas");
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute(
+      "aria-label",
+      `Stick figure walking: stride ${motion.stride_length_m.toFixed(2)} m in ${motion.stride_time_s.toFixed(2)} s`,
+    );
+    const controls = document.createElement("div");
+    controls.className = "controls";
+    controls.innerHTML = `
+      <button type="button" class="button quiet" data-play></button>
+      <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
+      <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
+      <output data-phase></output>`;
+    box.replaceChildren(this.canvas, controls);
+    this.button = /** @type {HTMLButtonElement} */ (controls.querySelector("[data-play]"));
+    this.speed = /** @type {HTMLSelectElement} */ (controls.querySelector("[data-speed]"));
+    this.scrub = /** @type {HTMLInputElement} */ (controls.querySelector("[data-scrub]"));
+    this.phase = /** @type {HTMLOutputElement} */ (controls.querySelector("[data-phase]"));
+    this.button.addEventListener("click", () => this.setPlaying(!this.playing));
+    this.scrub.addEventListener("input", () => {
+      this.setPlaying(false);
+      this.time = (Number(this.scrub.value) / 100) * this.motion.stride_time_s;
+      this.draw();
+    });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    this.setPlaying(this.playing);
+    this.draw();
+  }
+
+  /** @param {boolean} playing */
+  setPlaying(playing) {
+    this.playing = playing;
+    this.button.textContent = playing ? "Pause" : "Play";
+    if (playing) {
+      this.last = performance.now();
+      requestAnimationFrame((now) => this.tick(now));
+    }
+  }
+
+  /** @param {number} now */
+  tick(now) {
+    if (!this.playing) return;
+    this.time += ((now - this.last) / 1000) * Number(this.speed.value);
+    this.last = now;
+    while (this.time >= this.motion.stride_time_s) {
+      this.time -= this.motion.stride_time_s;
+      this.strides += 1;
+    }
+    this.draw();
+    requestAnimationFrame((next) => this.tick(next));
+  }
+
+  draw() {
+    const ratio = window.devicePixelRatio || 1;
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (width === 0) return;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    const pen = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
+    pen.scale(ratio, ratio);
+    const style = getComputedStyle(document.documentElement);
+    const colour = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
+    const frame = frameAt(this.motion, this.time);
+    const percent = (100 * this.time) / this.motion.stride_time_s;
+    this.scrub.value = String(percent);
+    this.phase.textContent = `${percent.toFixed(0)} %, ${frame.domain}`;
+
+    const scale = height / 2.05;
+    const ground = height - 0.22 * scale;
+    const walked = this.strides * this.motion.stride_length_m;
+    /** @type {(place: Place) => Place} */
+    const at = (place) => [width / 2 + (place[0] - frame.hip[0]) * scale, ground - place[1] * scale];
+    /** @type {(places: Place[]) => void} */
+    const line = (places) => {
+      pen.beginPath();
+      places.forEach((place, i) => (i === 0 ? pen.moveTo(...at(place)) : pen.lineTo(...at(place))));
+      pen.stroke();
+    };
+
+    // Ground with a tick every half metre, so that the walking is seen.
+    pen.lineCap = pen.lineJoin = "round";
+    pen.strokeStyle = colour("--soft");
+    pen.fillStyle = colour("--soft");
+    pen.lineWidth = 1.5;
+    const reach = width / 2 / scale;
+    line([[frame.hip[0] - reach, 0], [frame.hip[0] + reach, 0]]);
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "center";
+    const first = Math.ceil((walked + frame.hip[0] - reach) * 2);
+    for (let half = first; half / 2 <= walked + frame.hip[0] + reach; half += 1) {
+      const [x, y] = at([half / 2 - walked, 0]);
+      pen.fillRect(x - 0.5, y, 1, half % 2 === 0 ? 8 : 5);
+      if (half % 2 === 0) pen.fillText(`${half / 2} m`, x, y + 22);
+    }
+
+    // Forces.
+    pen.strokeStyle = colour("--c1");
+    pen.lineWidth = 2.5;
+    const feet = [frame.left.heel, frame.left.toe, frame.right.heel, frame.right.toe];
+    frame.forces_n.forEach((force, i) => {
+      if (Math.hypot(...force) < 10) return;
+      const foot = feet[i];
+      line([foot, [foot[0] + force[0] / FORCE_SCALE, foot[1] + force[1] / FORCE_SCALE]]);
+    });
+
+    // The prosthetic side is dashed as well as of another colour.
+    const leg = (/** @type {Leg} */ l) => {
+      line([frame.hip, l.knee, l.ankle]);
+      line([l.ankle, l.heel, l.toe, l.ankle]);
+    };
+    pen.lineWidth = 5;
+    pen.strokeStyle = colour("--c0");
+    leg(frame.left);
+    pen.strokeStyle = colour("--c3");
+    line([frame.hip, frame.right.knee]);
+    pen.setLineDash([9, 8]);
+    line([frame.right.knee, frame.right.ankle]);
+    line([frame.right.ankle, frame.right.heel, frame.right.toe, frame.right.ankle]);
+    pen.setLineDash([]);
+    pen.strokeStyle = colour("--ink");
+    line([frame.hip, frame.shoulder]);
+    pen.fillStyle = colour("--ink");
+    for (const joint of [frame.hip, frame.left.knee, frame.right.knee, frame.left.ankle, frame.right.ankle]) {
+      pen.beginPath();
+      pen.arc(...at(joint), 4, 0, 2 * Math.PI);
+      pen.fill();
+    }
+    const [hx, hy] = at(between(frame.hip, frame.shoulder, 1.18));
+    pen.beginPath();
+    pen.arc(hx, hy, 0.1 * scale, 0, 2 * Math.PI);
+    pen.lineWidth = 3;
+    pen.stroke();
+  }
+}
+
+for (const box of document.querySelectorAll(".walker[data-trial]")) {
+  const element = /** @type {HTMLElement} */ (box);
+  fetch(`/api/v1/trials/${element.dataset.trial}/motion`)
+    .then((answer) => (answer.ok ? answer.json() : Promise.reject(new Error(`status ${answer.status}`))))
+    .then((motion) => new Walker(element, motion))
+    .catch((error) => {
+      element.textContent = `The animation could not be loaded (${error.message}).`;
+    });
+}
