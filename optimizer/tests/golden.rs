@@ -119,11 +119,27 @@ fn the_solver_stays_at_the_golden_gaits() {
             &golden.programme,
             &StartPoint::Cold(golden.x.clone()),
             &settings,
-            &mut |r| println!("{} obj {:.10} viol {:.1e} dual {:.1e} compl {:.1e} mu {:.1e} a {:.2} dw {:.1e} tr {}", r.number, r.objective, r.violation, r.dual_infeasibility, r.complementarity, r.mu, r.alpha_primal, r.delta_w, r.trials),
+            &mut |r| {
+                println!(
+                    "{} obj {:.10} viol {:.1e} dual {:.1e} compl {:.1e} mu {:.1e} a {:.2} dw {:.1e} tr {}",
+                    r.number,
+                    r.objective,
+                    r.violation,
+                    r.dual_infeasibility,
+                    r.complementarity,
+                    r.mu,
+                    r.alpha_primal,
+                    r.delta_w,
+                    r.trials
+                )
+            },
             &|| false,
         )
         .unwrap();
-        println!("s{subject} {muscles} {:?} {} iterations {:?} {:?}", result.status, result.iterations, result.timing, result.counts);
+        println!(
+            "s{subject} {muscles} {:?} {} iterations {:?} {:?}",
+            result.status, result.iterations, result.timing, result.counts
+        );
         assert_eq!(result.status, NlpStatus::Converged);
         let theirs = golden.data["obj"].as_f64().unwrap();
         assert!((result.objective - theirs).abs() < 1e-6 * theirs, "{} {theirs}", result.objective);
