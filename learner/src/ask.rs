@@ -82,7 +82,9 @@ impl Learner {
             Partner::Incumbent => {
                 let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
                 let best = self.posterior(space, &before, settings)?.best();
-                best.into_iter().for_each(|a| add(a, QuestionReason::Incumbent));
+                if let Some(best) = best {
+                    add(best, QuestionReason::Incumbent);
+                }
             }
         }
         Ok(questions)

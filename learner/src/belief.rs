@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::inference::{Approximate, Approximation, Spread};
+use crate::inference::{Approximate, Approximation};
 use crate::kernel::Kernel;
 use crate::likelihood::Interval;
 use crate::linalg::{Cholesky, Square, dot};
@@ -90,6 +90,16 @@ impl Chain {
     }
 }
 
+/// Logarithm of the approximate probability of the answers, all taken at once.
+pub(crate) fn evidence(process: &Process<'_>, answers: &[Answer]) -> Result<f64> {
+    let mut model = Model::default();
+    for answer in answers {
+        model.add(process.space, process.kernel, answer.plus, answer.minus, answer.interval)?;
+    }
+    let approximation = process.method.advance(&model, process.link, None)?;
+    process.method.evidence(&model, process.link, &approximation)
+}
+
 impl State {
     /// No answers.
     fn prior() -> Self {
@@ -100,8 +110,7 @@ impl State {
                 weights: Vec::new(),
                 whitened: Vec::new(),
                 factors: Vec::new(),
-                spread: Spread::Covariance(Square::zeros(0)),
-                evidence: 0.0,
+                covariance: Square::zeros(0),
             },
         }
     }
@@ -151,7 +160,7 @@ impl Belief {
         let mean =
             slot.map_or_else(|| dot(&prior, &self.approximation().weights), |slot| self.approximation().mean[slot]);
         model.prior.solve_lower(&mut prior);
-        let (left, right) = self.approximation().spread.project(&model.prior, &prior);
+        let (left, right) = self.approximation().project(&model.prior, &prior);
         View { levels, slot, prior, left, right, mean }
     }
 
@@ -174,16 +183,10 @@ impl Belief {
     /// A joint draw of the utilities of all points, and of some actions that are not points.
     pub(crate) fn draw(&self, others: &[Vec<usize>], random: &mut Random) -> Result<(Vec<f64>, Vec<f64>)> {
         let model = self.model();
-        let mut noise: Vec<f64> = model.points.iter().map(|_| random.normal()).collect();
-        let spread = match &self.approximation().spread {
-            Spread::Precision(factor) => {
-                factor.solve_upper(&mut noise);
-                model.prior.multiply(&noise)
-            }
-            Spread::Covariance(covariance) => {
-                Cholesky::new(&covariance.ridged(1e-9 * self.kernel.variance))?.multiply(&noise)
-            }
-        };
+        let noise: Vec<f64> = model.points.iter().map(|_| random.normal()).collect();
+        // Rounding may leave the covariance a hair short of positive.
+        let covariance = self.approximation().covariance.ridged(1e-9 * self.kernel.variance);
+        let spread = Cholesky::new(&covariance)?.multiply(&noise);
         let points: Vec<f64> = self.approximation().mean.iter().zip(spread).map(|(m, s)| m + s).collect();
         let mut whitened_draw = points.clone();
         model.prior.solve_lower(&mut whitened_draw);
@@ -205,26 +208,13 @@ impl Belief {
         Ok((points, others))
     }
 
-    /// Weights `c` with `Cov(f(x), f(point)) = k(x, points) . c` for every `x` that is not a point.
-    pub(crate) fn covariance_weights(&self, slot: usize) -> Vec<f64> {
+    /// Weights `c` with `Cov(f(x), f(y)) = k(x, y) + k(x, points) . c` for a view of `y` and every other `x`.
+    pub(crate) fn covariance_weights(&self, view: &View) -> Vec<f64> {
         let prior = &self.model().prior;
-        let mut unit = vec![0.0; self.model().points.len()];
-        unit[slot] = 1.0;
-        // K^-1 Sigma e: through the projections of the point itself.
-        let mut row = prior.row(slot).to_vec();
-        row.resize(unit.len(), 0.0);
-        match &self.approximation().spread {
-            Spread::Covariance(covariance) => {
-                let mut column = covariance.row(slot).to_vec();
-                prior.solve(&mut column);
-                column
-            }
-            Spread::Precision(factor) => {
-                // Sigma e = L B^-1 L' e, hence K^-1 Sigma e = L'^-1 B^-1 L' e.
-                factor.solve(&mut row);
-                prior.solve_upper(&mut row);
-                row
-            }
-        }
+        let mut kept = view.right.clone();
+        prior.solve(&mut kept);
+        let mut removed = view.prior.clone();
+        prior.solve_upper(&mut removed);
+        kept.iter().zip(removed).map(|(kept, removed)| kept - removed).collect()
     }
 }

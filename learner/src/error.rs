@@ -91,6 +91,14 @@ pub enum LearnerError {
         /// Number of actions in the space.
         actions: u64,
     },
+    /// A stored state of a version this crate does not read.
+    #[error("learner state of version {version}; this program reads version {newest}")]
+    UnknownVersion {
+        /// Version of the document.
+        version: u32,
+        /// Version read.
+        newest: u32,
+    },
     /// A covariance matrix could not be factored even after regularisation.
     #[error("numerical failure: {0}")]
     Numerical(String),

@@ -5,7 +5,7 @@
 
 use crate::belief::Belief;
 use crate::linalg::{BLOCK, Block, multiply_two};
-use crate::space::SearchSpace;
+use crate::space::{ActionIndex, SearchSpace};
 
 /// The grid seen from a belief's points.
 pub(crate) struct Grid<'a> {
@@ -104,21 +104,20 @@ impl<'a> Grid<'a> {
         results
     }
 
-    /// Prior covariances of every action with one point.
-    pub(crate) fn with_point(&self, slot: usize) -> Vec<f64> {
-        let points = self.belief.model().points.len();
+    /// Prior covariances of every action with one.
+    pub(crate) fn prior_with(&self, space: &SearchSpace, action: ActionIndex) -> Vec<f64> {
+        let shape = space.shape();
+        let target = space.levels(action);
+        let mut levels = vec![0; shape.len()];
         let mut covariances = Vec::with_capacity(self.left.count * self.right.count);
-        for y in 0..self.left.count {
-            let u = self.left.row(y);
-            for z in 0..self.right.count {
-                let w = self.right.row(z);
-                let mut k = u[slot] * w[slot];
-                if !self.left.separate.is_empty() {
-                    k += u[points + slot] * w[points + slot]
-                        + self.left.separate[y * points + slot]
-                        + self.right.separate[z * points + slot];
+        for _ in 0..self.left.count * self.right.count {
+            covariances.push(self.belief.kernel.covariance(&levels, &target));
+            for (level, &n) in levels.iter_mut().zip(&shape).rev() {
+                *level += 1;
+                if *level < n {
+                    break;
                 }
-                covariances.push(k);
+                *level = 0;
             }
         }
         covariances
@@ -153,7 +152,7 @@ impl<'a> Grid<'a> {
             }
             model.prior.solve_lower_block(&mut block);
             let explained = crate::linalg::block_dots(&block, &block);
-            let kept = self.belief.approximation().spread.block_variances(&model.prior, block);
+            let kept = self.belief.approximation().block_variances(&model.prior, block);
             variances.extend((0..chunk.len()).map(|lane| (total - explained[lane] + kept[lane]).max(0.0)));
         }
         variances

@@ -134,6 +134,42 @@ impl Kernel {
         self.join(self.symmetric(0, a, b), Symmetric { product: 1.0, first: 0.0, second: 0.0 })
     }
 
+    /// Covariance from the factors of every dimension.
+    fn combine(&self, factors: impl Iterator<Item = (f64, f64)>) -> f64 {
+        let mut s = Symmetric { product: 1.0, first: 0.0, second: 0.0 };
+        for (product, broad) in factors {
+            s.product *= product;
+            s.second += s.first * broad;
+            s.first += broad;
+        }
+        self.join(s, Symmetric { product: 1.0, first: 0.0, second: 0.0 })
+    }
+
+    /// Covariance of one action with the average over all levels of the dimensions that a profile leaves open.
+    pub(crate) fn average_with(&self, profile: &[Option<usize>], point: &[usize]) -> f64 {
+        let mean = |table: &Square, j: usize| table.row(j).iter().sum::<f64>() / table.order() as f64;
+        self.combine(profile.iter().zip(point).zip(self.factors.iter().zip(&self.broad)).map(
+            |((level, &j), (factor, broad))| match *level {
+                Some(i) => (factor.at(i, j), broad.at(i, j)),
+                None => (mean(factor, j), mean(broad, j)),
+            },
+        ))
+    }
+
+    /// Prior variance of the average over all levels of the dimensions that a profile leaves open.
+    pub(crate) fn average_variance(&self, profile: &[Option<usize>]) -> f64 {
+        let mean = |table: &Square| {
+            let n = table.order();
+            (0..n).map(|i| table.row(i).iter().sum::<f64>()).sum::<f64>() / (n * n) as f64
+        };
+        self.combine(profile.iter().zip(self.factors.iter().zip(&self.broad)).map(|(level, (factor, broad))| {
+            match *level {
+                Some(i) => (factor.at(i, i), broad.at(i, i)),
+                None => (mean(factor), mean(broad)),
+            }
+        }))
+    }
+
     /// Covariances of one action with many.
     pub(crate) fn column(&self, a: &[usize], points: &[Vec<usize>]) -> Vec<f64> {
         points.iter().map(|b| self.covariance(a, b)).collect()

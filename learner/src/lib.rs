@@ -11,11 +11,13 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod acquisition;
+mod answers;
 mod ask;
 mod belief;
 mod error;
 mod feedback;
 mod grid;
+mod hyperparameters;
 mod inference;
 mod kernel;
 mod likelihood;
@@ -27,7 +29,9 @@ mod propose;
 mod random;
 mod settings;
 mod space;
+mod state;
 
+pub use answers::{Agreement, BestProbability, Marginal, Slice};
 pub use ask::{Question, QuestionReason, comparisons_to_ask, what_to_ask};
 pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
@@ -35,3 +39,4 @@ pub use posterior::{Learner, Posterior, Prediction, posterior};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch};
 pub use settings::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
 pub use space::{ActionIndex, Dimension, SearchSpace};
+pub use state::LearnerState;

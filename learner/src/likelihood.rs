@@ -30,10 +30,22 @@ pub(crate) struct LogLikelihood {
 impl Interval {
     pub(crate) fn log_likelihood(&self, link: Link, d: f64) -> LogLikelihood {
         let (low, high) = ((self.low - d) / self.noise, (self.high - d) / self.noise);
-        let standard = match link {
+        self.scaled(match link {
             Link::Logistic => logistic(low, high),
             Link::Probit => probit(low, high),
-        };
+        })
+    }
+
+    /// Slope and curvature alone; the value is not a number where it would cost more.
+    pub(crate) fn derivatives(&self, link: Link, d: f64) -> LogLikelihood {
+        let (low, high) = ((self.low - d) / self.noise, (self.high - d) / self.noise);
+        self.scaled(match link {
+            Link::Logistic => logistic_derivatives(low, high),
+            Link::Probit => probit(low, high),
+        })
+    }
+
+    fn scaled(&self, standard: LogLikelihood) -> LogLikelihood {
         LogLikelihood {
             value: standard.value,
             slope: standard.slope / self.noise,
@@ -42,16 +54,29 @@ impl Interval {
     }
 }
 
+/// `sigma(z)` and `sigma(-z)` from one exponential.
+fn sigmoids(z: f64) -> (f64, f64) {
+    let e = math::exp(-z.abs());
+    let (large, small) = (1.0 / (1.0 + e), e / (1.0 + e));
+    if z >= 0.0 { (large, small) } else { (small, large) }
+}
+
 /// `sigma(u) - sigma(l) = sigma(u) sigma(-l) (1 - exp(l - u))`: every factor keeps its digits, and only the first two
 /// depend on `d`.
 fn logistic(low: f64, high: f64) -> LogLikelihood {
-    let (below_high, above_low) = (math::sigmoid(high), math::sigmoid(-low));
-    let (beyond_high, beyond_low) = (math::sigmoid(-high), math::sigmoid(low));
+    let derivatives = logistic_derivatives(low, high);
     let gap = high - low;
     let narrow = if gap.is_finite() { math::ln(-libm::expm1(-gap)) } else { 0.0 };
     let tail = |z: f64| if z == f64::INFINITY { 0.0 } else { math::ln_sigmoid(z) };
+    LogLikelihood { value: tail(high) + tail(-low) + narrow, ..derivatives }
+}
+
+/// [`logistic`] without its value.
+fn logistic_derivatives(low: f64, high: f64) -> LogLikelihood {
+    let (below_high, beyond_high) = sigmoids(high);
+    let (beyond_low, above_low) = sigmoids(low);
     LogLikelihood {
-        value: tail(high) + tail(-low) + narrow,
+        value: f64::NAN,
         slope: beyond_low - beyond_high,
         curvature: below_high * beyond_high + above_low * beyond_low,
     }

@@ -49,17 +49,7 @@ pub(crate) fn inverse_mills(z: f64) -> f64 {
     if z < -5.0 { 1.0 / mills_ratio(-z) } else { normal_density(z) / normal_cdf(z) }
 }
 
-/// `1 / (1 + exp(-z))`.
-pub(crate) fn sigmoid(z: f64) -> f64 {
-    if z >= 0.0 {
-        1.0 / (1.0 + exp(-z))
-    } else {
-        let e = exp(z);
-        e / (1.0 + e)
-    }
-}
-
-/// Logarithm of [`sigmoid`].
+/// Logarithm of `1 / (1 + exp(-z))`.
 pub(crate) fn ln_sigmoid(z: f64) -> f64 {
     if z >= 0.0 { -ln_1p(exp(-z)) } else { z - ln_1p(exp(z)) }
 }
@@ -84,7 +74,6 @@ mod tests {
         let (below, above) = (inverse_mills(-5.0 - 1e-12), inverse_mills(-5.0 + 1e-12));
         assert!((below - above).abs() < 1e-10);
         assert!((inverse_mills(-1e8) / 1e8 - 1.0).abs() < 1e-12);
-        assert_eq!(sigmoid(-800.0), 0.0);
         assert_eq!(ln_sigmoid(-800.0), -800.0);
     }
 }

@@ -3,16 +3,17 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::belief::{Answer, Belief, Chain, Process};
-use crate::error::Result;
+use crate::belief::{Answer, Belief, Chain, Process, evidence};
+use crate::error::{LearnerError, Result};
 use crate::feedback::{Feedback, FeedbackLog};
+use crate::hyperparameters::Hyperparameters;
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
 use crate::kernel::{Kernel, KernelShape};
 use crate::likelihood::Interval;
 use crate::linalg::{Cholesky, Square};
 use crate::random::Random;
 use crate::settings::{Inference, Labels, LearnerSettings};
-use crate::space::{ActionIndex, SearchSpace};
+use crate::space::{ActionIndex, Dimension, SearchSpace};
 
 /// Mean and standard deviation of the utility of an action.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -28,7 +29,10 @@ pub struct Prediction {
 pub struct Posterior {
     space: SearchSpace,
     settings: LearnerSettings,
+    /// The setting, or what was learned in its place.
+    pub(crate) preference_noise: f64,
     visited: Vec<ActionIndex>,
+    feedback: Vec<Feedback>,
     pub(crate) utility: Belief,
     /// Present when labels are about a function of their own.
     pub(crate) feasibility: Option<Belief>,
@@ -44,6 +48,10 @@ pub struct Learner {
     of: Option<(SearchSpace, LearnerSettings)>,
     utility: Chain,
     feasibility: Chain,
+    /// What the chain of the utility was made with.
+    used: Option<Hyperparameters>,
+    /// Learned from these answers.
+    hyperparameters: Option<(Vec<Answer>, Hyperparameters)>,
 }
 
 /// The belief about the utility after the log.
@@ -55,7 +63,12 @@ pub fn posterior(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSetti
 }
 
 /// Answers about the utility and, when labels are separate, about feasibility.
-fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<ActionIndex>) -> [Vec<Answer>; 2] {
+fn answers(
+    log: &FeedbackLog,
+    settings: &LearnerSettings,
+    preference_noise: f64,
+    infeasible: &HashSet<ActionIndex>,
+) -> [Vec<Answer>; 2] {
     let above = |noise| Interval { low: 0.0, high: f64::INFINITY, noise };
     let mut split = [Vec::new(), Vec::new()];
     for &feedback in &log.feedback {
@@ -65,7 +78,7 @@ fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<A
                 let about = usize::from(settings.labels == Labels::Separate);
                 (about, settings.label_interval(category))
             }
-            Feedback::Preference { .. } => (0, above(settings.preference_noise)),
+            Feedback::Preference { .. } => (0, above(preference_noise)),
             Feedback::Suggestion { .. } => (0, above(settings.coactive_noise)),
             Feedback::Tie { .. } => {
                 (0, Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise })
@@ -80,7 +93,7 @@ fn answers(log: &FeedbackLog, settings: &LearnerSettings, infeasible: &HashSet<A
     split
 }
 
-fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape {
+pub(crate) fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings, factors: &[f64]) -> KernelShape {
     let dimensions = space.dimensions();
     KernelShape {
         variance: settings.signal_variance,
@@ -88,7 +101,11 @@ fn kernel_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelShape 
         product: 1.0 - settings.additive_share - settings.pairwise_share,
         additive: settings.additive_share,
         pairwise: settings.pairwise_share,
-        lengthscales: dimensions.iter().map(|d| d.lengthscale * settings.lengthscale_factor).collect(),
+        lengthscales: dimensions
+            .iter()
+            .zip(factors)
+            .map(|(d, factor)| d.lengthscale * settings.lengthscale_factor * factor)
+            .collect(),
         broad_lengthscales: dimensions.iter().map(|d| d.range() * settings.broad_lengthscale).collect(),
         relevance: vec![1.0; dimensions.len()],
     }
@@ -101,7 +118,7 @@ fn feasibility_shape(space: &SearchSpace, settings: &LearnerSettings) -> KernelS
         additive: settings.feasibility_additive_share,
         pairwise: 0.0,
         lengthscales: space.dimensions().iter().map(|d| d.lengthscale * factor).collect(),
-        ..kernel_shape(space, settings)
+        ..kernel_shape(space, settings, &vec![1.0; space.dimensions().len()])
     }
 }
 
@@ -131,13 +148,19 @@ impl Learner {
                 }
             }
         }
-        let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings)));
         let method: &dyn Approximate = match settings.inference {
             Inference::Laplace => &Laplace,
             Inference::ExpectationPropagation => &ExpectationPropagation::default(),
         };
+        let learned = self.learned(space, log, settings, method, &infeasible)?;
+        if self.used.as_ref() != Some(&learned) {
+            self.utility = Chain::default();
+            self.used = Some(learned.clone());
+        }
+        let preference_noise = settings.preference_noise * learned.preference_noise;
+        let kernel = Arc::new(Kernel::new(space, &kernel_shape(space, settings, &learned.lengthscales)));
         let process = Process { space, kernel: &kernel, link: settings.link, method };
-        let [about_utility, about_feasibility] = answers(log, settings, &infeasible);
+        let [about_utility, about_feasibility] = answers(log, settings, preference_noise, &infeasible);
         let utility = Belief { kernel: Arc::clone(&kernel), state: self.utility.advance(&process, &about_utility)? };
         let feasibility = match settings.labels {
             Labels::InUtility => None,
@@ -149,13 +172,54 @@ impl Learner {
             }
         };
         Ok(Posterior {
+            preference_noise,
             space: space.clone(),
             settings: settings.clone(),
             visited: log.visited.clone(),
+            feedback: log.feedback.clone(),
             utility,
             feasibility,
             infeasible,
         })
+    }
+}
+
+impl Learner {
+    /// Factors on lengthscales and noise after the log.
+    fn learned(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        settings: &LearnerSettings,
+        method: &dyn Approximate,
+        infeasible: &HashSet<ActionIndex>,
+    ) -> Result<Hyperparameters> {
+        let tried = settings.learn_every.map_or(0, |every| log.visited.len() / every * every);
+        if tried == 0 {
+            return Ok(Hyperparameters::neutral(space));
+        }
+        let known: HashSet<ActionIndex> = log.visited[..tried].iter().copied().collect();
+        let about_known = |feedback: &&Feedback| {
+            let (first, second) = feedback.actions();
+            known.contains(&first) && second.is_none_or(|second| known.contains(&second))
+        };
+        let feedback = log.feedback.iter().filter(about_known).copied().collect();
+        let log = FeedbackLog { visited: log.visited[..tried].to_vec(), feedback };
+        let [current, _] = answers(&log, settings, settings.preference_noise, infeasible);
+        if let Some((answers, learned)) = &self.hyperparameters
+            && *answers == current
+        {
+            return Ok(learned.clone());
+        }
+        let learned = Hyperparameters::learn(space, |candidate| {
+            let kernel = Kernel::new(space, &kernel_shape(space, settings, &candidate.lengthscales));
+            let process = Process { space, kernel: &kernel, link: settings.link, method };
+            let noise = settings.preference_noise * candidate.preference_noise;
+            let [about_utility, _] = answers(&log, settings, noise, infeasible);
+            evidence(&process, &about_utility)
+        })?;
+        self.hyperparameters = Some((current, learned.clone()));
+        Ok(learned)
     }
 }
 
@@ -210,15 +274,39 @@ impl Posterior {
         best.map(|(action, _)| action)
     }
 
-    /// One joint draw of the utilities of a few distinct actions.
-    pub(crate) fn draw(&self, actions: &[ActionIndex], random: &mut Random) -> Result<Vec<f64>> {
+    /// Answers given, in order.
+    pub(crate) fn feedback(&self) -> &[Feedback] {
+        &self.feedback
+    }
+
+    /// A dimension of the space by its number.
+    pub(crate) fn dimension(&self, dimension: usize) -> Result<&Dimension> {
+        self.space.dimensions().get(dimension).ok_or_else(|| LearnerError::WrongDimensionCount {
+            given: dimension + 1,
+            expected: self.space.dimensions().len(),
+        })
+    }
+
+    /// What joint draws of the utilities of a few distinct actions need.
+    pub(crate) fn sampler(&self, actions: &[ActionIndex]) -> Result<Sampler> {
         let belief = &self.utility;
         let views: Vec<_> = actions.iter().map(|&a| belief.view(a, self.space.levels(a))).collect();
         let covariance = Square::from_fn(actions.len(), |i, j| {
             belief.covariance(&views[i], &views[j]) + if i == j { belief.kernel.nugget } else { 0.0 }
         });
-        let factor = Cholesky::new(&covariance)?;
-        let noise: Vec<f64> = actions.iter().map(|_| random.normal()).collect();
-        Ok(views.iter().zip(factor.multiply(&noise)).map(|(view, spread)| view.mean + spread).collect())
+        Ok(Sampler { mean: views.iter().map(|v| v.mean).collect(), factor: Cholesky::new(&covariance)? })
+    }
+}
+
+/// Joint draws of the utilities of a few actions.
+pub(crate) struct Sampler {
+    mean: Vec<f64>,
+    factor: Cholesky,
+}
+
+impl Sampler {
+    pub(crate) fn draw(&self, random: &mut Random) -> Vec<f64> {
+        let noise: Vec<f64> = self.mean.iter().map(|_| random.normal()).collect();
+        self.factor.multiply(&noise).iter().zip(&self.mean).map(|(spread, mean)| mean + spread).collect()
     }
 }

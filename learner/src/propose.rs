@@ -127,7 +127,7 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
     };
     let (action, reason) = match belief.settings().method {
         Method::LineCoSpar => line_cospar(belief, best, pending, &taken, &mut random)?,
-        Method::Eubo => match on_lines(belief, best, &taken, &mut random) {
+        Method::Eubo => match on_lines(belief, best, pending, &taken, &mut random) {
             Some(action) => (action, ProposalReason::ExpectedBestUtility),
             None => return Err(LearnerError::Exhausted { actions: space.len() }),
         },
@@ -205,6 +205,7 @@ fn informative(
 fn on_lines(
     belief: &Posterior,
     best: ActionIndex,
+    pending: &[ActionIndex],
     taken: &HashSet<ActionIndex>,
     random: &mut Random,
 ) -> Option<ActionIndex> {
@@ -212,11 +213,11 @@ fn on_lines(
     if lines > 0 && belief.visited().len() < belief.settings().line_trials {
         let candidates: Vec<ActionIndex> =
             (0..lines).flat_map(|_| line::through(belief.space(), best, random)).collect();
-        if let Some(action) = eubo::against(belief, best, taken, Some(&candidates)) {
+        if let Some(action) = eubo::against(belief, best, taken, pending, Some(&candidates)) {
             return Some(action);
         }
     }
-    eubo::against(belief, best, taken, None)
+    eubo::against(belief, best, taken, pending, None)
 }
 
 /// The middle level of every dimension, the lower of two.
@@ -263,7 +264,7 @@ fn line_cospar(
         if candidates.is_empty() {
             continue;
         }
-        let draw = belief.draw(&candidates, random)?;
+        let draw = belief.sampler(&candidates)?.draw(random);
         let (chosen, _) = candidates
             .iter()
             .zip(&draw)

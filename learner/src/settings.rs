@@ -78,7 +78,8 @@ pub enum Partner {
 
 /// Everything that decides how a log is read and what is proposed next.
 ///
-/// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors.
+/// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors,
+/// except that it never repeats an action and compares each with the best so far.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearnerSettings {
@@ -122,6 +123,9 @@ pub struct LearnerSettings {
     pub tie_noise: f64,
     /// Utilities closer than this are felt as equal.
     pub tie_width: f64,
+    /// Learn lengthscales and preference noise from the evidence each time this many more actions were tried.
+    /// None: they stay as set.
+    pub learn_every: Option<usize>,
     /// Region of avoidance: actions whose mean plus this many standard deviations does not reach the lowest
     /// threshold are not proposed while others are left (ROIAL uses -0.45). None: no region is avoided.
     pub avoidance: Option<f64>,
@@ -141,8 +145,31 @@ pub struct LearnerSettings {
 
 impl Default for LearnerSettings {
     fn default() -> Self {
-        Self {
-            method: Method::LineCoSpar,
+        Self::of(Method::LineCoSpar)
+    }
+}
+
+impl LearnerSettings {
+    /// The recommended settings of a method; the README of this crate has the measurements behind them.
+    pub fn of(method: Method) -> Self {
+        match method {
+            Method::Eubo => Self {
+                labels: Labels::Separate,
+                lengthscale_factor: 1.5,
+                lines: 20,
+                line_trials: 10,
+                start: Start::Centre,
+                ..Self::published(method)
+            },
+            _ => Self { repeats: false, partner: Partner::Incumbent, ..Self::published(method) },
+        }
+    }
+
+    /// The settings of a method as the literature has them: LineCoSpar may repeat actions and compares with the last
+    /// ones tried, EUBO looks at the whole grid with labels in the utility.
+    pub fn published(method: Method) -> Self {
+        let polar = Self {
+            method,
             inference: Inference::Laplace,
             link: Link::Logistic,
             signal_variance: 1.0,
@@ -161,6 +188,7 @@ impl Default for LearnerSettings {
             coactive_noise: 0.02,
             tie_noise: 0.02,
             tie_width: 0.02,
+            learn_every: None,
             avoidance: None,
             samples_per_iteration: 1,
             repeats: true,
@@ -168,24 +196,16 @@ impl Default for LearnerSettings {
             line_trials: usize::MAX,
             partner: Partner::Previous,
             buffer: 1,
-        }
-    }
-}
-
-impl LearnerSettings {
-    /// The recommended settings of a method.
-    pub fn of(method: Method) -> Self {
+        };
         match method {
-            Method::LineCoSpar | Method::Thompson | Method::InformationGain | Method::Random => {
-                Self { method, ..Self::default() }
-            }
             Method::Eubo => Self {
-                method,
                 inference: Inference::ExpectationPropagation,
                 link: Link::Probit,
                 partner: Partner::Incumbent,
-                ..Self::default()
+                repeats: false,
+                ..polar
             },
+            _ => polar,
         }
     }
 
@@ -225,6 +245,9 @@ impl LearnerSettings {
             if !(value >= low && value <= high) {
                 return refuse(setting, format!("{value} is not between {low} and {high}"));
             }
+        }
+        if self.learn_every == Some(0) {
+            return refuse("learn_every", "must be at least 1".into());
         }
         if let Some(avoidance) = self.avoidance
             && (avoidance.is_nan() || avoidance.abs() > 1e3)

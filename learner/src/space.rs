@@ -8,6 +8,8 @@ use crate::error::{LearnerError, Result};
 
 /// Largest number of actions of a search space: indices stay exact as JSON numbers.
 const MAX_ACTIONS: u64 = 1 << 53;
+/// Largest number of actions that are looked at one by one.
+const MAX_ENUMERATED: usize = 1 << 20;
 /// Largest number of levels of one dimension.
 const MAX_LEVELS: usize = 10_000;
 /// Largest number of dimensions.
@@ -139,6 +141,14 @@ impl SearchSpace {
     #[allow(clippy::len_without_is_empty, reason = "a search space is never empty")]
     pub fn len(&self) -> u64 {
         self.len
+    }
+
+    /// Number of actions when all of them can be looked at.
+    pub(crate) fn enumerable(&self) -> Result<usize> {
+        usize::try_from(self.len)
+            .ok()
+            .filter(|&len| len <= MAX_ENUMERATED)
+            .ok_or(LearnerError::TooManyActions { limit: MAX_ENUMERATED as u64 })
     }
 
     /// Number of levels of every dimension.

@@ -1,42 +1,15 @@
-//! Development probe of the cold start.
-use gait_optimizer::cold_start::{GuessSettings, motion, muscles, posture};
-use gait_optimizer::gait_problem::GaitProgramme;
-use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, StartPoint};
-use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
-fn run(name: &str, p: &GaitProgramme, x: Vec<f64>, mu: f64, tol: f64, verbose: bool) -> nlp::NlpResult {
-    let settings = NlpSettings {
-        tolerance: tol,
-        mu_initial: mu,
-        bound_push: 1e-2, bound_fraction: 1e-2,
-        bound_multiplier_start: BoundMultiplierStart::Centred,
-        max_iterations: 600,
-        threads: 2,
-        ..NlpSettings::default()
-    };
-    let r = nlp::solve(p, &StartPoint::Cold(x), &settings, &mut |r| if verbose {eprintln!("{} {:?} obj {:.8} viol {:.1e} dual {:.1e} compl {:.1e} mu {:.1e} a {:.2} {:.2} dw {:.1e} tr {}", r.number, r.phase, r.objective, r.violation, r.dual_infeasibility, r.complementarity, r.mu, r.alpha_primal, r.alpha_dual, r.delta_w, r.trials)}, &|| false).unwrap();
-    println!("{name}: {:?} it {} obj {:.8} viol {:.1e} time {:.2}s (eval {:.2} fac {:.2} solve {:.2}) facs {} mcot {:.6}", r.status, r.iterations, r.objective, r.residuals.violation, r.timing.total, r.timing.evaluation, r.timing.factorisation, r.timing.backsolves, r.counts.factorisations, p.objective_parts(&r.x).cost_of_transport);
-    r
-}
+//! Development probe: cold and warm solves.
+use gait_optimizer::*;
 fn main() {
-    let verbose = std::env::args().any(|a| a == "-v");
-    for s in [1, 2] {
-        let new = |m| GaitProgramme::new(&Subject::builtin(s).unwrap(), &Device::ampro3().unwrap(), &TunedBounds::default(), m, &GaitSettings::default(), &ReferenceGait::builtin().unwrap()).unwrap();
-        let plain = new(false);
-        let full = new(true);
-        let guess = GuessSettings::default();
-        let t = std::time::Instant::now();
-        let postures = posture::solve(&plain, &guess).unwrap();
-        println!("posture {:?}", t.elapsed());
-        let x = motion::guess(&plain, &postures, &guess);
-        let v = plain.violations(&x);
-        for v in v.iter().take(5) { println!("  {:?} {}", v, v.row.map(|r| plain.rows.names[r].label()).unwrap_or_default()); }
-        let r1 = run("track", &plain.for_tracking(10.0), x, 1e-3, 1e-3, verbose);
-        let r2 = run("cost", &plain, r1.x.clone(), 1e-4, 1e-6, verbose);
-        let _ = r2;
-        let t = std::time::Instant::now();
-        let xm = muscles::guess(&full, &plain, &r1.x).unwrap();
-        println!("muscle guess {:?}", t.elapsed());
-        let r3 = run("muscle track", &full.for_tracking(10.0), xm, 1e-2, 1e-3, verbose);
-        run("muscle cost", &full, r3.x.clone(), 1e-4, 1e-6, verbose);
+    let args: Vec<String> = std::env::args().collect();
+    let verbose = args.iter().any(|a| a == "-v");
+    for (s, m) in [(1, false), (1, true), (2, false), (2, true)] {
+        if args.iter().any(|a| a == "-n") && m { continue; }
+        if args.iter().any(|a| a == "-m") && !m { continue; }
+        let problem = GaitProblem::new(Subject::builtin(s).unwrap(), m).unwrap();
+        let o = solve(&problem, None, &SolveOptions { threads: 2, max_iterations: 400, ..Default::default() }, &mut |r| if verbose { eprintln!("{:?} {} obj {:.8} viol {:.1e} dual {:.1e} mu {:.1e} a {:.3}", r.phase, r.iteration, r.objective, r.constraint_violation, r.dual_infeasibility, r.barrier, r.step) }, &CancelToken::new()).unwrap();
+        let r = &o.report;
+        println!("s{s} {m} {:?} it {} obj {:.8} cot {:.6} rmse {:.4} viol {:.1e} t {:.2} (eval {:.2} la {:.2}) speed {:.4} T {:?}", r.status, r.iterations, r.objective, r.cost_of_transport, r.gait_rmse_rad, r.max_violation, r.seconds_total, r.seconds_evaluation, r.seconds_linear_algebra, r.speed_m_s, r.durations_s.map(|t| (t * 1000.).round()));
+        for v in o.violations.iter().take(3) { println!("   {} {} {}", v.row, v.amount, v.unit); }
     }
 }

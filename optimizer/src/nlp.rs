@@ -4,7 +4,8 @@
 //! interior point with a filter line search (Wächter & Biegler, Math. Program. 106, 2006). The path of a solve:
 //!
 //! `solve` -> `formulation` (slacks, fixed variables, scaling) -> `interior_point` { `optimality`, `barrier`,
-//! `inertia_correction`, `newton` (assembly in `kkt`, factorisation behind `kkt_solver`), `line_search` with `filter`,
+//! `inertia_correction`, `newton` (assembly in `kkt`, factorisation behind `kkt_solver`: `multifrontal` or `supernodal`,
+//! chosen in `linear_solver`), `line_search` with `filter`,
 //! and `feasibility` when the line search fails } -> `status::NlpResult`.
 
 mod barrier;

@@ -227,7 +227,7 @@ fn nlp_solves_are_bit_for_bit_repeatable_and_independent_of_threads() {
         let mut trace = Vec::new();
         let settings = NlpSettings { linear_solver, threads, ..NlpSettings::default() };
         let start = StartPoint::Cold(problem.start.clone());
-        let r = solve(&problem, &start, &settings, &mut |it| trace.push(it.clone()), &|| false).unwrap();
+        let r = solve(&problem, &start, &settings, &mut |it| trace.push(*it), &|| false).unwrap();
         assert_eq!(r.status, NlpStatus::Converged);
         (trace, r.x, r.row_multipliers)
     };
@@ -357,7 +357,7 @@ fn nlp_linear_objective_without_curvature() {
 #[test]
 fn nlp_separable_problems_have_a_diagonal_matrix() {
     let n = 300;
-    let objective = (0..n).map(|k| Term::new(vec![k], move |x| square(x[0] - f64::from(k as u32 % 7)))).collect();
+    let objective = (0..n).map(|k| Term::new(vec![k], move |x| square(x[0] - (k % 7) as f64))).collect();
     let mut problem = Sparse::new(vec![1.0; n], objective, vec![], vec![]);
     problem.upper.fill(5.0);
     let r = run(&problem, &problem.start, &NlpSettings::default());

@@ -5,6 +5,7 @@ mod nlp_standard;
 
 use gait_optimizer::nlp::{BarrierStrategy, LinearSolver, NlpSettings, NlpStatus, StartPoint, solve};
 use nlp_standard::hock_schittkowski;
+use nlp_standard::sparse::{Sparse, cart_pole, gait_sized};
 
 fn misses(settings: &NlpSettings, golden: Option<&[(&str, usize)]>) -> Vec<String> {
     let mut misses = Vec::new();
@@ -56,4 +57,55 @@ fn nlp_standard_set_converges_with_the_adaptive_barrier() {
     let misses = misses(&NlpSettings { barrier_strategy: BarrierStrategy::Adaptive, ..NlpSettings::default() }, None);
     let others: Vec<&String> = misses.iter().filter(|m| !m.starts_with("HS33: Converged f = 1.9999")).collect();
     assert!(others.is_empty(), "{others:?}");
+}
+
+#[test]
+fn nlp_standard_set_from_random_starts_never_claims_falsely() {
+    let (mut solves, mut converged) = (0, 0);
+    for problem in hock_schittkowski::all() {
+        let mut seed = 777u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        for _ in 0..3 {
+            let x = problem.start.iter().map(|v| v + (1.0 + v.abs()) * random()).collect();
+            let r = solve(&problem, &StartPoint::Cold(x), &NlpSettings::default(), &mut |_| {}, &|| false).unwrap();
+            solves += 1;
+            if r.status == NlpStatus::Converged {
+                converged += 1;
+                let s = r.scaled_residuals;
+                assert!(r.residuals.violation <= 1e-6, "{}: {r:?}", problem.name);
+                assert!(s.dual_infeasibility <= 1e-8 && s.complementarity <= 1e-8, "{}: {r:?}", problem.name);
+            } else {
+                assert!(r.status == NlpStatus::Infeasible && r.residuals.violation > 1e-6, "{}: {r:?}", problem.name);
+            }
+        }
+    }
+    assert!(converged * 100 >= solves * 98, "{converged} of {solves}");
+}
+
+#[test]
+fn nlp_sparse_problems_keep_their_iteration_counts_with_every_solver() {
+    // name, problem, optimum, iterations
+    let golden: Vec<(&str, Sparse, f64, usize)> = vec![
+        ("cart-pole 50", cart_pole(50, 20.0, 1), 2.288286949, 30),
+        ("cart-pole 100", cart_pole(100, 20.0, 1), 2.284912413, 46),
+        ("gait-sized 2 x 5", gait_sized(2, 5), 159.43500783, 20),
+    ];
+    for (name, problem, optimum, iterations) in &golden {
+        for linear_solver in [LinearSolver::Auto, LinearSolver::Supernodal, LinearSolver::Multifrontal] {
+            let settings = NlpSettings { linear_solver, threads: 2, ..NlpSettings::default() };
+            let start = StartPoint::Cold(problem.start.clone());
+            let r = solve(problem, &start, &settings, &mut |_| {}, &|| false).unwrap();
+            assert_eq!(r.status, NlpStatus::Converged, "{name} {linear_solver:?}");
+            let limit = iterations + (iterations / 10).max(2);
+            assert!(
+                r.iterations <= limit,
+                "{name} {linear_solver:?}: {} iterations, used to be {iterations}",
+                r.iterations
+            );
+            assert!((r.objective - optimum).abs() < 1e-6 * optimum.abs(), "{name} {linear_solver:?}: {}", r.objective);
+        }
+    }
 }

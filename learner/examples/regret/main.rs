@@ -5,7 +5,8 @@
 //!     --comparisons N [--noise S] [--lengthscale L] [--set '{"setting": value}'] --out FILE.csv
 //! ```
 //!
-//! Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the
+//! NAME is `random` (the winner stays), a method (`linecospar`, `eubo`, `thompson`, `information_gain`) with its
+//! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the
 //! quartiles. `--noise S` answers with logistic noise of scale `S` on the utility. `--set` changes settings of the
 //! method. Regret is 1 minus the utility of the recommended action.
 
@@ -65,8 +66,13 @@ fn options() -> Result<Options, Box<dyn Error>> {
 
 /// The settings of a method with the changes asked for.
 fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
-    let method = serde_json::from_value(options.method.clone().into())?;
-    let serde_json::Value::Object(mut document) = serde_json::to_value(LearnerSettings::of(method))? else {
+    let (name, published) = match options.method.strip_suffix("_published") {
+        Some(name) => (name, true),
+        None => (options.method.as_str(), false),
+    };
+    let method = serde_json::from_value(name.into())?;
+    let settings = if published { LearnerSettings::published(method) } else { LearnerSettings::of(method) };
+    let serde_json::Value::Object(mut document) = serde_json::to_value(settings)? else {
         return Err("settings are an object".into());
     };
     document.extend(options.set.clone());
@@ -100,7 +106,7 @@ impl Person<'_> {
 /// Regret after 0, 1, ... comparisons.
 fn run(options: &Options, settings: Option<&LearnerSettings>, seed: u64) -> Result<Vec<f64>, Box<dyn Error>> {
     let problem = Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?;
-    let mut person = Person { problem: &problem, noise: options.noise, random: SplitMix64(seed ^ 0x5EED_0F_A17E) };
+    let mut person = Person { problem: &problem, noise: options.noise, random: SplitMix64(seed ^ 0x005E_ED0F_A17E) };
     let Some(settings) = settings else { return Ok(champion(&problem, &mut person, options.comparisons, seed)) };
     let labelled = problem.converged.iter().any(|c| !c);
     let mut learner = Learner::default();

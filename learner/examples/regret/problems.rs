@@ -173,7 +173,8 @@ fn hartmann<const D: usize>(n: usize, a: &[[f64; D]; 4], p: &[[f64; D]; 4], leng
     Problem { space, utility, converged }
 }
 
-/// The grid maximum of the raw Hartmann function in 3 or 6 dimensions, with where it is.
+/// For the tests of the definition: the grid maximum of the raw Hartmann function in 3 or 6 dimensions, with where it is.
+#[allow(dead_code)]
 pub fn hartmann_maximum(dimensions: usize) -> (f64, Vec<f64>) {
     let problem = if dimensions == 3 { hartmann(21, &A3, &P3, 0.1) } else { hartmann(6, &A6, &P6, 0.1) };
     let best = (0..problem.space.len())

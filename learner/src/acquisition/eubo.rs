@@ -7,11 +7,12 @@
 
 use std::collections::HashSet;
 
+use crate::belief::Belief;
 use crate::grid::Grid;
 use crate::linalg::BLOCK;
 use crate::math;
 use crate::posterior::Posterior;
-use crate::space::ActionIndex;
+use crate::space::{ActionIndex, SearchSpace};
 
 /// `E max(X, 0)` for `X` normal with the given mean and variance.
 pub(crate) fn expected_gain(mean: f64, variance: f64) -> f64 {
@@ -52,85 +53,179 @@ impl GainBound {
     }
 }
 
+/// The utility of every action beside the incumbent's.
+struct Duel<'a> {
+    grid: Grid<'a>,
+    incumbent_mean: f64,
+    incumbent_variance: f64,
+    means: Vec<f64>,
+    /// Posterior covariances with the incumbent.
+    covariances: Vec<f64>,
+    /// Prior covariances with the incumbent.
+    prior: Vec<f64>,
+    /// Prior variance that answers removed from the incumbent.
+    spent: f64,
+    /// What knowing the utility of each pending action would take from every standard deviation: squares add up.
+    pending: Vec<Vec<f64>>,
+}
+
+impl<'a> Duel<'a> {
+    fn new(space: &SearchSpace, belief: &'a Belief, best: ActionIndex, pending: &[ActionIndex]) -> Self {
+        let grid = Grid::new(space, belief);
+        let view = belief.view(best, space.levels(best));
+        let incumbent_variance = belief.variance(&view);
+        let prior = grid.prior_with(space, best);
+        let (means, mut covariances) = grid.forms(&belief.approximation().weights, &belief.covariance_weights(&view));
+        for (covariance, prior) in covariances.iter_mut().zip(&prior) {
+            *covariance += prior;
+        }
+        let spent = (belief.kernel.variance + belief.kernel.nugget - incumbent_variance).max(1e-12);
+        let mut duel = Self {
+            grid,
+            incumbent_mean: view.mean,
+            incumbent_variance,
+            means,
+            covariances,
+            prior,
+            spent,
+            pending: Vec::new(),
+        };
+        for &action in pending {
+            duel.suppose_known(space, belief, action, best);
+        }
+        duel
+    }
+
+    /// Conditions variances and covariances on the utility of a pending action.
+    fn suppose_known(&mut self, space: &SearchSpace, belief: &Belief, action: ActionIndex, best: ActionIndex) {
+        let (Ok(at), Ok(incumbent)) = (usize::try_from(action.0), usize::try_from(best.0)) else { return };
+        let view = belief.view(action, space.levels(action));
+        let weights = belief.covariance_weights(&view);
+        let mut column = self.grid.forms(&weights, &weights).0;
+        for (value, prior) in column.iter_mut().zip(self.grid.prior_with(space, action)) {
+            *value += prior;
+        }
+        let mut variance = belief.variance(&view) + belief.kernel.nugget;
+        for earlier in &self.pending {
+            let own = earlier[at];
+            variance -= own * own;
+            for (value, r) in column.iter_mut().zip(earlier) {
+                *value -= own * r;
+            }
+        }
+        let sd = variance.max(belief.kernel.nugget).sqrt();
+        for value in &mut column {
+            *value /= sd;
+        }
+        let with_best = column[incumbent];
+        self.incumbent_variance = (self.incumbent_variance - with_best * with_best).max(0.0);
+        for (covariance, r) in self.covariances.iter_mut().zip(&column) {
+            *covariance -= r * with_best;
+        }
+        self.pending.push(column);
+    }
+
+    fn supposed(&self, x: usize) -> f64 {
+        self.pending.iter().map(|r| r[x] * r[x]).sum()
+    }
+
+    /// Mean of the difference to the incumbent.
+    fn lead(&self, x: usize) -> f64 {
+        self.means[x] - self.incumbent_mean
+    }
+
+    /// Variance of the difference, given the action's own variance.
+    fn variance(&self, x: usize, own: f64) -> f64 {
+        (own - self.supposed(x) + self.incumbent_variance - 2.0 * self.covariances[x]).max(0.0)
+    }
+
+    /// At least the action's own variance: Cauchy-Schwarz gives what the answers about the incumbent removed.
+    fn variance_bound(&self, x: usize, total: f64) -> f64 {
+        if !self.pending.is_empty() {
+            return total;
+        }
+        total - (self.prior[x] - self.covariances[x]).powi(2) / self.spent
+    }
+}
+
+/// The probability of every action to be feasible.
+struct Chance<'a> {
+    grid: Grid<'a>,
+    means: Vec<f64>,
+    threshold: f64,
+    prior_sd: f64,
+}
+
+impl<'a> Chance<'a> {
+    fn new(space: &SearchSpace, belief: &'a Belief, threshold: f64) -> Self {
+        let grid = Grid::new(space, belief);
+        let weights = &belief.approximation().weights;
+        let means = grid.forms(weights, weights).0;
+        Self { grid, means, threshold, prior_sd: belief.kernel.variance.sqrt() }
+    }
+
+    fn bound(&self, x: usize) -> f64 {
+        let z = (self.means[x] - self.threshold) / self.prior_sd;
+        if z >= 0.0 { 1.0 } else { math::normal_cdf(z) }
+    }
+
+    fn of(&self, actions: &[usize]) -> Vec<f64> {
+        let variances = self.grid.variances(actions);
+        let chance = |(&x, v): (&usize, f64)| math::normal_cdf((self.means[x] - self.threshold) / v.max(1e-12).sqrt());
+        actions.iter().zip(variances).map(chance).collect()
+    }
+}
+
 /// The action outside `taken` with the highest expected utility of the better of it and `best`, times its
-/// probability of being feasible where that is a function of its own.
+/// probability of being feasible where that is a function of its own. `among` restricts the search; the utilities of
+/// `pending` actions are supposed to become known.
 pub(crate) fn against(
     belief: &Posterior,
     best: ActionIndex,
     taken: &HashSet<ActionIndex>,
+    pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
     let space = belief.space();
-    let utility = &belief.utility;
-    let grid = Grid::new(space, utility);
-    let incumbent = utility.view(best, space.levels(best));
-    let own = utility.variance(&incumbent);
-    let hopeless = belief.feasibility.is_some() && belief.infeasible.contains(&best);
-    let slot = utility.model().slot(best);
-    let weights = slot.map_or_else(|| vec![0.0; utility.model().points.len()], |slot| utility.covariance_weights(slot));
-    let (means, covariances) = grid.forms(&utility.approximation().weights, &weights);
-    let feasibility = belief.feasibility.as_ref().map(|feasibility| {
-        let grid = Grid::new(space, feasibility);
-        let weights = &feasibility.approximation().weights;
-        let means = grid.forms(weights, weights).0;
-        (grid, means, feasibility.kernel.variance)
-    });
+    let duel = Duel::new(space, &belief.utility, best, pending);
     let threshold = belief.settings().ordinal_thresholds.first().copied().unwrap_or(f64::NEG_INFINITY);
-    let total = utility.kernel.variance;
-    // Cauchy-Schwarz: what the answers about the incumbent alone remove of a variance.
-    let spent = (total + utility.kernel.nugget - own).max(1e-12);
-    let with_best = slot.map(|slot| grid.with_point(slot));
+    let chance = belief.feasibility.as_ref().map(|belief| Chance::new(space, belief, threshold));
+    // Nothing feasible was found yet: whatever is feasible is better.
+    let hopeless = chance.is_some() && belief.infeasible.contains(&best);
+    let total = belief.utility.kernel.variance;
     let bounds = GainBound::new();
     let bound = |x: usize| {
-        let removed = with_best.as_ref().map_or(0.0, |k| (k[x] - covariances[x]).powi(2) / spent);
-        let variance = total - removed + own - 2.0 * covariances[x];
-        let gain = if hopeless { 1.0 } else { bounds.of(means[x] - incumbent.mean, variance) };
-        let chance = feasibility.as_ref().map_or(1.0, |(_, means, total)| {
-            let z = (means[x] - threshold) / total.sqrt();
-            if z >= 0.0 { 1.0 } else { math::normal_cdf(z) }
-        });
-        gain * chance
+        let variance = duel.variance(x, duel.variance_bound(x, total));
+        let gain = if hopeless { 1.0 } else { bounds.of(duel.lead(x), variance) };
+        gain * chance.as_ref().map_or(1.0, |chance| chance.bound(x))
     };
-    let mut free = vec![among.is_none(); means.len()];
-    for action in among.unwrap_or_default() {
+    let mut free = vec![among.is_none(); duel.means.len()];
+    let mut mark = |action: &ActionIndex, value: bool| {
         if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
-            *free = true;
+            *free = value;
         }
+    };
+    for action in among.unwrap_or_default() {
+        mark(action, true);
     }
     for action in taken {
-        if let Some(free) = usize::try_from(action.0).ok().and_then(|x| free.get_mut(x)) {
-            *free = false;
-        }
+        mark(action, false);
     }
-    let mut ranked: Vec<(f64, usize)> = (0..means.len()).filter(|&x| free[x]).map(|x| (bound(x), x)).collect();
+    let mut ranked: Vec<(f64, usize)> = (0..free.len()).filter(|&x| free[x]).map(|x| (bound(x), x)).collect();
     let order = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     let mut top: Option<(f64, usize)> = None;
-    // The first block alone usually rules out most of the rest, which then need not be sorted.
-    let first = BLOCK.min(ranked.len());
-    if first < ranked.len() {
-        ranked.select_nth_unstable_by(first, order);
-    }
-    let (head, tail) = ranked.split_at_mut(first);
     let mut consider = |chunk: &[(f64, usize)]| {
+        let highest = top.map_or(f64::NEG_INFINITY, |(value, _)| value);
         let actions: Vec<usize> = chunk.iter().map(|c| c.1).collect();
-        let variances = grid.variances(&actions);
-        let chances: Vec<f64> = match &feasibility {
-            None => vec![1.0; actions.len()],
-            Some((grid, means, _)) => {
-                let variances = grid.variances(&actions);
-                actions
-                    .iter()
-                    .zip(variances)
-                    .map(|(&x, v)| math::normal_cdf((means[x] - threshold) / v.max(1e-12).sqrt()))
-                    .collect()
-            }
-        };
-        for ((&x, variance), chance) in actions.iter().zip(variances).zip(chances) {
-            let gain = if hopeless {
-                1.0
-            } else {
-                expected_gain(means[x] - incumbent.mean, (variance + own - 2.0 * covariances[x]).max(0.0))
-            };
+        let gains: Vec<(usize, f64)> = actions
+            .iter()
+            .zip(duel.grid.variances(&actions))
+            .map(|(&x, own)| (x, if hopeless { 1.0 } else { expected_gain(duel.lead(x), duel.variance(x, own)) }))
+            .filter(|&(x, gain)| gain * chance.as_ref().map_or(1.0, |chance| chance.bound(x)) >= highest)
+            .collect();
+        let actions: Vec<usize> = gains.iter().map(|g| g.0).collect();
+        let chances = chance.as_ref().map_or_else(|| vec![1.0; gains.len()], |chance| chance.of(&actions));
+        for ((x, gain), chance) in gains.into_iter().zip(chances) {
             let value = gain * chance;
             if top.is_none_or(|(highest, at)| value > highest || (value == highest && x < at)) {
                 top = Some((value, x));
@@ -138,6 +233,12 @@ pub(crate) fn against(
         }
         top.map_or(f64::NEG_INFINITY, |(value, _)| value)
     };
+    // The first block alone usually rules out most of the rest, which then need not be sorted.
+    let first = BLOCK.min(ranked.len());
+    if first < ranked.len() {
+        ranked.select_nth_unstable_by(first, order);
+    }
+    let (head, tail) = ranked.split_at(first);
     let mut highest = if head.is_empty() { f64::NEG_INFINITY } else { consider(head) };
     let mut rest: Vec<(f64, usize)> = tail.iter().copied().filter(|(bound, _)| *bound >= highest).collect();
     rest.sort_unstable_by(order);
@@ -156,8 +257,8 @@ mod tests {
     use crate::feedback::{Feedback, FeedbackLog};
     use crate::posterior::posterior;
     use crate::random::Random;
-    use crate::settings::{LearnerSettings, Method};
-    use crate::space::{Dimension, SearchSpace};
+    use crate::settings::{Labels, LearnerSettings, Method};
+    use crate::space::Dimension;
 
     #[test]
     fn the_pruned_search_finds_the_maximiser() {
@@ -167,11 +268,12 @@ mod tests {
             .map(|(d, &n)| Dimension { name: d.to_string(), values: (0..n).map(f64::from).collect(), lengthscale: 1.3 })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();
-        for (shares, seed) in [((0.0, 0.0), 1), ((0.3, 0.3), 2), ((0.0, 0.0), 3), ((0.5, 0.0), 4)] {
+        for (shares, seed) in [((0.0, 0.0), 1), ((0.3, 0.3), 2), ((0.0, 0.0), 3), ((0.5, 0.0), 4), ((0.3, 0.2), 5)] {
             let settings = LearnerSettings {
                 additive_share: shares.0,
                 pairwise_share: shares.1,
-                ..LearnerSettings::of(Method::Eubo)
+                labels: if seed % 2 == 1 { Labels::Separate } else { Labels::InUtility },
+                ..LearnerSettings::published(Method::Eubo)
             };
             let mut random = Random::new(seed, 0);
             let mut log = FeedbackLog::default();
@@ -194,12 +296,16 @@ mod tests {
             for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(a)) {
                 let (mean, variance) =
                     belief.utility.difference(&belief.utility.view(action, space.levels(action)), &incumbent);
-                let gain = expected_gain(mean, variance);
+                let chance = belief.feasibility.as_ref().map_or(1.0, |feasibility| {
+                    let view = feasibility.view(action, space.levels(action));
+                    math::normal_cdf(view.mean / feasibility.variance(&view).sqrt())
+                });
+                let gain = expected_gain(mean, variance) * chance;
                 if gain > top.0 {
                     top = (gain, action);
                 }
             }
-            assert_eq!(against(&belief, best, &taken, None), Some(top.1));
+            assert_eq!(against(&belief, best, &taken, &[], None), Some(top.1));
         }
     }
 }

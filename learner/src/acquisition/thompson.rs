@@ -94,18 +94,6 @@ pub(crate) fn draw(space: &SearchSpace, belief: &Belief, grid: &Grid<'_>, random
     Ok(sample)
 }
 
-/// Mean over the grid of a belief, for the tests and the slices.
-pub(crate) fn means(belief: &Belief, grid: &Grid<'_>) -> Vec<f64> {
-    let weights = &belief.approximation().weights;
-    let mut means = grid.forms(weights, weights).0;
-    for (action, &mean) in belief.model().points.iter().zip(&belief.approximation().mean) {
-        if let Some(at) = usize::try_from(action.0).ok().and_then(|x| means.get_mut(x)) {
-            *at = mean;
-        }
-    }
-    means
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,12 +1,13 @@
 //! Expectation propagation (Minka 2001) for probit answers about one utility or the difference of two.
 //!
-//! Each answer's factor is replaced in turn by the normal one that gives the right mean and variance of `d` when
-//! every other answer keeps its normal factor. The covariance of the points is kept whole and every replacement
-//! changes it by a matrix of rank one: `O(n^2)` for a replacement, `O(1)` for finding that none is needed.
+//! Each answer's factor is replaced in turn by the normal one that gives the right mean and variance of its functional
+//! when every other answer keeps its normal factor.
 
-use super::{Approximate, Approximation, Factor, Spread, whitened_precision};
+use super::sites::{Cavity, Match, Working, shifts};
+use super::{Approximate, Approximation, Factor, whitened_precision};
 use crate::error::Result;
-use crate::linalg::{Cholesky, Square, add_scaled, dot};
+use crate::likelihood::LogLikelihood;
+use crate::linalg::dot;
 use crate::math;
 use crate::model::{Model, Site};
 use crate::settings::Link;
@@ -25,205 +26,56 @@ impl Default for ExpectationPropagation {
     }
 }
 
-/// Cavities with less than this share of the marginal's precision are left alone.
-const MIN_CAVITY: f64 = 1e-10;
-/// Points after which the covariance is computed anew, so that rounding cannot add up.
-const REFRESH: usize = 64;
-
-/// The normal distribution being improved.
-struct Working {
-    covariance: Square,
-    mean: Vec<f64>,
-    factors: Vec<Factor>,
+/// Logarithm, slope and curvature of an answer's probability under its cavity, in the cavity's mean.
+fn mass(site: &Site, cavity: Cavity) -> LogLikelihood {
+    let mut interval = site.interval;
+    interval.noise = (1.0 / cavity.precision + interval.noise * interval.noise).sqrt();
+    interval.log_likelihood(Link::Probit, cavity.mean)
 }
 
-/// Cavity and tilted moments of one answer.
-struct Tilted {
-    cavity_precision: f64,
-    cavity_mean: f64,
-    ln_mass: f64,
-    factor: Factor,
-}
-
-fn variance(site: &Site, covariance: &Square) -> f64 {
-    let at = covariance.at(site.plus, site.plus);
-    site.minus.map_or(at, |m| at + covariance.at(m, m) - 2.0 * covariance.at(site.plus, m))
-}
-
-impl Working {
-    fn tilt(&self, site: &Site, factor: Factor) -> Option<Tilted> {
-        let variance = variance(site, &self.covariance);
-        if variance.is_nan() || variance < 1e-14 {
-            return None;
-        }
-        let cavity_precision = 1.0 / variance - factor.precision;
-        if cavity_precision < MIN_CAVITY / variance {
-            return None;
-        }
-        let cavity_variance = 1.0 / cavity_precision;
-        let cavity_mean = cavity_variance * (site.of(&self.mean) / variance - factor.shift);
-        let mut interval = site.interval;
-        interval.noise = (cavity_variance + interval.noise * interval.noise).sqrt();
-        let at = interval.log_likelihood(Link::Probit, cavity_mean);
-        let mean = cavity_mean + cavity_variance * at.slope;
-        // 1 / variance - 1 / cavity variance, with variance = cavity (1 - cavity curvature).
-        let shrink = (cavity_variance * at.curvature).min(1.0 - 1e-12);
+impl Match for ExpectationPropagation {
+    fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor> {
+        let variance = 1.0 / cavity.precision;
+        let at = mass(site, cavity);
+        let mean = cavity.mean + variance * at.slope;
+        // 1 / tilted variance - 1 / cavity variance, with tilted = cavity (1 - cavity curvature).
+        let shrink = (variance * at.curvature).min(1.0 - 1e-12);
         let precision = at.curvature / (1.0 - shrink);
-        let shift = mean * (cavity_precision + precision) - cavity_mean * cavity_precision;
-        (precision.is_finite() && shift.is_finite()).then_some(Tilted {
-            cavity_precision,
-            cavity_mean,
-            ln_mass: at.value,
-            factor: Factor { precision, shift },
-        })
+        let shift = mean * (cavity.precision + precision) - cavity.mean * cavity.precision;
+        (precision.is_finite() && shift.is_finite()).then_some(Factor { precision, shift })
     }
-
-    /// Replaces one factor; whether it was worth it.
-    fn replace(&mut self, index: usize, site: &Site, tolerance: f64) -> bool {
-        let old = self.factors[index];
-        let Some(tilted) = self.tilt(site, old) else { return false };
-        let new = tilted.factor;
-        let (more_precision, more_shift) = (new.precision - old.precision, new.shift - old.shift);
-        let variance = variance(site, &self.covariance);
-        let gain = 1.0 / more_precision.mul_add(variance, 1.0);
-        let move_by = (more_shift - more_precision * site.of(&self.mean)) * gain;
-        if (move_by * variance.sqrt()).abs() < tolerance && (more_precision * variance * gain).abs() < tolerance {
-            return false;
-        }
-        let mut column = self.covariance.row(site.plus).to_vec();
-        if let Some(minus) = site.minus {
-            add_scaled(&mut column, -1.0, self.covariance.row(minus));
-        }
-        add_scaled(&mut self.mean, move_by, &column);
-        self.covariance.add_rank_one(-more_precision * gain, &column);
-        self.factors[index] = new;
-        true
-    }
-
-    /// Computes covariance and mean from the factors.
-    fn refresh(&mut self, prior: &Cholesky, sites: &[Site]) -> Result<()> {
-        let n = prior.order();
-        let precision = whitened_precision(prior, sites, &self.factors)?;
-        // Columns of L B^-1/2: the covariance is their product.
-        let mut columns = Square::zeros(n);
-        for i in 0..n {
-            let row = columns.row_mut(i);
-            row[..=i].copy_from_slice(prior.row(i));
-            precision.solve_lower(row);
-        }
-        self.covariance = columns.outer_product();
-        self.mean = self.covariance.multiply(&shifts(n, sites, &self.factors));
-        Ok(())
-    }
-}
-
-/// `sum_s shift_s a_s`.
-fn shifts(n: usize, sites: &[Site], factors: &[Factor]) -> Vec<f64> {
-    let mut h = vec![0.0; n];
-    for (site, factor) in sites.iter().zip(factors) {
-        h[site.plus] += factor.shift;
-        if let Some(minus) = site.minus {
-            h[minus] -= factor.shift;
-        }
-    }
-    h
-}
-
-/// The previous distribution with the new points added, each given the others.
-fn extend(model: &Model, previous: Option<&Approximation>) -> Working {
-    let n = model.prior.order();
-    let old = previous.map_or(0, |p| p.mean.len());
-    let mut working = match previous {
-        Some(Approximation { mean, factors, spread: Spread::Covariance(covariance), .. }) => {
-            Working { covariance: covariance.grown(n - old), mean: mean.clone(), factors: factors.clone() }
-        }
-        _ => Working { covariance: Square::zeros(n), mean: Vec::new(), factors: Vec::new() },
-    };
-    working.mean.resize(n, 0.0);
-    working.factors.resize(model.sites.len(), Factor::default());
-    for i in old..n {
-        // Row i of the prior factor holds the whitened covariances with the earlier points and what remains.
-        let row = model.prior.row(i);
-        let mut gain = row[..i].to_vec();
-        model.prior.solve_upper(&mut gain);
-        let with_others: Vec<f64> = (0..i).map(|j| dot(&working.covariance.row(j)[..i], &gain)).collect();
-        let own = row[i] * row[i] + dot(&with_others, &gain);
-        working.mean[i] = dot(&working.mean[..i], &gain);
-        for (j, &c) in with_others.iter().enumerate() {
-            working.covariance.row_mut(j)[i] = c;
-        }
-        let last = working.covariance.row_mut(i);
-        last[..i].copy_from_slice(&with_others);
-        last[i] = own;
-    }
-    working
 }
 
 impl Approximate for ExpectationPropagation {
     fn advance(&self, model: &Model, _link: Link, previous: Option<&Approximation>) -> Result<Approximation> {
         let (prior, sites) = (&model.prior, &model.sites);
-        let mut working = extend(model, previous);
-        let first_new = previous.map_or(0, |p| p.factors.len());
+        let mut working = Working::extend(model, previous);
         let old = previous.map_or(0, |p| p.mean.len());
-        let mut refresh_due = prior.order() / REFRESH != old / REFRESH;
-        let mut changes = 0;
-        for (index, site) in sites.iter().enumerate().skip(first_new) {
-            changes += usize::from(working.replace(index, site, 0.0));
-        }
-        for _ in 0..self.sweeps {
-            let before = changes;
-            for (index, site) in sites.iter().enumerate() {
-                changes += usize::from(working.replace(index, site, self.tolerance));
-            }
-            if refresh_due {
-                working.refresh(prior, sites)?;
-                refresh_due = false;
-            } else if changes == before {
-                break;
-            }
-        }
-        let n = prior.order();
-        if !working.mean.iter().all(|m| m.is_finite())
-            || (0..n).any(|i| working.covariance.at(i, i).is_nan() || working.covariance.at(i, i) < 0.0)
-        {
+        working.sweep(sites, previous.map_or(0, |p| p.factors.len()), self, self.tolerance, self.sweeps);
+        if prior.order() / super::REFRESH != old / super::REFRESH || !working.is_sound() {
             working.refresh(prior, sites)?;
+            working.sweep(sites, sites.len(), self, self.tolerance, self.sweeps);
         }
-        let mut whitened = working.mean.clone();
-        prior.solve_lower(&mut whitened);
-        let mut weights = whitened.clone();
-        prior.solve_upper(&mut weights);
-        Ok(Approximation {
-            mean: working.mean,
-            weights,
-            whitened,
-            factors: working.factors,
-            spread: Spread::Covariance(working.covariance),
-            evidence: f64::NAN,
-        })
+        Ok(working.finish(prior))
     }
-}
 
-/// Logarithm of the approximate probability of the answers.
-pub(crate) fn evidence(model: &Model, approximation: &Approximation) -> Result<f64> {
-    let Spread::Covariance(covariance) = &approximation.spread else { return Ok(approximation.evidence) };
-    let working = Working {
-        covariance: covariance.clone(),
-        mean: approximation.mean.clone(),
-        factors: approximation.factors.clone(),
-    };
-    let mut total = 0.0;
-    for (site, &factor) in model.sites.iter().zip(&working.factors) {
-        if let Some(t) = working.tilt(site, factor) {
-            let q = t.cavity_mean * t.cavity_precision + factor.shift;
-            total += t.ln_mass + 0.5 * math::ln_1p(factor.precision / t.cavity_precision)
-                - 0.5
-                    * (q * q / (t.cavity_precision + factor.precision)
-                        - t.cavity_mean * t.cavity_mean * t.cavity_precision);
+    fn evidence(&self, model: &Model, _link: Link, approximation: &Approximation) -> Result<f64> {
+        let working = Working::of(approximation);
+        let mut total = 0.0;
+        for (site, &factor) in model.sites.iter().zip(&working.factors) {
+            if let Some(cavity) = working.cavity(site, factor) {
+                // The answer's share: its mass under the cavity, less what its normal factor would give.
+                let q = cavity.mean * cavity.precision + factor.shift;
+                total += mass(site, cavity).value + 0.5 * math::ln_1p(factor.precision / cavity.precision)
+                    - 0.5
+                        * (q * q / (cavity.precision + factor.precision)
+                            - cavity.mean * cavity.mean * cavity.precision);
+            }
         }
+        let precision = whitened_precision(&model.prior, &model.sites, &working.factors)?;
+        let h = shifts(model.points.len(), &model.sites, &working.factors);
+        Ok(total - 0.5 * precision.ln_determinant() + 0.5 * dot(&h, &working.mean))
     }
-    let precision = whitened_precision(&model.prior, &model.sites, &working.factors)?;
-    let h = shifts(model.points.len(), &model.sites, &working.factors);
-    Ok(total - 0.5 * precision.ln_determinant() + 0.5 * dot(&h, &working.mean))
 }
 
 #[cfg(test)]
@@ -239,7 +91,7 @@ mod tests {
         let space =
             SearchSpace::new(vec![Dimension { name: "x".into(), values: vec![0.0, 1.0], lengthscale: 1.0 }]).unwrap();
         let settings =
-            LearnerSettings { preference_noise: 0.3, ordinal_noise: 0.4, ..LearnerSettings::of(Method::Eubo) };
+            LearnerSettings { preference_noise: 0.3, ordinal_noise: 0.4, ..LearnerSettings::published(Method::Eubo) };
         let (a, b) = (ActionIndex(0), ActionIndex(1));
         let log = FeedbackLog {
             visited: vec![a, b],

@@ -6,6 +6,7 @@
 
 mod expectation_propagation;
 mod laplace;
+mod sites;
 
 pub(crate) use expectation_propagation::ExpectationPropagation;
 pub(crate) use laplace::Laplace;
@@ -14,6 +15,9 @@ use crate::error::Result;
 use crate::linalg::{Block, Cholesky, Square, add_scaled, block_dots};
 use crate::model::{Model, Site};
 use crate::settings::Link;
+
+/// Points after which an approximation is computed anew, so that rounding cannot add up.
+const REFRESH: usize = 64;
 
 /// The normal factor that stands for one answer.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -31,18 +35,7 @@ pub(crate) struct Approximation {
     /// `L^-1 mean`.
     pub(crate) whitened: Vec<f64>,
     pub(crate) factors: Vec<Factor>,
-    pub(crate) spread: Spread,
-    /// Logarithm of the approximate probability of all answers.
-    pub(crate) evidence: f64,
-}
-
-/// The covariance of the approximation, in the form its method has at hand.
-#[derive(Debug, Clone)]
-pub(crate) enum Spread {
-    /// Factor of `B = I + L' W L`; the covariance is `L B^-1 L'`.
-    Precision(Cholesky),
-    /// The covariance itself.
-    Covariance(Square),
+    pub(crate) covariance: Square,
 }
 
 /// A method of approximation.
@@ -51,39 +44,25 @@ pub(crate) trait Approximate {
     ///
     /// The result is a function of the arguments alone.
     fn advance(&self, model: &Model, link: Link, previous: Option<&Approximation>) -> Result<Approximation>;
+
+    /// Logarithm of the approximate probability of all answers.
+    fn evidence(&self, model: &Model, link: Link, approximation: &Approximation) -> Result<f64>;
 }
 
-impl Spread {
+impl Approximation {
     /// Two vectors whose inner products with those of another action are posterior covariances, given the action's
     /// whitened prior covariances with the points.
     pub(crate) fn project(&self, prior: &Cholesky, whitened: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut left = whitened.to_vec();
-        match self {
-            Self::Precision(factor) => {
-                factor.solve_lower(&mut left);
-                let right = left.clone();
-                (left, right)
-            }
-            Self::Covariance(covariance) => {
-                prior.solve_upper(&mut left);
-                let right = covariance.multiply(&left);
-                (left, right)
-            }
-        }
+        prior.solve_upper(&mut left);
+        let right = self.covariance.multiply(&left);
+        (left, right)
     }
 
     /// For a block of actions: the posterior variance their utilities owe to the points.
     pub(crate) fn block_variances(&self, prior: &Cholesky, mut whitened: Block) -> [f64; crate::linalg::BLOCK] {
-        match self {
-            Self::Precision(factor) => {
-                factor.solve_lower_block(&mut whitened);
-                block_dots(&whitened, &whitened)
-            }
-            Self::Covariance(covariance) => {
-                prior.solve_upper_block(&mut whitened);
-                block_dots(&whitened, &covariance.multiply_block(&whitened))
-            }
-        }
+        prior.solve_upper_block(&mut whitened);
+        block_dots(&whitened, &self.covariance.multiply_block(&whitened))
     }
 }
 

@@ -98,11 +98,14 @@ kernels! {
         }
     }
 
-    /// `A += a x x'`.
-    pub(super) fn add_rank_one<'a>(rows: &'a mut [f64], a: f64, x: &'a [f64]) {
-        let n = x.len();
+    /// `A += sum_k a_k x_k x_k'`, row by row, so that each row is read once.
+    pub(super) fn add_rank_ones<'a>(rows: &'a mut [f64], changes: &'a [(f64, Vec<f64>)], n: usize) {
         for i in 0..n {
-            add_scaled_inline(&mut rows[i * n..(i + 1) * n], a * x[i], x);
+            let row = &mut rows[i * n..(i + 1) * n];
+            for c in 0..changes.len() {
+                let x = &changes[c].1;
+                add_scaled_inline(row, changes[c].0 * x[i], x);
+            }
         }
     }
 

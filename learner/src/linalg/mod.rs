@@ -84,9 +84,9 @@ impl Square {
         y
     }
 
-    /// `A += a x x'`.
-    pub(crate) fn add_rank_one(&mut self, a: f64, x: &[f64]) {
-        kernels::add_rank_one(&mut self.data, a, x);
+    /// `A += sum_k a_k x_k x_k'`.
+    pub(crate) fn add_rank_ones(&mut self, changes: &[(f64, Vec<f64>)]) {
+        kernels::add_rank_ones(&mut self.data, changes, self.n);
     }
 
     /// `A A'`.

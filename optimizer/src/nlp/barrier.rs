@@ -49,14 +49,15 @@ pub(super) fn fraction_to_zero(z: &[f64], d: &[f64], tau: f64) -> f64 {
     z.iter().zip(d).fold(1.0, |alpha, (z, d)| if *d < 0.0 && *z > 0.0 { alpha.min(-tau * z / d) } else { alpha })
 }
 
-/// Smallest barrier parameter worth solving for.
-pub(super) fn smallest_mu(settings: &NlpSettings) -> f64 {
-    settings.tolerance.min(settings.complementarity_tolerance) / (settings.kappa_epsilon + 1.0)
+/// Smallest barrier parameter worth solving for; the scaled objective's multipliers are scaled with it.
+pub(super) fn smallest_mu(settings: &NlpSettings, objective_scale: f64) -> f64 {
+    let complementarity = settings.complementarity_tolerance * objective_scale;
+    settings.tolerance.min(complementarity) / (settings.kappa_epsilon + 1.0)
 }
 
 /// max(mu_min, min(kappa_mu mu, mu^theta_mu)) (WB06 eq. 7).
-pub(super) fn reduced_mu(settings: &NlpSettings, mu: f64) -> f64 {
-    (settings.kappa_mu * mu).min(mu.powf(settings.theta_mu)).max(smallest_mu(settings))
+pub(super) fn reduced_mu(settings: &NlpSettings, mu: f64, smallest: f64) -> f64 {
+    (settings.kappa_mu * mu).min(mu.powf(settings.theta_mu)).max(smallest)
 }
 
 /// tau = max(tau_min, 1 - mu) (WB06 eq. 8).

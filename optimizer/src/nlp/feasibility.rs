@@ -8,8 +8,9 @@ use super::barrier;
 use super::formulation::{Attached, EvaluationTally, Formulation, Goal, RowKind};
 use super::interior_point::{Ending, Run, Session};
 use super::newton::{PrimalDual, largest};
+use super::settings::BoundMultiplierStart;
 
-/// Bound multipliers above this are reset to one after the phase (IPOPT `bound_mult_reset_threshold`).
+/// Bound multipliers above this start anew after the phase (IPOPT `bound_mult_reset_threshold`).
 const MULTIPLIER_RESET: f64 = 1e3;
 
 /// Elastics (p, n) minimising rho (p + n) - mu (ln p + ln n) subject to c = p - n (WB06 eqs. 32, 33).
@@ -161,9 +162,15 @@ pub(super) fn restore(run: &mut Run, session: &mut Session) -> Option<Ending> {
         run.point.zu[j] += alpha * step.zu[j];
     }
     if largest(&run.point.zl).max(largest(&run.point.zu)) > MULTIPLIER_RESET {
+        let mu = run.mu;
+        let first = |slack: f64| match (slack.is_finite(), settings.bound_multiplier_start) {
+            (false, _) => 0.0,
+            (true, BoundMultiplierStart::One) => 1.0,
+            (true, BoundMultiplierStart::Centred) => mu / slack,
+        };
         for j in 0..length {
-            run.point.zl[j] = if run.form.lower[j].is_finite() { 1.0 } else { 0.0 };
-            run.point.zu[j] = if run.form.upper[j].is_finite() { 1.0 } else { 0.0 };
+            run.point.zl[j] = first(run.at.slack_lower[j]);
+            run.point.zu[j] = first(run.at.slack_upper[j]);
         }
     }
     barrier::keep_near_centre(&mut run.point, &run.at, run.mu);

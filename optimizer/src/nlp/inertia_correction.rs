@@ -6,6 +6,8 @@ use super::settings::{DualRegularisation, NlpSettings};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct InertiaCorrection {
     last: f64,
+    /// Proximal weight: delta_w starts here while steps are cut by the line search.
+    proximal: f64,
     /// Current delta_w.
     pub delta_w: f64,
     /// Current delta_c.
@@ -15,11 +17,28 @@ pub(super) struct InertiaCorrection {
 impl InertiaCorrection {
     /// First trial of an iteration.
     pub(super) fn begin(&mut self, settings: &NlpSettings, mu: f64) {
-        self.delta_w = 0.0;
+        self.delta_w = self.proximal;
         self.delta_c = match settings.dual_regularisation {
             DualRegularisation::Always => Self::dual(settings, mu),
             DualRegularisation::WhenSingular => 0.0,
         };
+    }
+
+    /// Learns from the line search: a direction that had to be cut often was too long for its linear model, so the next
+    /// ones are kept shorter by a proximal term, which fades as soon as full steps are accepted. It acts on the
+    /// matrix only, so it never moves a solution.
+    pub(super) fn observe(&mut self, settings: &NlpSettings, trials: usize) {
+        if settings.proximal_first == 0.0 {
+            return;
+        }
+        if trials >= PROXIMAL_TRIGGER {
+            self.proximal = (INCREASE * self.delta_w).max(settings.proximal_first).min(PROXIMAL_MAX);
+        } else if trials <= 2 {
+            self.proximal *= PROXIMAL_DECREASE;
+            if self.proximal < PROXIMAL_VANISHES * settings.proximal_first {
+                self.proximal = 0.0;
+            }
+        }
     }
 
     /// The matrix was accepted.
@@ -65,3 +84,11 @@ const DECREASE: f64 = 1.0 / 3.0;
 const INCREASE: f64 = 8.0;
 /// WB06 kappa_w^+ bar, while nothing is remembered.
 const FIRST_INCREASE: f64 = 100.0;
+/// Line-search trials that start or strengthen the proximal term.
+const PROXIMAL_TRIGGER: usize = 5;
+/// Fading of the proximal term after a step cut at most once.
+const PROXIMAL_DECREASE: f64 = 0.125;
+/// Share of `proximal_first` below which the term is dropped.
+const PROXIMAL_VANISHES: f64 = 1e-3;
+/// Largest proximal weight.
+const PROXIMAL_MAX: f64 = 1e2;

@@ -222,6 +222,7 @@ impl<'p> Run<'p> {
     fn set_mu(&mut self, mu: f64) {
         self.mu = mu;
         self.filter.clear();
+        self.search.end_watch();
         if let Goal::Feasibility { zeta, .. } = &mut self.form.goal {
             *zeta = mu.sqrt();
             self.objective = self.form.objective(&self.point.w);
@@ -232,7 +233,7 @@ impl<'p> Run<'p> {
 
     /// Reduces mu while the barrier problem is solved well enough (`force`: at least once).
     fn update_mu(&mut self, settings: &NlpSettings, now: &Optimality, mut force: bool) {
-        let smallest = barrier::smallest_mu(settings);
+        let smallest = barrier::smallest_mu(settings, self.form.objective_scale);
         if settings.barrier_strategy == BarrierStrategy::Adaptive {
             let error = now.error();
             let recent = &mut self.free_mu.recent;
@@ -254,7 +255,7 @@ impl<'p> Run<'p> {
             }
         }
         while self.mu > smallest && (force || self.optimality(self.mu).error() <= settings.kappa_epsilon * self.mu) {
-            self.set_mu(barrier::reduced_mu(settings, self.mu));
+            self.set_mu(barrier::reduced_mu(settings, self.mu, smallest));
             force = false;
         }
     }
@@ -380,7 +381,7 @@ impl<'p> Run<'p> {
             if largest(&self.point.w[..self.form.n]) > settings.divergence_limit {
                 return Ending::Unbounded;
             }
-            if tiny_steps > 1 && self.mu <= barrier::smallest_mu(settings) {
+            if tiny_steps > 1 && self.mu <= barrier::smallest_mu(settings, self.form.objective_scale) {
                 return Ending::Stalled;
             }
             self.update_mu(settings, &now, tiny_steps > 0);
@@ -415,6 +416,7 @@ impl<'p> Run<'p> {
             }
             short_steps = 0;
             soft_steps = 0;
+            self.search.end_watch();
             session.last_step = StepRecord::default();
             match self.phase() {
                 Phase::Feasibility => {
@@ -442,6 +444,7 @@ impl<'p> Run<'p> {
     /// Forgets filter and multipliers: z = mu / slack, y by least squares.
     pub(super) fn recentre(&mut self, session: &mut Session) {
         self.filter.clear();
+        self.search.end_watch();
         for j in 0..self.form.length() {
             self.point.zl[j] = if self.at.slack_lower[j].is_finite() { self.mu / self.at.slack_lower[j] } else { 0.0 };
             self.point.zu[j] = if self.at.slack_upper[j].is_finite() { self.mu / self.at.slack_upper[j] } else { 0.0 };

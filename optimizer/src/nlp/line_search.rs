@@ -12,6 +12,18 @@ pub(super) struct Search {
     trial_c: Vec<f64>,
     corrected_c: Vec<f64>,
     correction: PrimalDual,
+    /// Shortened steps in a row.
+    shortened: usize,
+    watch: Option<Box<Watch>>,
+}
+
+/// Where the watchdog goes back to.
+struct Watch {
+    point: PrimalDual,
+    direction: PrimalDual,
+    reference: Reference,
+    alpha: f64,
+    trials: usize,
 }
 
 impl Search {
@@ -21,11 +33,20 @@ impl Search {
             trial_c: vec![0.0; form.m],
             corrected_c: vec![0.0; form.m],
             correction: PrimalDual::zeros(form),
+            shortened: 0,
+            watch: None,
         }
+    }
+
+    /// Drops the watchdog: what it compares with is no longer comparable.
+    pub(super) fn end_watch(&mut self) {
+        self.watch = None;
+        self.shortened = 0;
     }
 }
 
 /// What the search compares with.
+#[derive(Clone, Copy)]
 struct Reference {
     theta: f64,
     phi: f64,
@@ -81,12 +102,10 @@ impl Run<'_> {
     pub(super) fn line_search(&mut self, session: &mut Session, tiny: bool) -> bool {
         let settings = session.settings;
         let tau = barrier::boundary_fraction(settings, self.mu);
-        let reference = Reference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
-        let alpha_max =
+        let mut reference = Reference { theta: self.theta(), phi: self.phi(), slope: self.slope() };
+        let mut alpha =
             barrier::fraction_to_boundary(&self.at.slack_lower, &self.at.slack_upper, &self.direction.w, tau);
-        let smallest = reference.smallest_step(self.theta_min);
-        let mut alpha = alpha_max;
-        let mut trials = 0;
+        let mut corrects = true;
         if tiny {
             let (_, _, finite) = self.try_step(alpha, false);
             if finite {
@@ -94,19 +113,54 @@ impl Run<'_> {
                 return true;
             }
         }
+        if settings.watchdog_trigger > 0 && self.search.shortened >= settings.watchdog_trigger {
+            self.search.shortened = 0;
+            self.search.watch = Some(Box::new(Watch {
+                point: self.point.clone(),
+                direction: self.direction.clone(),
+                reference,
+                alpha,
+                trials: 0,
+            }));
+        }
+        if let Some(mut watch) = self.search.watch.take() {
+            let (theta, phi, finite) = self.try_step(alpha, false);
+            if finite && let Some(kind) = self.judge(&watch.reference, watch.alpha, theta, phi) {
+                self.finish(session, &watch.reference, kind, alpha, tau, 1);
+                return true;
+            }
+            watch.trials += 1;
+            if finite && watch.trials <= settings.watchdog_trials {
+                self.search.watch = Some(watch);
+                self.accept(session, alpha, tau, 1);
+                return true;
+            }
+            // Back to where it began, and an ordinary search there; the matrix of its corrections is gone.
+            self.point = watch.point;
+            self.direction = watch.direction;
+            self.evaluate();
+            (reference, alpha, corrects) = (watch.reference, watch.alpha, false);
+        }
+        let smallest = reference.smallest_step(self.theta_min);
+        let mut trials = 0;
         while alpha > smallest || trials == 0 {
             trials += 1;
             let (theta, phi, finite) = self.try_step(alpha, false);
             if finite {
                 if let Some(kind) = self.judge(&reference, alpha, theta, phi) {
+                    self.search.shortened = if trials > 1 { self.search.shortened + 1 } else { 0 };
+                    self.correction.observe(settings, trials);
                     self.finish(session, &reference, kind, alpha, tau, trials);
                     return true;
                 }
                 if trials == 1
+                    && corrects
                     && theta >= reference.theta
                     && let Some((kind, alpha, extra)) =
                         self.second_order_correction(session, &reference, alpha, tau, theta)
                 {
+                    self.search.shortened = 0;
+                    self.correction.observe(settings, 1);
                     self.finish(session, &reference, kind, alpha, tau, trials + extra);
                     return true;
                 }

@@ -102,7 +102,8 @@ fn with_inertia(order: usize, negative: usize, seed: u64) -> Matrix {
     }
     let d: Vec<f64> = (0..order)
         .map(|k| {
-            let sign = if k * negative / order != (k + 1) * negative / order { -1.0 } else { 1.0 };
+            let steps = (k + 1) * negative / order - k * negative / order;
+            let sign = if steps > 0 { -1.0 } else { 1.0 };
             sign * (0.5 + random.next().abs())
         })
         .collect();

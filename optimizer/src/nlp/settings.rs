@@ -117,6 +117,8 @@ pub struct NlpSettings {
     pub hessian_regularisation_min: f64,
     /// Regularisation of the Hessian that counts as failure. Default 1e20.
     pub hessian_regularisation_max: f64,
+    /// First weight of the proximal term that follows steps cut by the line search; 0: none. Default 1e-4.
+    pub proximal_first: f64,
     /// When delta_c > 0. Default always.
     pub dual_regularisation: DualRegularisation,
     /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c).
@@ -131,6 +133,11 @@ pub struct NlpSettings {
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
+    /// Shortened steps in a row that start the watchdog, which takes full steps without asking and goes back if none of
+    /// them is acceptable. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
+    pub watchdog_trigger: usize,
+    /// Full steps the watchdog may try. Default 3 (IPOPT `watchdog_trial_iter_max`).
+    pub watchdog_trials: usize,
     /// Steps in a row that may be taken for a lower primal-dual error alone when the line search fails, before the
     /// feasibility phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
     pub max_soft_steps: usize,
@@ -182,12 +189,15 @@ impl Default for NlpSettings {
             hessian_regularisation_first: 1e-4,
             hessian_regularisation_min: 1e-20,
             hessian_regularisation_max: 1e20,
+            proximal_first: 1e-4,
             dual_regularisation: DualRegularisation::default(),
             dual_regularisation_value: 1e-8,
             residual_target: 1e-10,
             residual_limit: 1e-5,
             max_refinements: 10,
             max_second_order_corrections: 4,
+            watchdog_trigger: 10,
+            watchdog_trials: 3,
             max_soft_steps: 10,
             elastic_weight: 1000.0,
             required_reduction: 0.9,
@@ -238,6 +248,7 @@ impl NlpSettings {
             self.hessian_regularisation_first,
             f64::MAX,
         )?;
+        in_range("proximal_first", self.proximal_first, 0.0, 1e4)?;
         in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
         in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
         in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;

@@ -101,7 +101,7 @@ pub fn solve(
         StartPoint::Warm(_) => {
             if settings.mu_warm.is_none() {
                 let average = barrier::average_complementarity(&run.point, &run.at).unwrap_or(settings.mu_initial);
-                run.mu = average.clamp(barrier::smallest_mu(settings), settings.mu_initial);
+                run.mu = average.clamp(barrier::smallest_mu(settings, run.form.objective_scale), settings.mu_initial);
             }
         }
     }

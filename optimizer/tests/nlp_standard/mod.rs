@@ -1,5 +1,5 @@
 //! Small dense problems with known optima, their derivatives by hyper-dual numbers.
-#![allow(dead_code, clippy::pedantic, missing_docs, unreachable_pub)]
+#![allow(dead_code, clippy::pedantic, clippy::unwrap_used, clippy::type_complexity, missing_docs, unreachable_pub)]
 
 pub mod hock_schittkowski;
 pub mod hyper_dual;

@@ -1,0 +1,77 @@
+//! Lengthscales and noise learned from the answers, off by default.
+//!
+//! The evidence of the approximation times priors is climbed by a coordinate search: factors on every dimension's
+//! lengthscale, log-normal around 1 and never below 1 (a grid cannot tell of anything shorter than its steps), and a
+//! factor on the preference noise, log-normal around 1. The search starts anew from 1 each time, on the answers about
+//! the first `n` actions tried, `n` the last multiple of the learning interval: it depends on nothing but the log.
+
+use crate::error::Result;
+use crate::space::SearchSpace;
+
+/// Factors on the settings' lengthscales and preference noise.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Hyperparameters {
+    pub(crate) lengthscales: Vec<f64>,
+    pub(crate) preference_noise: f64,
+}
+
+/// Standard deviation of the logarithm of a lengthscale's factor.
+const LENGTHSCALE_SPREAD: f64 = 0.8;
+/// Standard deviation of the logarithm of the noise's factor.
+const NOISE_SPREAD: f64 = 1.5;
+/// Ratio of neighbouring values that are tried.
+const STEP: f64 = 1.6;
+/// Largest lengthscale factor.
+const LONGEST: f64 = 20.0;
+/// Passes over the dimensions.
+const PASSES: usize = 2;
+
+impl Hyperparameters {
+    pub(crate) fn neutral(space: &SearchSpace) -> Self {
+        Self { lengthscales: vec![1.0; space.dimensions().len()], preference_noise: 1.0 }
+    }
+
+    fn ln_prior(&self) -> f64 {
+        let term = |factor: f64, spread: f64| -0.5 * (crate::math::ln(factor) / spread).powi(2);
+        self.lengthscales.iter().map(|&l| term(l, LENGTHSCALE_SPREAD)).sum::<f64>()
+            + term(self.preference_noise, NOISE_SPREAD)
+    }
+
+    /// Climbs `evidence` plus the priors.
+    pub(crate) fn learn(space: &SearchSpace, evidence: impl Fn(&Self) -> Result<f64>) -> Result<Self> {
+        let mut best = Self::neutral(space);
+        // A candidate that cannot be factored is no candidate.
+        let score = |candidate: &Self| evidence(candidate).map_or(f64::NEG_INFINITY, |e| e + candidate.ln_prior());
+        let mut highest = evidence(&best)? + best.ln_prior();
+        let mut consider = |best: &mut Self, change: &dyn Fn(&mut Self)| {
+            let mut candidate = best.clone();
+            change(&mut candidate);
+            candidate.lengthscales.iter_mut().for_each(|l| *l = l.clamp(1.0, LONGEST));
+            candidate.preference_noise = candidate.preference_noise.clamp(1e-2, 1e2);
+            let value = if candidate == *best { f64::NEG_INFINITY } else { score(&candidate) };
+            let better = value > highest + 1e-9;
+            if better {
+                highest = value;
+                *best = candidate;
+            }
+            better
+        };
+        // All lengthscales together, then the noise, then one dimension at a time.
+        while consider(&mut best, &|h| h.lengthscales.iter_mut().for_each(|l| *l *= STEP)) {}
+        for factor in [STEP, 1.0 / STEP] {
+            while consider(&mut best, &|h| h.preference_noise *= factor) {}
+        }
+        for _ in 0..PASSES {
+            let mut improved = false;
+            for d in 0..space.dimensions().len() {
+                for factor in [STEP, 1.0 / STEP] {
+                    improved |= consider(&mut best, &|h| h.lengthscales[d] *= factor);
+                }
+            }
+            if !improved {
+                break;
+            }
+        }
+        Ok(best)
+    }
+}

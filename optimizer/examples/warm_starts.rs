@@ -1,0 +1,100 @@
+//! Warm starts against cold starts after changing one bound of Table I.
+//!
+//! `cargo run --release -p gait-optimizer --example warm_starts -- [--subject 1] [--muscles on] [--changes 20] [--seed 1]
+//! [--cold on] [--threads 1]`: solves the default problem, then for each random one-bound change solves warm from it
+//! (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end.
+
+use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve};
+use std::error::Error;
+
+/// Levels of Table I (Li et al. 2022).
+const LEVELS: [&[f64]; 8] = [
+    &[15.0, 20.0],
+    &[70.0, 80.0, 90.0],
+    &[0.3, 0.4, 0.5],
+    &[1.2, 1.3, 1.4],
+    &[0.0, 0.013, 0.026, 0.039],
+    &[0.0, 0.1, 0.2, 0.3, 0.4, 0.5],
+    &[20.0, 35.0, 50.0],
+    &[20.0, 30.0, 40.0],
+];
+
+/// splitmix64 (Steele, Lea & Flood 2014).
+struct SplitMix(u64);
+
+impl SplitMix {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % n as u64) as usize
+    }
+}
+
+fn argument(name: &str, default: &str) -> String {
+    let arguments: Vec<String> = std::env::args().collect();
+    arguments.iter().position(|a| a == name).and_then(|i| arguments.get(i + 1)).cloned().unwrap_or_else(|| default.to_owned())
+}
+
+fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {
+    let options = SolveOptions { threads, ..SolveOptions::default() };
+    Ok(solve(problem, warm, &options, &mut |_| {}, &CancelToken::new())?)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    if values.is_empty() { f64::NAN } else { values[values.len() / 2] }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let subject: u32 = argument("--subject", "1").parse()?;
+    let muscles = argument("--muscles", "on") == "on";
+    let changes: usize = argument("--changes", "20").parse()?;
+    let with_cold = argument("--cold", "on") == "on";
+    let threads: usize = argument("--threads", "1").parse()?;
+    let mut random = SplitMix(argument("--seed", "1").parse()?);
+    let base = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+    let start = run(&base, None, threads)?;
+    eprintln!("base: {:?} {} iterations {:.2} s", start.report.status, start.report.iterations, start.report.seconds_total);
+    println!("bound,value,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse");
+    let (mut warm_seconds, mut warm_iterations) = (Vec::new(), Vec::new());
+    let (mut cold_seconds, mut cold_iterations) = (Vec::new(), Vec::new());
+    let mut worst_ratio = 0.0_f64;
+    let default = TunedBounds::default().to_array();
+    for _ in 0..changes {
+        let bound = random.below(8);
+        let others: Vec<f64> = LEVELS[bound].iter().copied().filter(|&v| v != default[bound]).collect();
+        let value = others[random.below(others.len())];
+        let mut action = default;
+        action[bound] = value;
+        let problem = GaitProblem { bounds: TunedBounds::from_array(action)?, ..base.clone() };
+        let warm = run(&problem, Some(&start.warm_start), threads)?.report;
+        print!(
+            "{},{value},{:?},{:?},{},{:.3},{:.8},{:.4}",
+            TunedBounds::NAMES[bound], warm.status, warm.started_from, warm.iterations, warm.seconds_total, warm.objective, warm.gait_rmse_rad
+        );
+        if warm.status == SolveStatus::Converged {
+            warm_seconds.push(warm.seconds_total);
+            warm_iterations.push(warm.iterations as f64);
+        }
+        if with_cold {
+            let cold = run(&problem, None, threads)?.report;
+            println!(",{:?},{},{:.3},{:.8},{:.4}", cold.status, cold.iterations, cold.seconds_total, cold.objective, cold.gait_rmse_rad);
+            cold_seconds.push(cold.seconds_total);
+            cold_iterations.push(cold.iterations as f64);
+            worst_ratio = worst_ratio.max(warm.seconds_total / cold.seconds_total);
+        } else {
+            println!(",,,,,");
+        }
+    }
+    eprintln!(
+        "median warm {} iterations {:.3} s ({} of {changes} converged); median cold {} iterations {:.3} s; worst warm/cold {worst_ratio:.2}",
+        median(&mut warm_iterations),
+        median(&mut warm_seconds),
+        warm_seconds.len(),
+        median(&mut cold_iterations),
+        median(&mut cold_seconds),
+    );
+    Ok(())
+}
