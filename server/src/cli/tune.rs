@@ -16,6 +16,7 @@ use clap::Args;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -115,22 +116,19 @@ impl Tune {
                 && plan.seed == self.seed
                 && plan.search_space == space
         });
-        let study = match unfinished {
-            Some(study) => {
-                let done = trials::counts(&mut writer, study.id).await?;
-                eprintln!("going on with study {}: {} of {} trials", study.id, done.total - done.open, self.trials);
-                study
-            }
-            None => {
-                let new = NewStudy {
-                    muscles: self.muscles.is_on(),
-                    trial_budget: self.trials,
-                    parallel_trials: u32::try_from(workers).unwrap_or(1),
-                    seed: self.seed,
-                    ..NewStudy::of(subject.id)
-                };
-                plan::create(&mut writer, new).await?
-            }
+        let study = if let Some(study) = unfinished {
+            let done = trials::counts(&mut writer, study.id).await?;
+            eprintln!("going on with study {}: {} of {} trials", study.id, done.total - done.open, self.trials);
+            study
+        } else {
+            let new = NewStudy {
+                muscles: self.muscles.is_on(),
+                trial_budget: self.trials,
+                parallel_trials: u32::try_from(workers).unwrap_or(1),
+                seed: self.seed,
+                ..NewStudy::of(subject.id)
+            };
+            plan::create(&mut writer, new).await?
         };
         commit(writer).await?;
         Ok(study)
@@ -214,21 +212,27 @@ async fn follow(director: &Director, study: &Study, json: bool) -> Result<(), Er
 
 fn trial_line(trial: &Trial, all: &[Trial]) -> String {
     let mut line = format!("{:>4}  {:<13}", trial.number, trial.state.as_str());
+    // Writing to a String cannot fail.
+    let _ = describe(&mut line, trial, all);
+    line
+}
+
+fn describe(line: &mut String, trial: &Trial, all: &[Trial]) -> std::fmt::Result {
     if let (Some(rmse), Some(cost)) = (trial.gait_rmse_rad, trial.cost_of_transport) {
-        line.push_str(&format!("  RMSE {rmse:.4} rad  cost {cost:.4}"));
+        write!(line, "  RMSE {rmse:.4} rad  cost {cost:.4}")?;
     }
     if let (Some(iterations), Some(seconds)) = (trial.iterations, trial.seconds_total) {
-        line.push_str(&format!("  {iterations:>4} iterations {seconds:>6.1} s"));
+        write!(line, "  {iterations:>4} iterations {seconds:>6.1} s")?;
     }
     match number_of(trial.warm_started_from, all) {
-        Some(from) => line.push_str(&format!("  from {from:<4}")),
+        Some(from) => write!(line, "  from {from:<4}")?,
         None => line.push_str("  cold     "),
     }
-    line.push_str(&format!("  {}", action_line(&trial.action)));
+    write!(line, "  {}", action_line(&trial.action))?;
     if !trial.message.is_empty() {
-        line.push_str(&format!("\n      {}", trial.message));
+        write!(line, "\n      {}", trial.message)?;
     }
-    line
+    Ok(())
 }
 
 fn action_line(action: &TunedBounds) -> String {

@@ -49,7 +49,7 @@ pub(crate) fn points(gait: &Gait) -> Vec<Point<'_>> {
             for (name, value) in domain.contact_rows.iter().zip(given) {
                 let side = if name.side == Side::Left { 0 } else { 4 };
                 let point = if name.point == FootPoint::Heel { 0 } else { 2 };
-                let axis = if name.axis == Axis::X { 0 } else { 1 };
+                let axis = usize::from(name.axis == Axis::Z);
                 forces[side + point + axis] = *value;
             }
             let activation = domain.muscles.as_ref().and_then(|muscles| muscles.activation.get(i));

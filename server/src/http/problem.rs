@@ -8,29 +8,29 @@ use serde::Serialize;
 use serde_json::Value;
 
 /// Media type of a problem document.
-pub const PROBLEM_JSON: &str = "application/problem+json";
+pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 
 /// A problem document.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Problem {
+pub(super) struct Problem {
     /// What kind of problem: stable, for programs.
     #[serde(rename = "type")]
-    pub kind: &'static str,
+    pub(super) kind: &'static str,
     /// The kind in words.
-    pub title: &'static str,
+    pub(super) title: &'static str,
     /// The HTTP status.
-    pub status: u16,
+    pub(super) status: u16,
     /// This occurrence in words.
-    pub detail: String,
+    pub(super) detail: String,
     /// The field that was refused.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub field: Option<String>,
+    pub(super) field: Option<String>,
     /// The value that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<Value>,
+    pub(super) value: Option<Value>,
     /// What would have been accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub allowed: Option<String>,
+    pub(super) allowed: Option<String>,
 }
 
 impl Problem {

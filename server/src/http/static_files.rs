@@ -12,7 +12,7 @@ use std::fmt::Write;
 struct Files;
 
 /// `GET /static/{path}`: revalidated by content hash, so that a new version is seen at once.
-pub async fn get(Path(path): Path<String>, headers: HeaderMap) -> Result<Response, Error> {
+pub(super) async fn get(Path(path): Path<String>, headers: HeaderMap) -> Result<Response, Error> {
     let file = Files::get(&path).ok_or_else(|| Error::NotFound { what: "file".to_owned(), id: path })?;
     let mut tag = String::from("\"");
     for byte in &file.metadata.sha256_hash()[..16] {

@@ -76,15 +76,15 @@ fn round_step(raw: f64) -> f64 {
     round * power
 }
 
+/// Decimals that tell neighbouring ticks apart.
 fn decimals_of(step: f64) -> usize {
-    let digits = -(step * 1.0001).log10().floor();
-    if digits <= 0.0 {
-        0
-    } else if digits >= 12.0 {
-        12
-    } else {
-        (1..=12).find(|n| f64::from(*n) >= digits).unwrap_or(12) as usize
+    let mut decimals = 0;
+    let mut scaled = step;
+    while scaled < 0.999 && decimals < 12 {
+        scaled *= 10.0;
+        decimals += 1;
     }
+    decimals
 }
 
 #[cfg(test)]

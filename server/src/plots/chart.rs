@@ -127,7 +127,7 @@ impl Chart {
         write!(
             svg,
             "<text class=\"label\" x=\"{:.1}\" y=\"{}\">{}</text>",
-            (LEFT + right) / 2.0,
+            f64::midpoint(LEFT, right),
             HEIGHT - 6.0,
             escape(&self.x_label)
         )?;

@@ -172,7 +172,7 @@ pub async fn troubles(db: &mut Connection, job: JobId) -> StoreResult<Troubles> 
 /// What the database reports.
 pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>> {
     leases(
-        sqlx::query(
+        &sqlx::query(
             "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
              where j.state = 'leased' and j.lease_until < ? order by j.id",
         )
@@ -188,7 +188,7 @@ pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>
 /// What the database reports.
 pub async fn leased(db: &mut Connection) -> StoreResult<Vec<Lease>> {
     leases(
-        sqlx::query(
+        &sqlx::query(
             "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
              where j.state = 'leased' order by j.id",
         )
@@ -210,7 +210,7 @@ pub async fn depth(db: &mut Connection) -> StoreResult<(u32, u32)> {
     Ok((row.try_get("queued")?, row.try_get("leased")?))
 }
 
-fn leases(rows: Vec<SqliteRow>) -> StoreResult<Vec<Lease>> {
+fn leases(rows: &[SqliteRow]) -> StoreResult<Vec<Lease>> {
     rows.iter()
         .map(|row| {
             Ok(Lease {

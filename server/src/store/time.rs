@@ -19,6 +19,7 @@ pub fn now() -> Instant {
 
 impl Instant {
     /// This instant moved by whole seconds; at the end of time it stays where it is.
+    #[must_use]
     pub fn plus_seconds(self, seconds: i64) -> Self {
         Self(self.0.checked_add(jiff::SignedDuration::from_secs(seconds)).unwrap_or(self.0))
     }

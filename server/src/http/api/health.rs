@@ -23,6 +23,9 @@ pub struct Health {
 }
 
 /// `GET /health`: 200 when the database answers.
+///
+/// # Errors
+/// When it does not.
 pub async fn get(State(app): State<AppState>) -> Result<Json<Health>, Error> {
     let (jobs_queued, jobs_running) = jobs::depth(&mut *app.read().await?).await?;
     let version = env!("CARGO_PKG_VERSION");

@@ -1,0 +1,181 @@
+//! A real Chromium, driven over its own protocol.
+
+use chromiumoxide::Page;
+use chromiumoxide::browser::{Browser, BrowserConfig};
+use chromiumoxide::cdp::browser_protocol::emulation::{
+    SetDeviceMetricsOverrideParams, SetScriptExecutionDisabledParams,
+};
+use chromiumoxide::cdp::browser_protocol::input::InsertTextParams;
+use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
+use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent};
+use futures_util::StreamExt;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::task::JoinHandle;
+
+/// Where a Chromium may be.
+const PLACES: [&str; 4] =
+    ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome", "/snap/bin/chromium"];
+
+/// A running browser.
+pub(crate) struct Chromium {
+    browser: Browser,
+    events: JoinHandle<()>,
+    _profile: tempfile::TempDir,
+}
+
+impl Chromium {
+    /// Starts one, or says why the test is skipped.
+    pub(crate) async fn launch() -> Option<Self> {
+        let Some(executable) = PLACES.into_iter().find(|place| Path::new(place).exists()) else {
+            assert!(std::env::var_os("GAITWRIGHT_REQUIRE_BROWSER").is_none(), "no Chromium is installed");
+            eprintln!("skipped: no Chromium is installed");
+            return None;
+        };
+        let profile = tempfile::tempdir().unwrap();
+        let config = BrowserConfig::builder()
+            .chrome_executable(executable)
+            .user_data_dir(profile.path())
+            .no_sandbox()
+            .window_size(1280, 900)
+            .args([
+                "--disable-gpu",
+                "--disable-quic",
+                "--no-first-run",
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--disable-sync",
+            ])
+            .build()
+            .unwrap();
+        let (browser, mut handler) = Browser::launch(config).await.unwrap();
+        let events = tokio::spawn(async move { while handler.next().await.is_some() {} });
+        Some(Self { browser, events, _profile: profile })
+    }
+
+    /// Opens an address and watches what the page does.
+    pub(crate) async fn open(&self, address: &str) -> Tab {
+        Tab::new(self.browser.new_page("about:blank").await.unwrap(), address, true).await
+    }
+
+    /// Opens an address with scripts switched off.
+    pub(crate) async fn open_without_scripts(&self, address: &str) -> Tab {
+        Tab::new(self.browser.new_page("about:blank").await.unwrap(), address, false).await
+    }
+
+    /// Ends it.
+    pub(crate) async fn close(mut self) {
+        self.browser.close().await.unwrap();
+        self.browser.wait().await.unwrap();
+        self.events.abort();
+    }
+}
+
+/// A page.
+pub(crate) struct Tab {
+    page: Page,
+    requests: Arc<Mutex<Vec<String>>>,
+    complaints: Arc<Mutex<Vec<String>>>,
+}
+
+impl Tab {
+    async fn new(page: Page, address: &str, scripts: bool) -> Self {
+        let (requests, complaints) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(Vec::new())));
+        page.execute(network::EnableParams::default()).await.unwrap();
+        page.execute(log::EnableParams::default()).await.unwrap();
+        let mut sent = page.event_listener::<EventRequestWillBeSent>().await.unwrap();
+        let list = Arc::clone(&requests);
+        tokio::spawn(async move {
+            while let Some(event) = sent.next().await {
+                list.lock().unwrap().push(event.request.url.clone());
+            }
+        });
+        // What the console shows: script errors, refused resources, violations of the content policy.
+        let mut logged = page.event_listener::<EventEntryAdded>().await.unwrap();
+        let list = Arc::clone(&complaints);
+        tokio::spawn(async move {
+            while let Some(event) = logged.next().await {
+                list.lock().unwrap().push(format!("{:?}: {}", event.entry.level, event.entry.text));
+            }
+        });
+        if !scripts {
+            page.execute(SetScriptExecutionDisabledParams::new(true)).await.unwrap();
+        }
+        page.goto(address).await.unwrap();
+        Self { page, requests, complaints }
+    }
+
+    /// Waits until an element is there.
+    pub(crate) async fn wait_for(&self, selector: &str) {
+        for _ in 0..400 {
+            if self.page.find_element(selector).await.is_ok() {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        panic!("{selector} does not appear on {:?}", self.page.url().await);
+    }
+
+    /// Clicks an element with the mouse.
+    pub(crate) async fn click(&self, selector: &str) {
+        self.wait_for(selector).await;
+        self.page.find_element(selector).await.unwrap().click().await.unwrap();
+    }
+
+    /// Replaces the text of a field.
+    pub(crate) async fn fill(&self, selector: &str, text: &str) {
+        self.run(&format!("document.querySelector('{selector}').select()")).await;
+        self.type_text(text).await;
+    }
+
+    /// Types into whatever has the focus.
+    pub(crate) async fn type_text(&self, text: &str) {
+        self.page.execute(InsertTextParams::new(text)).await.unwrap();
+    }
+
+    /// Presses a key.
+    pub(crate) async fn press(&self, key: &str) {
+        self.page.find_element("body").await.unwrap().press_key(key).await.unwrap();
+    }
+
+    /// How many elements there are.
+    pub(crate) async fn count(&self, selector: &str) -> usize {
+        self.page.find_elements(selector).await.map_or(0, |found| found.len())
+    }
+
+    /// The text of an element.
+    pub(crate) async fn text(&self, selector: &str) -> String {
+        self.page.find_element(selector).await.unwrap().inner_text().await.unwrap().unwrap_or_default()
+    }
+
+    /// Runs a script.
+    pub(crate) async fn run(&self, script: &str) {
+        self.page.evaluate(format!("(() => {{ {script} }})()")).await.unwrap();
+    }
+
+    /// The value of an expression, as JSON text or bare string.
+    pub(crate) async fn value(&self, expression: &str) -> String {
+        let value = self.page.evaluate(expression.to_owned()).await.unwrap().value().cloned().unwrap_or_default();
+        value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+    }
+
+    /// Changes the size of the window.
+    pub(crate) async fn resize(&self, width: i64, height: i64) {
+        self.page.execute(SetDeviceMetricsOverrideParams::new(width, height, 1.0, false)).await.unwrap();
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+
+    /// No request left the origin, and the console is empty.
+    pub(crate) async fn is_clean(&self, origin: &str) {
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        let requests = self.requests.lock().unwrap();
+        let foreign: Vec<_> = requests
+            .iter()
+            .filter(|url| !url.starts_with(origin) && !url.starts_with("data:") && !url.starts_with("about:"))
+            .collect();
+        assert!(foreign.is_empty(), "requests to other origins: {foreign:?}");
+        let complaints = self.complaints.lock().unwrap();
+        assert!(complaints.is_empty(), "{complaints:?}");
+    }
+}
