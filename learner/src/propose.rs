@@ -309,7 +309,7 @@ fn line_cospar(
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
     if belief.settings().repeats {
-        return line_with_repeats(belief, best, pending, random);
+        return line_with_repeats(belief, best, pending, taken, random);
     }
     let suggested: Vec<ActionIndex> =
         belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
@@ -337,6 +337,7 @@ fn line_with_repeats(
     belief: &Posterior,
     best: ActionIndex,
     pending: &[ActionIndex],
+    taken: &HashSet<ActionIndex>,
     random: &mut Random,
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
@@ -344,17 +345,23 @@ fn line_with_repeats(
     let line: Vec<ActionIndex> =
         line::through(space, best, random).into_iter().filter(|&a| model.slot(a).is_none()).collect();
     let levels: Vec<Vec<usize>> = line.iter().map(|&a| space.levels(a)).collect();
-    let buffered: Vec<ActionIndex> =
-        belief.visited().iter().rev().take(belief.settings().buffer).chain(pending).copied().collect();
-    let mut chosen = best;
+    let buffered: Vec<ActionIndex> = belief.visited().iter().rev().take(belief.settings().buffer).copied().collect();
+    let mut chosen = None;
     for _ in 0..50 {
         let (points, others) = belief.utility.draw(&levels, random)?;
         let all = model.points.iter().zip(&points).chain(line.iter().zip(&others));
-        chosen = all.fold((best, f64::NEG_INFINITY), |top, (&a, &f)| if f > top.1 { (a, f) } else { top }).0;
-        if !buffered.contains(&chosen) {
+        let start = (None, f64::NEG_INFINITY);
+        chosen = all
+            .filter(|(action, _)| !pending.contains(action))
+            .fold(start, |top, (&a, &f)| if f > top.1 { (Some(a), f) } else { top })
+            .0;
+        if chosen.is_none_or(|chosen| !buffered.contains(&chosen)) {
             break;
         }
     }
+    let Some(chosen) = chosen else {
+        return Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted));
+    };
     Ok((chosen, ProposalReason::ThompsonOnLine))
 }
 

@@ -208,7 +208,7 @@ proptest! {
         let space = space(&[3, 4, 3]);
         let log = FeedbackLog { visited: visited.into_iter().map(ActionIndex).collect(), feedback };
         exercise(&space, &log, &settings);
-        if let Ok(batch) = propose_batch(&space, &log, &[], &LearnerSettings { repeats: false, ..settings }, 1) {
+        if let Ok(batch) = propose_batch(&space, &log, &[], &settings, 1) {
             let distinct: std::collections::HashSet<_> = batch.iter().map(|p| p.action).collect();
             prop_assert_eq!(distinct.len(), batch.len());
         }
