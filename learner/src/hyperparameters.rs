@@ -75,3 +75,52 @@ impl Hyperparameters {
         Ok(best)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::feedback::{Feedback, FeedbackLog};
+    use crate::posterior::posterior;
+    use crate::random::Random;
+    use crate::settings::{LearnerSettings, Method};
+    use crate::space::{ActionIndex, Dimension, SearchSpace};
+
+    #[test]
+    fn a_dimension_that_does_not_matter_gets_a_longer_lengthscale() {
+        let dimension =
+            |name: &str| Dimension { name: name.into(), values: (0..8).map(f64::from).collect(), lengthscale: 1.0 };
+        let space = SearchSpace::new(vec![dimension("matters"), dimension("does not")]).unwrap();
+        let utility = |a: ActionIndex| (1.7 * space.levels(a)[0] as f64).sin();
+        let mut random = Random::new(1, 0);
+        let mut log = FeedbackLog::default();
+        for _ in 0..40 {
+            let action = ActionIndex(random.below(64));
+            if log.visited.contains(&action) {
+                continue;
+            }
+            for &other in log.visited.iter().rev().take(3) {
+                let better = utility(action) > utility(other);
+                let (winner, loser) = if better { (action, other) } else { (other, action) };
+                log.feedback.push(Feedback::Preference { winner, loser });
+            }
+            log.visited.push(action);
+        }
+        let settings = LearnerSettings { preference_noise: 0.1, ..LearnerSettings::published(Method::Eubo) };
+        let learning = LearnerSettings { learn_every: Some(10), ..settings.clone() };
+        // What was learned shows in what is believed of actions that were not tried.
+        let wrong = |settings: &LearnerSettings| {
+            let belief = posterior(&space, &log, settings).unwrap();
+            let actions: Vec<ActionIndex> = (0..64).map(ActionIndex).collect();
+            let mut wrong = 0;
+            for &a in &actions {
+                for &b in &actions {
+                    let truth = utility(a) - utility(b);
+                    let believed = belief.mean(a).unwrap() - belief.mean(b).unwrap();
+                    wrong += u32::from(truth.abs() > 1e-9 && truth * believed < 0.0);
+                }
+            }
+            wrong
+        };
+        let (fixed, learned) = (wrong(&settings), wrong(&learning));
+        assert!(learned < fixed, "{learned} {fixed}");
+    }
+}

@@ -28,6 +28,7 @@ fn all_settings() -> Vec<LearnerSettings> {
     settings.push(LearnerSettings::published(Method::LineCoSpar));
     settings.push(LearnerSettings::published(Method::Eubo));
     settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::default() });
+    settings.push(LearnerSettings { learn_every: Some(5), ..LearnerSettings::published(Method::Eubo) });
     settings.push(LearnerSettings {
         inference: Inference::ExpectationPropagation,
         link: Link::Probit,
