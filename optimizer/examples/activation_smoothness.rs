@@ -36,7 +36,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("no fibre-velocity weight", default.activation, 0.0),
         ("neither", 0.0, 0.0),
     ];
-    println!("variant,status,iterations,objective,cost_of_transport,gait_rmse_rad,mean_activation,activation_chatter,fibre_velocity_chatter");
+    println!(
+        "variant,status,iterations,objective,cost_of_transport,gait_rmse_rad,mean_activation,activation_chatter,fibre_velocity_chatter"
+    );
     let mut warm: Option<WarmStart> = None;
     for (name, activation, fibre_velocity) in variants {
         let mut problem = base.clone();

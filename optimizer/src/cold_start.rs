@@ -10,20 +10,18 @@ pub mod posture;
 
 use thiserror::Error;
 
-/// Stride time and length, and variations, of a guess.
+/// Stride time and length of a guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuessSettings {
     /// Stride time, s.
     pub stride_time_s: f64,
     /// Stride length, m.
     pub stride_length_m: f64,
-    /// Factor on the reference's knee flexion (1: as measured).
-    pub knee_flexion: f64,
 }
 
 impl Default for GuessSettings {
     fn default() -> Self {
-        Self { stride_time_s: 1.2, stride_length_m: 1.15, knee_flexion: 1.0 }
+        Self { stride_time_s: 1.2, stride_length_m: 1.15 }
     }
 }
 

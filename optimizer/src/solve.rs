@@ -1,15 +1,13 @@
 //! The public face: one gait problem in, one honest outcome out.
 
 use crate::bounds::TunedBounds;
-use crate::cold_start::{self, ColdStartError, GuessSettings};
+use crate::cold_start::ColdStartError;
 use crate::device::Device;
 use crate::gait::Gait;
+use crate::gait_problem::GaitProgramme;
 use crate::gait_problem::programme::RowViolation;
-use crate::gait_problem::{GaitProgramme, gait_of};
 use crate::metrics::gait_rmse;
-use crate::nlp::{
-    self, BoundMultiplierStart, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, StartPoint, WarmPoint,
-};
+use crate::nlp::{NlpError, NlpStatus, NonlinearProgram, WarmPoint};
 use crate::reference::ReferenceGait;
 use crate::settings::{GaitSettings, Mesh};
 use crate::subject::{ModelError, Subject};
@@ -18,6 +16,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use thiserror::Error;
+
+mod cold_guesses;
+mod run;
+
+pub use cold_guesses::{Attempt, BasinChoice, ColdGuess, ColdRoute};
+use cold_guesses::{Choice, choose, try_guesses};
+use run::{Context, Run};
 
 /// One gait problem.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -72,6 +77,9 @@ pub struct IterationRecord {
     pub barrier: f64,
     /// Primal step length.
     pub step: f64,
+    /// Cold guess it belongs to, from 0; several may run at the same time.
+    #[serde(default)]
+    pub guess: usize,
 }
 
 /// Phase of a solve.
@@ -82,6 +90,8 @@ pub enum Phase {
     Tracking,
     /// Tracking the reference with muscles (cold start).
     MuscleTracking,
+    /// Minimising the cost of transport without muscles, as the start of a gait with muscles (cold start).
+    PlainCost,
     /// Minimising the cost of transport.
     Cost,
 }
@@ -127,13 +137,26 @@ pub struct SolveOptions {
     pub max_iterations: usize,
     /// Most seconds of wall time for the whole solve; `None`: no limit.
     pub time_limit_s: Option<f64>,
-    /// Threads of the linear algebra, 1 to 16; the result does not depend on it.
+    /// Threads, 1 to 16: for the cold guesses side by side, then for the linear algebra of each. The result does not
+    /// depend on it.
     pub threads: usize,
+    /// How many guesses of [`ColdGuess::CATALOGUE`] a cold start tries. The variant without muscles has one basin from
+    /// all of them and tries one.
+    pub cold_guesses: usize,
+    /// Which of the converged guesses is the answer.
+    pub basin_choice: BasinChoice,
 }
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-6, max_iterations: 1000, time_limit_s: None, threads: 1 }
+        Self {
+            tolerance: 1e-6,
+            max_iterations: 1000,
+            time_limit_s: None,
+            threads: 1,
+            cold_guesses: 2,
+            basin_choice: BasinChoice::default(),
+        }
     }
 }
 
@@ -146,6 +169,8 @@ impl SolveOptions {
         ModelError::check_range("tolerance", self.tolerance, 1e-10, 1e-2)?;
         ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
+        ModelError::check_range("cold_guesses", self.cold_guesses as f64, 1.0, ColdGuess::CATALOGUE.len() as f64)?;
+        self.basin_choice.validate()?;
         if let Some(limit) = self.time_limit_s {
             ModelError::check_range("time_limit_s", limit, 0.0, 1e7)?;
         }
@@ -207,6 +232,10 @@ pub struct SolveReport {
     pub durations_s: [f64; 8],
     /// v_hip of the four impact-free runs, m/s.
     pub vhip_m_s: [f64; 4],
+    /// Everything that was tried, in order; the figures above are those of the chosen one, iterations and seconds the
+    /// sum.
+    #[serde(default)]
+    pub attempts: Vec<Attempt>,
 }
 
 /// A constraint row or bound that is not met, in words and numbers.
@@ -272,151 +301,11 @@ impl GaitProblem {
     }
 }
 
-/// First barrier parameter of each phase of a cold start. Small values keep the natural guess: at 0.1 the barrier of
-/// 7,000 bounds swamps a cost of 0.06.
-const MU_TRACKING: f64 = 1e-3;
-const MU_MUSCLE_TRACKING: f64 = 1e-2;
-const MU_COST: f64 = 1e-4;
-/// Weight and tolerance of the tracking phases.
-const TRACKING_WEIGHT: f64 = 10.0;
-const TRACKING_TOLERANCE: f64 = 1e-3;
-/// First barrier parameter of a warm start.
-const MU_WARM: f64 = 1e-5;
-/// Most violations reported.
-const MAX_VIOLATIONS: usize = 20;
-
-/// One solve in progress: what all its phases share.
-struct Run<'a> {
-    options: &'a SolveOptions,
-    observer: &'a mut dyn FnMut(&IterationRecord),
-    cancel: &'a CancelToken,
-    started: Instant,
-    iterations: usize,
-    evaluation_s: f64,
-    linear_algebra_s: f64,
-}
-
-impl Run<'_> {
-    fn phase(
-        &mut self,
-        phase: Phase,
-        programme: &GaitProgramme,
-        start: &StartPoint,
-        settings: NlpSettings,
-    ) -> Result<NlpResult, SolveError> {
-        let remaining = self
-            .options
-            .time_limit_s
-            .map_or(f64::INFINITY, |limit| (limit - self.started.elapsed().as_secs_f64()).max(0.0));
-        let settings = NlpSettings {
-            max_seconds: remaining,
-            max_iterations: self.options.max_iterations,
-            bound_multiplier_start: BoundMultiplierStart::Centred,
-            threads: self.options.threads,
-            ..settings
-        };
-        let before = self.iterations;
-        let observer = &mut *self.observer;
-        let result = nlp::solve(
-            programme,
-            start,
-            &settings,
-            &mut |record| {
-                observer(&IterationRecord {
-                    iteration: before + record.number,
-                    phase,
-                    objective: record.objective,
-                    constraint_violation: record.violation,
-                    dual_infeasibility: record.dual_infeasibility,
-                    barrier: record.mu,
-                    step: record.alpha_primal,
-                });
-            },
-            &|| self.cancel.is_cancelled(),
-        )?;
-        self.iterations += result.iterations;
-        self.evaluation_s += result.timing.evaluation;
-        self.linear_algebra_s += result.timing.analysis + result.timing.factorisation + result.timing.backsolves;
-        Ok(result)
-    }
-
-    fn interrupted(result: &NlpResult) -> bool {
-        matches!(result.status, NlpStatus::Cancelled | NlpStatus::TimeLimit)
-    }
-
-    /// Tracking, with muscles tracking again, then cost.
-    fn cold(&mut self, problem: &GaitProblem, programme: &GaitProgramme) -> Result<NlpResult, SolveError> {
-        let guess = GuessSettings::default();
-        let plain = problem.programme(false)?;
-        let postures = cold_start::posture::solve(&plain, &guess)?;
-        let first = cold_start::motion::guess(&plain, &postures, &guess);
-        let tracking_settings =
-            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..NlpSettings::default() };
-        let mut tracked = self.phase(
-            Phase::Tracking,
-            &plain.for_tracking(TRACKING_WEIGHT),
-            &StartPoint::Cold(first),
-            tracking_settings.clone(),
-        )?;
-        if problem.muscles {
-            let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x)?;
-            if Self::interrupted(&tracked) {
-                return Ok(blank(programme, with_muscles, tracked));
-            }
-            tracked = self.phase(
-                Phase::MuscleTracking,
-                &programme.for_tracking(TRACKING_WEIGHT),
-                &StartPoint::Cold(with_muscles),
-                NlpSettings { mu_initial: MU_MUSCLE_TRACKING, ..tracking_settings },
-            )?;
-        }
-        if Self::interrupted(&tracked) {
-            return Ok(tracked);
-        }
-        self.phase(
-            Phase::Cost,
-            programme,
-            &StartPoint::Cold(tracked.x),
-            NlpSettings { tolerance: self.options.tolerance, mu_initial: MU_COST, ..NlpSettings::default() },
-        )
-    }
-
-    fn warm(&mut self, programme: &GaitProgramme, warm: &WarmStart) -> Result<NlpResult, SolveError> {
-        self.phase(
-            Phase::Cost,
-            programme,
-            &StartPoint::Warm(warm.point.clone()),
-            NlpSettings {
-                tolerance: self.options.tolerance,
-                mu_initial: MU_COST,
-                mu_warm: Some(MU_WARM),
-                warm_bound_push: 1e-4,
-                warm_bound_fraction: 1e-4,
-                ..NlpSettings::default()
-            },
-        )
-    }
-}
-
-/// An interrupted result in the shape of `programme`: its multipliers carry no information.
-fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
-    let (n, m) = (programme.variables(), programme.rows());
-    NlpResult {
-        x,
-        row_multipliers: vec![0.0; m],
-        lower_multipliers: vec![0.0; n],
-        upper_multipliers: vec![0.0; n],
-        slacks: vec![0.0; m],
-        slack_lower_multipliers: vec![0.0; m],
-        slack_upper_multipliers: vec![0.0; m],
-        ..result
-    }
-}
-
 /// Solves one gait problem. Deterministic: same inputs, same bits.
 ///
-/// `observer` is called once per iteration, on the calling thread. A solve that ends without a gait is an
-/// `Ok` outcome with another status than `Converged`. A warm start that does not converge falls back to a cold start.
+/// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]. A warm start
+/// that does not converge falls back to a cold start. `observer` is called once per iteration, on the calling thread.
+/// A solve that ends without a gait is an `Ok` outcome with another status than `Converged`.
 ///
 /// # Errors
 /// [`SolveError`] when the input is invalid.
@@ -432,33 +321,87 @@ pub fn solve(
     if let Some(warm) = warm_start {
         check_shape(problem, &programme, warm)?;
     }
-    let mut run = Run {
-        options,
-        observer,
-        cancel,
-        started: Instant::now(),
-        iterations: 0,
-        evaluation_s: 0.0,
-        linear_algebra_s: 0.0,
-    };
-    let mut started_from = StartedFrom::Cold;
-    let mut result = match warm_start {
-        None => run.cold(problem, &programme)?,
-        Some(warm) => {
-            started_from = StartedFrom::Warm;
-            let result = run.warm(&programme, warm)?;
-            if result.status == NlpStatus::Converged || Run::interrupted(&result) {
-                result
-            } else {
-                started_from = StartedFrom::ColdAfterWarm;
-                run.cold(problem, &programme)?
-            }
+    let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let mut tally = Tally::default();
+    if let Some(warm) = warm_start {
+        let mut run = Run::new(&context, options.threads, observer);
+        let result = run.warm(warm)?;
+        tally.add(&run);
+        let settled = result.status == NlpStatus::Converged || Run::interrupted(&result);
+        let choice = Choice::new(&context, result);
+        tally.attempts.push(choice.attempt("warm start", &run));
+        if settled {
+            return Ok(outcome(&context, choice, tally, StartedFrom::Warm));
         }
-    };
-    // Polish: the residuals of the point that is handed out are measured on that point, after it is moved into its
-    // bounds (the solver works in bounds widened by 1e-8).
-    programme.project_into_bounds(&mut result.x);
-    Ok(outcome(problem, &programme, &result, &run, started_from))
+    }
+    let guesses = if problem.muscles { options.cold_guesses } else { 1 };
+    let tried = try_guesses(&context, &ColdGuess::CATALOGUE[..guesses], observer)?;
+    finish(&context, tried, tally, if warm_start.is_some() { StartedFrom::ColdAfterWarm } else { StartedFrom::Cold })
+}
+
+/// Solves one gait problem cold from the given guesses only: for studies of basins.
+///
+/// # Errors
+/// [`SolveError`] when the input is invalid or there is no guess.
+pub fn solve_from_guesses(
+    problem: &GaitProblem,
+    guesses: &[ColdGuess],
+    options: &SolveOptions,
+    observer: &mut dyn FnMut(&IterationRecord),
+    cancel: &CancelToken,
+) -> Result<SolveOutcome, SolveError> {
+    options.validate()?;
+    for guess in guesses {
+        guess.validate()?;
+    }
+    ModelError::check_range("number of guesses", guesses.len() as f64, 1.0, 1e3)?;
+    let programme = problem.programme(problem.muscles)?;
+    let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let tried = try_guesses(&context, guesses, observer)?;
+    finish(&context, tried, Tally::default(), StartedFrom::Cold)
+}
+
+fn finish(
+    context: &Context<'_>,
+    tried: Vec<cold_guesses::Tried>,
+    mut tally: Tally,
+    started_from: StartedFrom,
+) -> Result<SolveOutcome, SolveError> {
+    let chosen = choose(&tried, context.options.basin_choice);
+    let mut answer = None;
+    for (index, mut one) in tried.into_iter().enumerate() {
+        one.attempt.chosen = index == chosen;
+        tally.iterations += one.attempt.iterations;
+        tally.evaluation_s += one.evaluation_s;
+        tally.linear_algebra_s += one.linear_algebra_s;
+        tally.attempts.push(one.attempt);
+        if index == chosen {
+            answer = Some(one.choice);
+        }
+    }
+    match answer {
+        Some(answer) => Ok(outcome(context, answer, tally, started_from)),
+        None => {
+            Err(ModelError::OutOfRange { field: "guesses".to_owned(), value: 0.0, minimum: 1.0, maximum: 1e3 }.into())
+        }
+    }
+}
+
+/// What all attempts of one solve cost together.
+#[derive(Default)]
+struct Tally {
+    iterations: usize,
+    evaluation_s: f64,
+    linear_algebra_s: f64,
+    attempts: Vec<Attempt>,
+}
+
+impl Tally {
+    fn add(&mut self, run: &Run<'_>) {
+        self.iterations += run.iterations;
+        self.evaluation_s += run.evaluation_s;
+        self.linear_algebra_s += run.linear_algebra_s;
+    }
 }
 
 fn check_shape(problem: &GaitProblem, programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
@@ -504,36 +447,29 @@ fn status_of(status: NlpStatus) -> SolveStatus {
     }
 }
 
-fn outcome(
-    problem: &GaitProblem,
-    programme: &GaitProgramme,
-    result: &NlpResult,
-    run: &Run<'_>,
-    started_from: StartedFrom,
-) -> SolveOutcome {
+/// Most violations reported.
+const MAX_VIOLATIONS: usize = 20;
+
+fn outcome(context: &Context<'_>, choice: Choice, tally: Tally, started_from: StartedFrom) -> SolveOutcome {
+    let (problem, programme) = (context.problem, context.programme);
+    let Choice { result, gait, status, .. } = choice;
     let x = &result.x;
-    let gait = gait_of(problem, programme, x);
     let rmse = gait_rmse(&gait, &problem.reference);
     let violations = programme.violations(x);
-    let max_violation = violations.first().map_or(0.0, |v| v.amount);
-    let mut status = status_of(result.status);
-    if status == SolveStatus::Converged && !(max_violation <= CONVERGED_VIOLATION) {
-        status = SolveStatus::Stalled;
-    }
     let parts = programme.objective_parts(x);
     let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
     let report = SolveReport {
         status,
         started_from,
-        iterations: run.iterations,
+        iterations: tally.iterations,
         objective: programme.objective(x),
         cost_of_transport: parts.cost_of_transport,
         gait_rmse_rad: rmse.total,
         gait_rmse_parts_rad: rmse.parts,
-        max_violation,
-        seconds_total: run.started.elapsed().as_secs_f64(),
-        seconds_evaluation: run.evaluation_s,
-        seconds_linear_algebra: run.linear_algebra_s,
+        max_violation: violations.first().map_or(0.0, |v| v.amount),
+        seconds_total: context.started.elapsed().as_secs_f64(),
+        seconds_evaluation: tally.evaluation_s,
+        seconds_linear_algebra: tally.linear_algebra_s,
         variables: programme.variables(),
         equalities,
         inequalities: programme.rows() - equalities,
@@ -541,6 +477,7 @@ fn outcome(
         stride_length_m: gait.stride_length_m,
         durations_s: std::array::from_fn(|d| gait.domains[d].duration_s),
         vhip_m_s: gait.hip_velocity_m_s,
+        attempts: tally.attempts,
     };
     let violations = if status == SolveStatus::Converged {
         Vec::new()

@@ -65,6 +65,7 @@ impl Evaluate for Analytic {
                 dual_infeasibility: decay,
                 barrier: decay * 0.1,
                 step: 1.0,
+                guess: 0,
             });
             std::thread::sleep(self.pause);
         }
@@ -98,6 +99,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             stride_length_m: 1.3,
             durations_s: [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1],
             vhip_m_s: [1.0; 4],
+            attempts: Vec::new(),
         },
         gait: gait(assignment, rmse),
         warm_start: WarmStart {

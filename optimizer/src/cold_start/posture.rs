@@ -79,7 +79,7 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec
         .map(|instant| {
             let mut reference = programme.reference_at(instant.fraction);
             for knee in [2, 5] {
-                reference[knee] = (reference[knee] * guess.knee_flexion).clamp(0.05, 1.35);
+                reference[knee] = reference[knee].clamp(0.05, 1.35);
             }
             let mut q = [0.0; 9];
             q[0] = -toe_left - 0.22 * stride + speed * instant.fraction * guess.stride_time_s;

@@ -411,10 +411,13 @@ impl GaitProgramme {
     }
 
     /// One block per mesh point under one block per domain (Bezier coefficients, phase limits, integration rows)
-    /// under one root (durations, hip velocities, lengths, impulses, resets). The velocities before an impact and the
-    /// rows that determine them move to the root, because the impact couples them with the next domain.
+    /// under one root (durations, hip velocities, lengths, impulses, resets). With muscles their states and force rows
+    /// are a block of their own under each point, which they meet in four angles and four torque rows only. The
+    /// velocities before an impact and the rows that determine them move to the root, because the impact couples them
+    /// with the next domain.
     fn elimination_tree(&self) -> EliminationBlocks {
-        let points: usize = self.layout.domains.iter().map(|d| d.points).sum();
+        let per_point = if self.layout.muscles { 2 } else { 1 };
+        let points: usize = self.layout.domains.iter().map(|d| d.points * per_point).sum();
         let root = points + CYCLE.len();
         let mut blocks = EliminationBlocks {
             parent: vec![Some(root); root + 1],
@@ -428,9 +431,14 @@ impl GaitProgramme {
             first_block[d] = block;
             let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();
             for k in 0..domain.points {
-                blocks.parent[block] = Some(points + d);
                 let p = domain.point(k);
-                blocks.block_of_variable[p..p + domain.per_point].fill(block);
+                if self.layout.muscles {
+                    blocks.parent[block] = Some(block + 1);
+                    blocks.block_of_variable[p + domain.fibre_length()..p + domain.per_point].fill(block);
+                    block += 1;
+                }
+                blocks.parent[block] = Some(points + d);
+                blocks.block_of_variable[p..p + domain.fibre_length()].fill(block);
                 if into_impact && k == domain.last() {
                     blocks.block_of_variable[p + super::layout::QD..p + super::layout::QDD].fill(root);
                 }
@@ -457,7 +465,8 @@ impl GaitProgramme {
                 | RowKind::MidpointFibre
                 | RowKind::EndpointFibre => points + d,
                 RowKind::ContactVelocity | RowKind::OutputVelocity | RowKind::HipVelocity if before_impact => root,
-                _ => first_block[d] + k,
+                RowKind::MuscleForce => first_block[d] + per_point * k,
+                _ => first_block[d] + per_point * k + per_point - 1,
             };
         }
         blocks

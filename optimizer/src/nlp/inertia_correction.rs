@@ -8,6 +8,12 @@ pub(super) struct InertiaCorrection {
     last: f64,
     /// Proximal weight: delta_w starts here while steps are cut by the line search.
     proximal: f64,
+    /// Iterations in a row whose unregularised matrix was tried and refused.
+    refusals: usize,
+    /// Iterations still to begin with the fading regularisation.
+    skip: usize,
+    /// The present iteration began without regularisation.
+    bare: bool,
     /// Current delta_w.
     pub delta_w: f64,
     /// Current delta_c.
@@ -18,6 +24,12 @@ impl InertiaCorrection {
     /// First trial of an iteration.
     pub(super) fn begin(&mut self, settings: &NlpSettings, mu: f64) {
         self.delta_w = self.proximal;
+        if self.skip > 0 {
+            self.skip -= 1;
+            let fading = (self.last * DECREASE).max(settings.hessian_regularisation_min);
+            self.delta_w = self.delta_w.max(fading);
+        }
+        self.bare = self.delta_w == 0.0;
         self.delta_c = match settings.dual_regularisation {
             DualRegularisation::Always => Self::dual(settings, mu),
             DualRegularisation::WhenSingular => 0.0,
@@ -42,9 +54,13 @@ impl InertiaCorrection {
     }
 
     /// The matrix was accepted.
-    pub(super) fn accept(&mut self) {
+    pub(super) fn accept(&mut self, settings: &NlpSettings) {
         if self.delta_w > 0.0 {
             self.last = self.delta_w;
+        }
+        if self.bare {
+            self.refusals = if self.delta_w > 0.0 { self.refusals + 1 } else { 0 };
+            self.skip = self.refusals.saturating_sub(1).min(settings.regularisation_memory);
         }
     }
 

@@ -288,7 +288,7 @@ impl<'p> Run<'p> {
                         &mut self.direction,
                     );
                     if ratio <= settings.residual_limit {
-                        self.correction.accept();
+                        self.correction.accept(settings);
                         return true;
                     }
                     session.newton.distrust() || self.correction.singular(settings, self.mu)

@@ -117,6 +117,10 @@ pub struct NlpSettings {
     pub hessian_regularisation_min: f64,
     /// Regularisation of the Hessian that counts as failure. Default 1e20.
     pub hessian_regularisation_max: f64,
+    /// Once the unregularised matrix has had the wrong inertia in two iterations in a row, the next iterations begin with
+    /// the last regularisation, fading, instead of factorising it again: one more for each further refusal, at most
+    /// this many. Default 0 (WB06: always try).
+    pub regularisation_memory: usize,
     /// First weight of the proximal term that follows steps cut by the line search; 0: none. Default 1e-4.
     pub proximal_first: f64,
     /// When delta_c > 0. Default always.
@@ -189,6 +193,7 @@ impl Default for NlpSettings {
             hessian_regularisation_first: 1e-4,
             hessian_regularisation_min: 1e-20,
             hessian_regularisation_max: 1e20,
+            regularisation_memory: 0,
             proximal_first: 1e-4,
             dual_regularisation: DualRegularisation::default(),
             dual_regularisation_value: 1e-8,

@@ -1,0 +1,52 @@
+//! Which local optima the cold guesses reach: objective, Gait RMSE and iterations of each.
+//!
+//! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--grid off]`: the guesses of the
+//! catalogue, or with `--grid on` a grid of routes, knee flexions and barriers; one CSV row each.
+
+use gait_optimizer::{CancelToken, ColdGuess, ColdRoute, GaitProblem, SolveOptions, Subject, solve_from_guesses};
+use std::error::Error;
+
+fn argument(name: &str, default: &str) -> String {
+    let arguments: Vec<String> = std::env::args().collect();
+    arguments
+        .iter()
+        .position(|a| a == name)
+        .and_then(|i| arguments.get(i + 1))
+        .cloned()
+        .unwrap_or_else(|| default.to_owned())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let threads: usize = argument("--threads", "2").parse()?;
+    let muscles = argument("--muscles", "on") == "on";
+    let mut guesses = ColdGuess::CATALOGUE.to_vec();
+    if argument("--grid", "off") == "on" {
+        let base = guesses[0];
+        guesses.clear();
+        let base = ColdGuess { route: ColdRoute::Direct, ..base };
+        for knee_flexion in [0.4, 0.6, 0.8] {
+            guesses.push(ColdGuess { knee_flexion, ..base });
+        }
+        for barrier in [1e-3, 1e-2] {
+            guesses.push(ColdGuess { barrier, ..base });
+        }
+        for (stride_time_s, stride_length_m) in [(1.0, 1.05), (1.1, 1.15), (1.3, 1.3)] {
+            guesses.push(ColdGuess { stride_time_s, stride_length_m, ..base });
+        }
+    }
+    println!("subject,guess,status,iterations,seconds,objective,gait_rmse_rad");
+    for subject in argument("--subjects", "1,2").split(',') {
+        let problem = GaitProblem::new(Subject::builtin(subject.parse()?)?, muscles)?;
+        for pair in guesses.chunks(threads) {
+            let options = SolveOptions { threads, max_iterations: 500, ..SolveOptions::default() };
+            let outcome = solve_from_guesses(&problem, pair, &options, &mut |_| {}, &CancelToken::new())?;
+            for a in outcome.report.attempts {
+                println!(
+                    "{subject},\"{}\",{:?},{},{:.2},{:.8},{:.4}",
+                    a.strategy, a.status, a.iterations, a.seconds, a.objective, a.gait_rmse_rad
+                );
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,193 @@
+//! One attempt in progress: its phases, and what they cost.
+
+use super::cold_guesses::{ColdGuess, ColdRoute};
+use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveOptions, WarmStart};
+use crate::cold_start;
+use crate::gait_problem::GaitProgramme;
+use crate::nlp::{self, BoundMultiplierStart, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
+use std::time::Instant;
+
+/// First barrier parameter of the tracking phases of a cold start. Small values keep the natural guess: at 0.1 the
+/// barrier of 7,000 bounds swamps a cost of 0.06.
+const MU_TRACKING: f64 = 1e-3;
+const MU_MUSCLE_TRACKING: f64 = 1e-2;
+/// Weight and tolerance of the tracking phases.
+const TRACKING_WEIGHT: f64 = 10.0;
+const TRACKING_TOLERANCE: f64 = 1e-3;
+/// First barrier parameter of a warm start.
+const MU_WARM: f64 = 1e-5;
+/// First barrier parameter of a cost phase that may not choose its own.
+const MU_COST: f64 = 1e-4;
+/// Longest run of iterations that do not try the unregularised matrix again after it had the wrong inertia.
+const REGULARISATION_MEMORY: usize = 4;
+
+/// What all attempts of one solve share.
+#[derive(Clone, Copy)]
+pub(super) struct Context<'a> {
+    pub(super) problem: &'a GaitProblem,
+    pub(super) programme: &'a GaitProgramme,
+    pub(super) options: &'a SolveOptions,
+    pub(super) cancel: &'a CancelToken,
+    pub(super) started: Instant,
+}
+
+/// One attempt.
+pub(super) struct Run<'a> {
+    context: &'a Context<'a>,
+    threads: usize,
+    observer: &'a mut dyn FnMut(&IterationRecord),
+    begun: Instant,
+    /// Number of the cold guess.
+    pub(super) guess: usize,
+    pub(super) iterations: usize,
+    pub(super) evaluation_s: f64,
+    pub(super) linear_algebra_s: f64,
+}
+
+impl<'a> Run<'a> {
+    pub(super) fn new(context: &'a Context<'a>, threads: usize, observer: &'a mut dyn FnMut(&IterationRecord)) -> Self {
+        Self {
+            context,
+            threads,
+            observer,
+            begun: Instant::now(),
+            guess: 0,
+            iterations: 0,
+            evaluation_s: 0.0,
+            linear_algebra_s: 0.0,
+        }
+    }
+
+    /// Seconds since the attempt began.
+    pub(super) fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    fn phase(
+        &mut self,
+        phase: Phase,
+        programme: &GaitProgramme,
+        start: &StartPoint,
+        settings: NlpSettings,
+    ) -> Result<NlpResult, SolveError> {
+        let options = self.context.options;
+        let remaining = options
+            .time_limit_s
+            .map_or(f64::INFINITY, |limit| (limit - self.context.started.elapsed().as_secs_f64()).max(0.0));
+        let settings = NlpSettings {
+            max_seconds: remaining,
+            max_iterations: options.max_iterations,
+            bound_multiplier_start: BoundMultiplierStart::Centred,
+            regularisation_memory: REGULARISATION_MEMORY,
+            threads: self.threads,
+            ..settings
+        };
+        let (before, guess) = (self.iterations, self.guess);
+        let observer = &mut *self.observer;
+        let result = nlp::solve(
+            programme,
+            start,
+            &settings,
+            &mut |record| {
+                observer(&IterationRecord {
+                    iteration: before + record.number,
+                    phase,
+                    objective: record.objective,
+                    constraint_violation: record.violation,
+                    dual_infeasibility: record.dual_infeasibility,
+                    barrier: record.mu,
+                    step: record.alpha_primal,
+                    guess,
+                });
+            },
+            &|| self.context.cancel.is_cancelled(),
+        )?;
+        self.iterations += result.iterations;
+        self.evaluation_s += result.timing.evaluation;
+        self.linear_algebra_s += result.timing.analysis + result.timing.factorisation + result.timing.backsolves;
+        Ok(result)
+    }
+
+    /// Whether the caller or the clock ended it.
+    pub(super) fn interrupted(result: &NlpResult) -> bool {
+        matches!(result.status, NlpStatus::Cancelled | NlpStatus::TimeLimit)
+    }
+
+    /// Tracking, with muscles by the guess's route, then cost.
+    pub(super) fn cold(&mut self, guess: &ColdGuess) -> Result<NlpResult, SolveError> {
+        let (problem, programme) = (self.context.problem, self.context.programme);
+        let settings = guess.settings();
+        let tracked_problem = guess.tracked(problem);
+        let plain = tracked_problem.programme(false)?;
+        let postures = cold_start::posture::solve(&plain, &settings)?;
+        let first = cold_start::motion::guess(&plain, &postures, &settings);
+        let tracking_settings =
+            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..NlpSettings::default() };
+        let cost_settings = |mu_initial| NlpSettings {
+            tolerance: self.context.options.tolerance,
+            mu_initial,
+            ..NlpSettings::default()
+        };
+        let mut tracked = self.phase(
+            Phase::Tracking,
+            &plain.for_tracking(TRACKING_WEIGHT),
+            &StartPoint::Cold(first),
+            tracking_settings.clone(),
+        )?;
+        if problem.muscles {
+            if guess.route == ColdRoute::PlainOptimum && !Self::interrupted(&tracked) {
+                let settings = NlpSettings { tolerance: TRACKING_TOLERANCE, ..cost_settings(MU_COST) };
+                tracked = self.phase(Phase::PlainCost, &plain, &StartPoint::Cold(tracked.x), settings)?;
+            }
+            let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x)?;
+            if Self::interrupted(&tracked) {
+                return Ok(blank(programme, with_muscles, tracked));
+            }
+            if guess.route == ColdRoute::MuscleTracking {
+                tracked = self.phase(
+                    Phase::MuscleTracking,
+                    &tracked_problem.programme(true)?.for_tracking(TRACKING_WEIGHT),
+                    &StartPoint::Cold(with_muscles),
+                    NlpSettings { mu_initial: MU_MUSCLE_TRACKING, ..tracking_settings },
+                )?;
+            } else {
+                tracked.x = with_muscles;
+            }
+        }
+        if Self::interrupted(&tracked) {
+            return Ok(tracked);
+        }
+        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), cost_settings(guess.barrier))
+    }
+
+    pub(super) fn warm(&mut self, warm: &WarmStart) -> Result<NlpResult, SolveError> {
+        self.phase(
+            Phase::Cost,
+            self.context.programme,
+            &StartPoint::Warm(warm.point.clone()),
+            NlpSettings {
+                tolerance: self.context.options.tolerance,
+                mu_initial: MU_COST,
+                mu_warm: Some(MU_WARM),
+                warm_bound_push: 1e-4,
+                warm_bound_fraction: 1e-4,
+                ..NlpSettings::default()
+            },
+        )
+    }
+}
+
+/// An interrupted result in the shape of `programme`: its multipliers carry no information.
+fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
+    let (n, m) = (programme.variables(), programme.rows());
+    NlpResult {
+        x,
+        row_multipliers: vec![0.0; m],
+        lower_multipliers: vec![0.0; n],
+        upper_multipliers: vec![0.0; n],
+        slacks: vec![0.0; m],
+        slack_lower_multipliers: vec![0.0; m],
+        slack_upper_multipliers: vec![0.0; m],
+        ..result
+    }
+}
