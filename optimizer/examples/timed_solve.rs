@@ -1,0 +1,39 @@
+//! One cold solve with its figures as JSON: our side of `benches/casadi/race.py`.
+//!
+//! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]`
+
+use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, Subject, solve};
+use std::error::Error;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut subject = 1;
+    let mut muscles = false;
+    let mut options = SolveOptions::default();
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
+        match argument.as_str() {
+            "--muscles" => muscles = true,
+            "--subject" => subject = value()?.parse()?,
+            "--threads" => options.threads = value()?.parse()?,
+            other => return Err(format!("unknown argument {other}").into()),
+        }
+    }
+    let problem = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+    let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
+    let outcome = solve(
+        &problem,
+        None,
+        &options,
+        &mut |record| {
+            let phase = serde_json::json!(record.phase);
+            match phases.last_mut() {
+                Some((name, count)) if *name == phase => *count += 1,
+                _ => phases.push((phase, 1)),
+            }
+        },
+        &CancelToken::new(),
+    )?;
+    println!("{}", serde_json::json!({ "report": outcome.report, "records_by_phase": phases }));
+    Ok(())
+}
