@@ -71,7 +71,8 @@ async fn browser_animation_plays_pauses_and_is_scrubbed() {
     assert_eq!(page.value(phase).await, paused, "it stands still");
     let pixels = "document.querySelector('.walker canvas').toDataURL().length";
     let before = page.value(pixels).await;
-    page.run("const s = document.querySelector('[data-scrub]'); s.value = 50; s.dispatchEvent(new Event('input'))").await;
+    page.run("const s = document.querySelector('[data-scrub]'); s.value = 50; s.dispatchEvent(new Event('input'))")
+        .await;
     assert_ne!(page.value(pixels).await, before, "another picture");
     page.is_clean(&site.origin).await;
     browser.close().await;
@@ -99,10 +100,10 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     }
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let plain = browser.open_without_scripts(&format!("{}/studies/{study}/compare", site.origin)).await;
-    plain.click("input[value=b]").await;
-    plain.click("#author").await;
+    plain.click_plainly("input[value=b]").await;
+    plain.click_plainly("#author").await;
     plain.type_text("K2").await;
-    plain.click("main > form button[type=submit]").await;
+    plain.click_plainly("main > form button[type=submit]").await;
     plain.wait_for(".notice.good").await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     assert_eq!(site.service.feedback(study).await.iter().filter(|row| row.author.starts_with('K')).count(), 2);
@@ -116,11 +117,18 @@ async fn browser_pages_fit_a_tablet_and_a_phone() {
     let study = site.service.study(|new| new.trial_budget = 4).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trial = site.service.trials(study).await[0].id;
-    for path in ["/".into(), "/studies/new".into(), format!("/studies/{study}"), format!("/studies/{study}/compare"), format!("/trials/{trial}")] {
+    for path in [
+        "/".into(),
+        "/studies/new".into(),
+        format!("/studies/{study}"),
+        format!("/studies/{study}/compare"),
+        format!("/trials/{trial}"),
+    ] {
         let page = browser.open(&format!("{}{path}", site.origin)).await;
         for width in [1280, 768, 360] {
             page.resize(width, 900).await;
-            let overflow = page.value("document.documentElement.scrollWidth - document.documentElement.clientWidth").await;
+            let overflow =
+                page.value("document.documentElement.scrollWidth - document.documentElement.clientWidth").await;
             assert_eq!(overflow, "0", "{path} at {width} px");
         }
         page.is_clean(&site.origin).await;

@@ -3,6 +3,7 @@
 use super::body::{Body, Switch};
 use super::serve::{cores_or, interrupted};
 use crate::error::Error;
+use crate::store::audit::Actor;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Store, TrialId, commit, studies, trials};
@@ -128,7 +129,7 @@ impl Tune {
                 seed: self.seed,
                 ..NewStudy::of(subject.id)
             };
-            plan::create(&mut writer, new).await?
+            plan::create(&mut writer, &Actor::terminal(), new).await?
         };
         commit(writer).await?;
         Ok(study)
