@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::feedback::FeedbackLog;
+use crate::feedback::{Feedback, FeedbackLog};
 use crate::posterior::Learner;
 use crate::settings::{LearnerSettings, Partner};
 use crate::space::{ActionIndex, SearchSpace};
@@ -17,6 +17,8 @@ pub enum QuestionReason {
     Previous,
     /// The other action is the best so far.
     Incumbent,
+    /// The pair was asked before: the two answers tell how consistent answers are.
+    Consistency,
 }
 
 /// "Which of these two is better?"
@@ -91,21 +93,73 @@ impl Learner {
     }
 }
 
-/// The next comparison worth asking about the actions already tried, if any: the last action against its partners of
-/// [`comparisons_to_ask`], unless already answered.
+/// Answered comparisons for each one that is asked again.
+const ANSWERS_PER_REPEAT: usize = 8;
+
+/// The next comparison worth asking about the actions already tried, if any.
+///
+/// First the last action against its partners of [`comparisons_to_ask`], then against the action tried before it and
+/// the best one, where not answered yet. When all are, one pair in eight is asked again, the oldest that was asked only
+/// once: what people answer the second time says how far their answers can be trusted.
 ///
 /// # Errors
 /// When a setting is out of range or the log does not fit the space.
 pub fn what_to_ask(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) -> Result<Option<Question>> {
+    let mut learner = Learner::default();
     let Some(&last) = log.visited.last() else { return Ok(None) };
-    let answered = |question: &Question| {
-        log.feedback.iter().any(|feedback| {
-            let (first, second) = feedback.actions();
-            second.is_some_and(|second| {
-                (first, second) == (question.action, question.against)
-                    || (second, first) == (question.action, question.against)
-            })
+    let pair = |a: ActionIndex, b: ActionIndex| (a.min(b), a.max(b));
+    let answered: Vec<(ActionIndex, ActionIndex)> = log
+        .feedback
+        .iter()
+        .filter_map(|feedback| match *feedback {
+            Feedback::Preference { winner, loser } => Some(pair(winner, loser)),
+            Feedback::Tie { a, b } => Some(pair(a, b)),
+            Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
         })
-    };
-    Ok(comparisons_to_ask(space, log, last, settings)?.into_iter().find(|question| !answered(question)))
+        .collect();
+    let mut questions = learner.comparisons_to_ask(space, log, last, settings)?;
+    for partner in [Partner::Previous, Partner::Incumbent] {
+        let settings = LearnerSettings { partner, buffer: 1, ..settings.clone() };
+        questions.extend(learner.comparisons_to_ask(space, log, last, &settings)?);
+    }
+    if let Some(open) = questions.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
+        return Ok(Some(open));
+    }
+    let times = |asked: &(ActionIndex, ActionIndex)| answered.iter().filter(|a| *a == asked).count();
+    let again = answered.iter().enumerate().filter(|&(at, asked)| answered[..at].contains(asked)).count();
+    if answered.len() < ANSWERS_PER_REPEAT * (again + 1) {
+        return Ok(None);
+    }
+    let once = answered.iter().find(|asked| times(asked) == 1);
+    Ok(once.map(|&(action, against)| Question { action, against, reason: QuestionReason::Consistency }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::Dimension;
+
+    #[test]
+    fn questions_come_in_order_and_a_pair_is_repeated() {
+        let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let settings = LearnerSettings::default();
+        let mut log = FeedbackLog { visited: vec![ActionIndex(3)], feedback: vec![] };
+        assert_eq!(what_to_ask(&space, &log, &settings).unwrap(), None);
+        let mut reasons = Vec::new();
+        for action in [9, 5, 12, 7, 20].map(ActionIndex) {
+            log.visited.push(action);
+            while let Some(question) = what_to_ask(&space, &log, &settings).unwrap() {
+                reasons.push(question.reason);
+                assert!(reasons.len() < 30, "asks for ever");
+                let (a, b) = (question.action, question.against);
+                let closer = a.0.abs_diff(8) < b.0.abs_diff(8);
+                let (winner, loser) = if closer { (a, b) } else { (b, a) };
+                log.feedback.push(Feedback::Preference { winner, loser });
+            }
+        }
+        assert_eq!(reasons[0], QuestionReason::Incumbent);
+        assert!(reasons.contains(&QuestionReason::Previous));
+        assert_eq!(reasons.iter().filter(|r| **r == QuestionReason::Consistency).count(), 1, "{reasons:?}");
+    }
 }

@@ -57,8 +57,8 @@ impl Chain {
                     || answer.minus.is_some_and(|minus| state.model.slot(minus).is_none())
             })
         };
-        let usable =
-            |link: &Option<(usize, Arc<State>)>| link.clone().filter(|(end, state)| *end <= same && opens(state, *end));
+        let usable = |link: &Option<(usize, Arc<State>)>| // The state without answers is no link: the first group starts from nothing.
+            link.clone().filter(|(end, state)| *end > 0 && *end <= same && opens(state, *end));
         let (mut end, mut state) = match usable(&self.tip).or_else(|| usable(&self.base)) {
             Some((end, state)) => (end, Some(state)),
             None => (0, None),

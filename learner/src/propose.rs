@@ -125,7 +125,16 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
         };
         return Ok(Proposal { action, reason: ProposalReason::FirstAction, best: None });
     };
+    let enumerable = space.enumerable().is_ok();
     let (action, reason) = match belief.settings().method {
+        Method::Eubo if !enumerable => {
+            (best_candidate(belief, best, &taken, &mut random), ProposalReason::ExpectedBestUtility)
+        }
+        Method::Thompson if !enumerable => {
+            let candidates = candidates(belief, best, &taken, THOMPSON_CANDIDATES, &mut random);
+            let draw = belief.sampler(&candidates)?.draw(&mut random);
+            (highest(&candidates, &draw), ProposalReason::JointThompson)
+        }
         Method::LineCoSpar => line_cospar(belief, best, pending, &taken, &mut random)?,
         Method::Eubo => match on_lines(belief, best, pending, &taken, &mut random) {
             Some(action) => (action, ProposalReason::ExpectedBestUtility),
@@ -139,6 +148,59 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
         Method::Random => (random_untried(space, &taken, &mut random), ProposalReason::RandomAction),
     };
     Ok(Proposal { action, reason, best: Some(best) })
+}
+
+/// Actions on which EUBO looks where the grid is too large to look at every one.
+const EUBO_CANDIDATES: usize = 2000;
+/// Actions on which a joint draw is taken where the grid is too large for all.
+const THOMPSON_CANDIDATES: usize = 200;
+
+/// The action with the highest value, the first of equals.
+fn highest(actions: &[ActionIndex], values: &[f64]) -> ActionIndex {
+    let start = (actions[0], f64::NEG_INFINITY);
+    actions.iter().zip(values).fold(start, |top, (&a, &f)| if f > top.1 { (a, f) } else { top }).0
+}
+
+/// Untried actions of 20 lines through the best, then random ones; at least one.
+fn candidates(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    count: usize,
+    random: &mut Random,
+) -> Vec<ActionIndex> {
+    let space = belief.space();
+    let mut seen = HashSet::new();
+    let mut chosen: Vec<ActionIndex> = (0..20).flat_map(|_| line::through(space, best, random)).collect();
+    chosen.extend((0..count).map(|_| random_untried(space, taken, random)));
+    chosen.retain(|action| !taken.contains(action) && seen.insert(*action));
+    chosen.truncate(count);
+    chosen
+}
+
+/// EUBO over candidates instead of the whole grid.
+fn best_candidate(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> ActionIndex {
+    let space = belief.space();
+    let candidates = candidates(belief, best, taken, EUBO_CANDIDATES, random);
+    let incumbent = belief.utility.view(best, space.levels(best));
+    let values: Vec<f64> = candidates
+        .iter()
+        .map(|&action| {
+            let (mean, variance) =
+                belief.utility.difference(&belief.utility.view(action, space.levels(action)), &incumbent);
+            let chance = match &belief.feasibility {
+                Some(_) => belief.probability_of_converging(action).unwrap_or(1.0),
+                None => 1.0,
+            };
+            eubo::expected_gain(mean, variance) * chance
+        })
+        .collect();
+    highest(&candidates, &values)
 }
 
 /// Whether an action reaches the lowest threshold when its mean is raised by the avoidance setting.
@@ -247,7 +309,7 @@ fn line_cospar(
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
     if belief.settings().repeats {
-        return line_with_repeats(belief, best, pending, random);
+        return line_with_repeats(belief, best, pending, taken, random);
     }
     let suggested: Vec<ActionIndex> =
         belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
@@ -265,11 +327,7 @@ fn line_cospar(
             continue;
         }
         let draw = belief.sampler(&candidates)?.draw(random);
-        let (chosen, _) = candidates
-            .iter()
-            .zip(&draw)
-            .fold((candidates[0], f64::NEG_INFINITY), |top, (&a, &f)| if f > top.1 { (a, f) } else { top });
-        return Ok((chosen, ProposalReason::ThompsonOnLine));
+        return Ok((highest(&candidates, &draw), ProposalReason::ThompsonOnLine));
     }
     Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted))
 }
@@ -279,6 +337,7 @@ fn line_with_repeats(
     belief: &Posterior,
     best: ActionIndex,
     pending: &[ActionIndex],
+    taken: &HashSet<ActionIndex>,
     random: &mut Random,
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
@@ -286,17 +345,23 @@ fn line_with_repeats(
     let line: Vec<ActionIndex> =
         line::through(space, best, random).into_iter().filter(|&a| model.slot(a).is_none()).collect();
     let levels: Vec<Vec<usize>> = line.iter().map(|&a| space.levels(a)).collect();
-    let buffered: Vec<ActionIndex> =
-        belief.visited().iter().rev().take(belief.settings().buffer).chain(pending).copied().collect();
-    let mut chosen = best;
+    let buffered: Vec<ActionIndex> = belief.visited().iter().rev().take(belief.settings().buffer).copied().collect();
+    let mut chosen = None;
     for _ in 0..50 {
         let (points, others) = belief.utility.draw(&levels, random)?;
         let all = model.points.iter().zip(&points).chain(line.iter().zip(&others));
-        chosen = all.fold((best, f64::NEG_INFINITY), |top, (&a, &f)| if f > top.1 { (a, f) } else { top }).0;
-        if !buffered.contains(&chosen) {
+        let start = (None, f64::NEG_INFINITY);
+        chosen = all
+            .filter(|(action, _)| !pending.contains(action))
+            .fold(start, |top, (&a, &f)| if f > top.1 { (Some(a), f) } else { top })
+            .0;
+        if chosen.is_none_or(|chosen| !buffered.contains(&chosen)) {
             break;
         }
     }
+    let Some(chosen) = chosen else {
+        return Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted));
+    };
     Ok((chosen, ProposalReason::ThompsonOnLine))
 }
 

@@ -4,7 +4,9 @@
 //! [--cold on] [--threads 1]`: solves the default problem, then for each random one-bound change solves warm from it
 //! (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end.
 
-use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve};
+use gait_optimizer::{
+    CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
+};
 use std::error::Error;
 
 /// Levels of Table I (Li et al. 2022).
@@ -34,7 +36,12 @@ impl SplitMix {
 
 fn argument(name: &str, default: &str) -> String {
     let arguments: Vec<String> = std::env::args().collect();
-    arguments.iter().position(|a| a == name).and_then(|i| arguments.get(i + 1)).cloned().unwrap_or_else(|| default.to_owned())
+    arguments
+        .iter()
+        .position(|a| a == name)
+        .and_then(|i| arguments.get(i + 1))
+        .cloned()
+        .unwrap_or_else(|| default.to_owned())
 }
 
 fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {
@@ -56,8 +63,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut random = SplitMix(argument("--seed", "1").parse()?);
     let base = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
     let start = run(&base, None, threads)?;
-    eprintln!("base: {:?} {} iterations {:.2} s", start.report.status, start.report.iterations, start.report.seconds_total);
-    println!("bound,value,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse");
+    eprintln!(
+        "base: {:?} {} iterations {:.2} s",
+        start.report.status, start.report.iterations, start.report.seconds_total
+    );
+    println!(
+        "bound,value,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse"
+    );
     let (mut warm_seconds, mut warm_iterations) = (Vec::new(), Vec::new());
     let (mut cold_seconds, mut cold_iterations) = (Vec::new(), Vec::new());
     let mut worst_ratio = 0.0_f64;
@@ -72,7 +84,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         let warm = run(&problem, Some(&start.warm_start), threads)?.report;
         print!(
             "{},{value},{:?},{:?},{},{:.3},{:.8},{:.4}",
-            TunedBounds::NAMES[bound], warm.status, warm.started_from, warm.iterations, warm.seconds_total, warm.objective, warm.gait_rmse_rad
+            TunedBounds::NAMES[bound],
+            warm.status,
+            warm.started_from,
+            warm.iterations,
+            warm.seconds_total,
+            warm.objective,
+            warm.gait_rmse_rad
         );
         if warm.status == SolveStatus::Converged {
             warm_seconds.push(warm.seconds_total);
@@ -80,7 +98,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         if with_cold {
             let cold = run(&problem, None, threads)?.report;
-            println!(",{:?},{},{:.3},{:.8},{:.4}", cold.status, cold.iterations, cold.seconds_total, cold.objective, cold.gait_rmse_rad);
+            println!(
+                ",{:?},{},{:.3},{:.8},{:.4}",
+                cold.status, cold.iterations, cold.seconds_total, cold.objective, cold.gait_rmse_rad
+            );
             cold_seconds.push(cold.seconds_total);
             cold_iterations.push(cold.iterations as f64);
             worst_ratio = worst_ratio.max(warm.seconds_total / cold.seconds_total);

@@ -25,7 +25,7 @@ pub use gait::{DomainTrajectory, Gait};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    CancelToken, GaitProblem, IterationRecord, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
-    Violation, WarmStart, solve,
+    CancelToken, GaitProblem, IterationRecord, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus,
+    StartedFrom, Violation, WarmStart, solve,
 };
 pub use subject::{ModelError, Subject};

@@ -20,9 +20,9 @@ pub struct GaitRmse {
 pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
     let mut squares = [0.0; 5];
     for sample in 0..RMSE_SAMPLES {
-        let fraction = sample as f64 / (RMSE_SAMPLES - 1) as f64;
+        let fraction = sample as f64 / RMSE_SAMPLES as f64;
         let angles = gait.coordinates_at(fraction * gait.stride_time_s);
-        let wanted = reference.at_clamped(fraction);
+        let wanted = reference.at(fraction);
         for i in 0..5 {
             squares[i] += (angles[2 + i] - wanted[i]).powi(2);
         }

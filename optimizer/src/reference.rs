@@ -99,11 +99,6 @@ impl ReferenceGait {
         std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
     }
 
-    /// The five angles at a fraction within one cycle: 1 is the last row, not the first of the next cycle.
-    pub fn at_clamped(&self, fraction: f64) -> [f64; 5] {
-        if fraction >= 1.0 { self.angles_rad[REFERENCE_ROWS - 1] } else { self.at(fraction.max(0.0)) }
-    }
-
     /// All seven joint angles of the walker at a stride fraction; the right knee and ankle, which no reference of an
     /// intact person has, are the left ones half a stride later.
     pub fn seven_angles(&self, fraction: f64) -> [f64; 7] {

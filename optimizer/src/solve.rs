@@ -304,9 +304,10 @@ impl Run<'_> {
         start: &StartPoint,
         settings: NlpSettings,
     ) -> Result<NlpResult, SolveError> {
-        let remaining = self.options.time_limit_s.map_or(f64::INFINITY, |limit| {
-            (limit - self.started.elapsed().as_secs_f64()).max(0.0)
-        });
+        let remaining = self
+            .options
+            .time_limit_s
+            .map_or(f64::INFINITY, |limit| (limit - self.started.elapsed().as_secs_f64()).max(0.0));
         let settings = NlpSettings {
             max_seconds: remaining,
             max_iterations: self.options.max_iterations,
@@ -546,8 +547,7 @@ fn outcome(
     } else {
         violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
     };
-    let warm_start =
-        WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point() };
+    let warm_start = WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point() };
     SolveOutcome { report, gait, warm_start, violations }
 }
 

@@ -5,6 +5,7 @@
 use gait_optimizer::body::{InverseDynamics, PointState, WalkerModel};
 use gait_optimizer::gait::{FootPoint, Side};
 use gait_optimizer::muscle::{MUSCLES, force_length, force_velocity, tendon_force};
+use gait_optimizer::walking::{CYCLE, impact, kinetic_energy};
 use gait_optimizer::{Device, Subject};
 use serde_json::Value;
 
@@ -111,6 +112,31 @@ fn muscle_lengths_arms_and_curves() {
                 close("fse", fse.value, f("fse"), 1e-9);
                 close("dfse", fse.first * 0.04, f("dfse"), 1e-9);
                 close("Fce", f("act") * muscle.max_force_n * fl.value * fv.value, f("Fce"), 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn impacts() {
+    for number in [1, 2] {
+        let data = fixture(number);
+        let model = WalkerModel::new(&Subject::builtin(number).unwrap(), &Device::ampro3().unwrap()).unwrap();
+        for (k, state) in data["states"].as_array().unwrap().iter().enumerate() {
+            let (q, qd) = (nine(&state["q"]), nine(&state["dq"]));
+            for domain in CYCLE.into_iter().filter(|d| d.opens_with_impact()) {
+                let expected = &state["impacts"][domain.name()];
+                let ours = impact(&model, domain, &q, &qd).unwrap();
+                for (i, value) in numbers(&expected["dq_plus"]).into_iter().enumerate() {
+                    close(&format!("state {k} {} dq+[{i}]", domain.name()), ours.velocity_after[i], value, 1e-8);
+                }
+                for (i, value) in numbers(&expected["Lambda"]).into_iter().enumerate() {
+                    close(&format!("state {k} {} Lambda[{i}]", domain.name()), ours.impulse[i], value, 1e-8);
+                }
+                // A plastic impact cannot create energy.
+                let (before, after) =
+                    (kinetic_energy(&model, &q, &qd), kinetic_energy(&model, &q, &ours.velocity_after));
+                assert!(after <= before * (1.0 + 1e-12), "state {k}: {before} J to {after} J");
             }
         }
     }

@@ -2,9 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
-use gait_optimizer::gait_problem::{GaitProgramme, PointVariables};
+use gait_optimizer::gait_problem::{GaitProgramme, PointVariables, gait_of};
+use gait_optimizer::metrics::gait_rmse;
 use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
-use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
+use gait_optimizer::{Device, GaitProblem, GaitSettings, ReferenceGait, Subject, TunedBounds};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -118,13 +119,44 @@ fn the_solver_stays_at_the_golden_gaits() {
             &golden.programme,
             &StartPoint::Cold(golden.x.clone()),
             &settings,
-            &mut |r| println!("{} obj {:.10} viol {:.1e} dual {:.1e} compl {:.1e} mu {:.1e} a {:.2} dw {:.1e} tr {}", r.number, r.objective, r.violation, r.dual_infeasibility, r.complementarity, r.mu, r.alpha_primal, r.delta_w, r.trials),
+            &mut |r| {
+                println!(
+                    "{} obj {:.10} viol {:.1e} dual {:.1e} compl {:.1e} mu {:.1e} a {:.2} dw {:.1e} tr {}",
+                    r.number,
+                    r.objective,
+                    r.violation,
+                    r.dual_infeasibility,
+                    r.complementarity,
+                    r.mu,
+                    r.alpha_primal,
+                    r.delta_w,
+                    r.trials
+                )
+            },
             &|| false,
         )
         .unwrap();
-        println!("s{subject} {muscles} {:?} {} iterations {:?} {:?}", result.status, result.iterations, result.timing, result.counts);
+        println!(
+            "s{subject} {muscles} {:?} {} iterations {:?} {:?}",
+            result.status, result.iterations, result.timing, result.counts
+        );
         assert_eq!(result.status, NlpStatus::Converged);
         let theirs = golden.data["obj"].as_f64().unwrap();
         assert!((result.objective - theirs).abs() < 1e-6 * theirs, "{} {theirs}", result.objective);
+    }
+}
+
+#[test]
+fn gait_rmse_of_the_golden_gaits() {
+    for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
+        let golden = golden(subject, muscles);
+        let problem = GaitProblem::new(Subject::builtin(subject).unwrap(), muscles).unwrap();
+        let gait = gait_of(&problem, &golden.programme, &golden.x);
+        let rmse = gait_rmse(&gait, &problem.reference);
+        let theirs = golden.data["gait_rmse"].as_f64().unwrap();
+        assert!((rmse.total - theirs).abs() < 1e-9, "subject {subject} muscles {muscles}: {} {theirs}", rmse.total);
+        for (ours, theirs) in rmse.parts.iter().zip(numbers(&golden.data["gait_rmse_parts"])) {
+            assert!((ours - theirs).abs() < 1e-9, "{ours} {theirs}");
+        }
     }
 }

@@ -85,3 +85,6 @@ pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[Fa
     }
     Cholesky::new(&prior.identity_plus_transposed_product(&product))
 }
+
+#[cfg(test)]
+mod against_sampling;

@@ -83,9 +83,10 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec
             }
             let mut q = [0.0; 9];
             q[0] = -toe_left - 0.22 * stride + speed * instant.fraction * guess.stride_time_s;
-            q[1] = 0.98 * (programme.model.left.thigh_length_m
-                + programme.model.left.shank_length_m
-                + programme.model.left.ankle_height_m);
+            q[1] = 0.98
+                * (programme.model.left.thigh_length_m
+                    + programme.model.left.shank_length_m
+                    + programme.model.left.ankle_height_m);
             q[2..].copy_from_slice(&reference);
             q
         })
@@ -106,8 +107,7 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec
             break;
         }
     }
-    let mut result: Vec<Vec<[f64; 9]>> =
-        programme.layout.domains.iter().map(|d| vec![[0.0; 9]; d.points]).collect();
+    let mut result: Vec<Vec<[f64; 9]>> = programme.layout.domains.iter().map(|d| vec![[0.0; 9]; d.points]).collect();
     for (i, instant) in instants.iter().enumerate() {
         for &(d, k) in &instant.members {
             result[d][k] = q[i];
@@ -189,7 +189,10 @@ fn linearised_step(
                 for (contact, target, foot_point) in programme.contact_targets_at(d, right_step, stride) {
                     let seen = grounded[foot_point] && contact.axis == Axis::Z;
                     let flat_x = contact.axis == Axis::X
-                        && instant.members.iter().any(|&(other, _)| other < d && programme.shares_contact(other, contact));
+                        && instant
+                            .members
+                            .iter()
+                            .any(|&(other, _)| other < d && programme.shares_contact(other, contact));
                     if seen || flat_x {
                         continue;
                     }

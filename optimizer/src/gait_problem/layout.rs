@@ -327,8 +327,7 @@ impl Layout {
 }
 
 fn point_variable_label(layout: &DomainLayout, offset: usize) -> (String, &'static str) {
-    const COORDINATE: [&str; 9] =
-        ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+    const COORDINATE: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
     let angle = |i: usize, linear: &'static str, angular: &'static str| if i < 2 { linear } else { angular };
     if offset < QD {
         (COORDINATE[offset].to_owned(), angle(offset, "m", "rad"))

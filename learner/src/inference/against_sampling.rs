@@ -1,0 +1,111 @@
+//! Both approximations against long elliptical slice sampling of the exact posterior (Murray, Adams and MacKay 2010).
+//!
+//! `cargo test --release -p gait-learner sampling -- --nocapture` prints the table of the README.
+
+use super::{Approximate, ExpectationPropagation, Laplace};
+use crate::belief::{Answer, Chain, Process};
+use crate::kernel::Kernel;
+use crate::likelihood::Interval;
+use crate::model::Model;
+use crate::random::Random;
+use crate::settings::{LearnerSettings, Link};
+use crate::space::{ActionIndex, Dimension, SearchSpace};
+
+/// Means and standard deviations of the points under the exact posterior.
+fn sampled(model: &Model, draws: usize) -> (Vec<f64>, Vec<f64>) {
+    let n = model.points.len();
+    let mut random = Random::new(2024, 0);
+    let likelihood =
+        |f: &[f64]| -> f64 { model.sites.iter().map(|s| s.interval.log_likelihood(Link::Probit, s.of(f)).value).sum() };
+    let mut f = vec![0.0; n];
+    let mut current = likelihood(&f);
+    let (mut first, mut second) = (vec![0.0; n], vec![0.0; n]);
+    let warm_up = draws / 5;
+    for step in 0..warm_up + draws {
+        let noise: Vec<f64> = (0..n).map(|_| random.normal()).collect();
+        let v = model.prior.multiply(&noise);
+        let height = current + crate::math::ln(random.uniform().max(1e-300));
+        let mut angle = random.uniform() * std::f64::consts::TAU;
+        let (mut low, mut high) = (angle - std::f64::consts::TAU, angle);
+        loop {
+            let next: Vec<f64> = f.iter().zip(&v).map(|(f, v)| f * angle.cos() + v * angle.sin()).collect();
+            let value = likelihood(&next);
+            if value > height {
+                (f, current) = (next, value);
+                break;
+            }
+            if angle < 0.0 {
+                low = angle;
+            } else {
+                high = angle;
+            }
+            angle = low + random.uniform() * (high - low);
+        }
+        if step >= warm_up {
+            for i in 0..n {
+                first[i] += f[i] / draws as f64;
+                second[i] += f[i] * f[i] / draws as f64;
+            }
+        }
+    }
+    let sd = first.iter().zip(&second).map(|(m, s)| (s - m * m).max(0.0).sqrt()).collect();
+    (first, sd)
+}
+
+fn answers(noise: f64, ties: bool, seed: u64, space: &SearchSpace) -> Vec<Answer> {
+    let mut random = Random::new(seed, 1);
+    let mut answers = Vec::new();
+    let mut last: Option<ActionIndex> = None;
+    let utility = |a: ActionIndex| space.levels(a).iter().map(|&l| -(l as f64 - 1.2).powi(2)).sum::<f64>() + 1.5;
+    while answers.len() < 24 {
+        let action = ActionIndex(random.below(space.len()));
+        let (low, high) = if utility(action) > 0.0 { (0.0, f64::INFINITY) } else { (f64::NEG_INFINITY, 0.0) };
+        answers.push(Answer { plus: action, minus: None, interval: Interval { low, high, noise: 0.1 } });
+        if let Some(last) = last.filter(|&last| last != action) {
+            let (winner, loser) = if utility(action) >= utility(last) { (action, last) } else { (last, action) };
+            let high = if ties && random.uniform() < 0.3 { 0.1 } else { f64::INFINITY };
+            let low = if high.is_finite() { -0.1 } else { 0.0 };
+            answers.push(Answer { plus: winner, minus: Some(loser), interval: Interval { low, high, noise } });
+        }
+        last = Some(action);
+    }
+    answers
+}
+
+#[test]
+fn both_approximations_against_long_sampling() {
+    let dimensions =
+        (0..3).map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0], lengthscale: 1.0 }).collect();
+    let space = SearchSpace::new(dimensions).unwrap();
+    let kernel = Kernel::new(&space, &crate::posterior::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 3]));
+    println!("data                        error of mean (EP, Laplace)   sd (sampled, EP, Laplace)");
+    // The bounds for EP are those of its own error; Laplace's are wide because its error is (see the README).
+    for (name, noise, ties, bounds) in [
+        ("preferences, noise 0.02", 0.02, false, [0.06, 1.2]),
+        ("preferences, noise 0.3", 0.3, false, [0.06, 0.8]),
+        ("with ties, noise 0.1", 0.1, true, [0.06, 1.0]),
+    ] {
+        let answers = answers(noise, ties, 5, &space);
+        let run = |method: &dyn Approximate| {
+            let process = Process { space: &space, kernel: &kernel, link: Link::Probit, method };
+            Chain::default().advance(&process, &answers).unwrap()
+        };
+        let states = [run(&ExpectationPropagation::default()), run(&Laplace)];
+        let (mean, sd) = sampled(&states[0].model, 40_000);
+        let n = mean.len() as f64;
+        let errors = states
+            .each_ref()
+            .map(|state| state.approximation.mean.iter().zip(&mean).map(|(a, b)| (a - b).abs()).sum::<f64>() / n);
+        let spreads = states
+            .each_ref()
+            .map(|state| (0..mean.len()).map(|i| state.approximation.covariance.at(i, i).sqrt()).sum::<f64>() / n);
+        let exact = sd.iter().sum::<f64>() / n;
+        println!(
+            "{name:<27} {:.3}, {:.3}                  {exact:.3}, {:.3}, {:.3}",
+            errors[0], errors[1], spreads[0], spreads[1]
+        );
+        assert!(errors[0] < bounds[0] && errors[1] < bounds[1], "{name}: {errors:?}");
+        assert!((spreads[0] - exact).abs() < 0.05, "{name}: {spreads:?} {exact}");
+        assert!(errors[0] < errors[1], "{name}: {errors:?}");
+    }
+}

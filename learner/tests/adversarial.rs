@@ -1,0 +1,251 @@
+//! Data that no reasonable study produces, and must not break one: whatever the log, there is a finite belief and an
+//! untried action to propose, and the same twice.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use gait_learner::{
+    ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, Learner, LearnerError, LearnerSettings, Link,
+    Method, SearchSpace, posterior, propose, propose_batch, what_to_ask,
+};
+use proptest::prelude::*;
+
+fn space(shape: &[usize]) -> SearchSpace {
+    let dimensions = shape
+        .iter()
+        .enumerate()
+        .map(|(d, &n)| Dimension {
+            name: format!("x{d}"),
+            values: (0..n).map(|level| level as f64).collect(),
+            lengthscale: 1.0,
+        })
+        .collect();
+    SearchSpace::new(dimensions).unwrap()
+}
+
+fn all_settings() -> Vec<LearnerSettings> {
+    let methods = [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random];
+    let mut settings: Vec<LearnerSettings> = methods.map(LearnerSettings::of).to_vec();
+    settings.push(LearnerSettings::published(Method::LineCoSpar));
+    settings.push(LearnerSettings::published(Method::Eubo));
+    settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::default() });
+    settings.push(LearnerSettings {
+        inference: Inference::ExpectationPropagation,
+        link: Link::Probit,
+        avoidance: Some(-0.45),
+        additive_share: 0.4,
+        pairwise_share: 0.3,
+        ..LearnerSettings::default()
+    });
+    settings
+}
+
+/// Everything that a study asks of the learner, checked for sense.
+fn exercise(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) {
+    let belief = posterior(space, log, settings).unwrap();
+    for &action in log.visited.iter().take(5).chain([&ActionIndex(0), &ActionIndex(space.len() - 1)]) {
+        let prediction = belief.predict(action).unwrap();
+        assert!(prediction.mean.is_finite() && prediction.standard_deviation.is_finite(), "{settings:?}");
+        assert!(prediction.standard_deviation < 1.1 * settings.signal_variance.sqrt());
+        let chance = belief.probability_of_converging(action).unwrap();
+        assert!((0.0..=1.0).contains(&chance), "{chance}");
+    }
+    assert_eq!(belief.best().is_some(), !log.visited.is_empty());
+    assert!(belief.best().is_none_or(|best| log.visited.contains(&best)));
+    what_to_ask(space, log, settings).unwrap();
+    let tried: std::collections::HashSet<_> = log.visited.iter().collect();
+    match propose(space, log, &[], settings, 3) {
+        Ok(proposal) => {
+            assert!(space.contains(proposal.action));
+            assert!(settings.repeats || !tried.contains(&proposal.action), "{settings:?}");
+            assert_eq!(propose(space, log, &[], settings, 3).unwrap(), proposal);
+        }
+        Err(LearnerError::Exhausted { .. }) => assert_eq!(tried.len() as u64, space.len()),
+        Err(error) => panic!("{error} {settings:?}"),
+    }
+}
+
+#[test]
+fn a_thousand_contradictory_answers() {
+    let space = space(&[3, 4, 3]);
+    let (a, b) = (ActionIndex(1), ActionIndex(20));
+    let mut log = FeedbackLog { visited: vec![a, b], feedback: Vec::new() };
+    for i in 0..500 {
+        log.feedback.push(Feedback::Preference { winner: a, loser: b });
+        log.feedback.push(Feedback::Preference { winner: b, loser: a });
+        log.feedback.push(Feedback::Label { action: if i % 2 == 0 { a } else { b }, category: i % 2 });
+        if i % 10 == 0 {
+            log.feedback.push(Feedback::Tie { a, b });
+        }
+    }
+    for settings in all_settings() {
+        exercise(&space, &log, &settings);
+        let belief = posterior(&space, &log, &settings).unwrap();
+        let p = belief.preference_probability(a, b).unwrap();
+        assert!((p - 0.5).abs() < 0.2, "{p} {settings:?}");
+    }
+}
+
+#[test]
+fn a_thousand_answers_against_every_order() {
+    // A cycle through many actions, again and again: there is no utility that agrees.
+    let space = space(&[4, 4, 4]);
+    let ring: Vec<ActionIndex> = (0..40).map(ActionIndex).collect();
+    let feedback =
+        (0..1000).map(|i| Feedback::Preference { winner: ring[i % 40], loser: ring[(i + 1) % 40] }).collect();
+    let log = FeedbackLog { visited: ring, feedback };
+    for settings in [LearnerSettings::default(), LearnerSettings::of(Method::Eubo)] {
+        exercise(&space, &log, &settings);
+    }
+}
+
+#[test]
+fn nothing_converges() {
+    let space = space(&[3, 3, 3, 3]);
+    let visited: Vec<ActionIndex> = (0..60).map(ActionIndex).collect();
+    let feedback = visited.iter().map(|&action| Feedback::Label { action, category: 0 }).collect();
+    let log = FeedbackLog { visited, feedback };
+    for settings in all_settings() {
+        exercise(&space, &log, &settings);
+    }
+}
+
+#[test]
+fn one_action_one_point_and_no_answer() {
+    for shape in [vec![1], vec![1, 1, 1], vec![2], vec![5]] {
+        let space = space(&shape);
+        for settings in all_settings() {
+            let mut log = FeedbackLog::default();
+            exercise(&space, &log, &settings);
+            log.visited.push(ActionIndex(0));
+            exercise(&space, &log, &settings);
+            log.feedback = vec![Feedback::Label { action: ActionIndex(0), category: 1 }; 50];
+            exercise(&space, &log, &settings);
+        }
+    }
+}
+
+#[test]
+fn thirty_dimensions() {
+    // 2^30 actions cannot be looked at one by one.
+    let space = space(&[2; 30]);
+    let [a, b, c] = [0, 1 << 29, 77].map(ActionIndex);
+    let log = FeedbackLog {
+        visited: vec![a, b, c],
+        feedback: vec![
+            Feedback::Preference { winner: b, loser: a },
+            Feedback::Label { action: c, category: 0 },
+            Feedback::Preference { winner: b, loser: c },
+        ],
+    };
+    for settings in all_settings() {
+        exercise(&space, &log, &settings);
+    }
+}
+
+#[test]
+fn nonsense_is_refused_by_name() {
+    let space = space(&[2, 2]);
+    let settings = LearnerSettings::default();
+    let refused = |feedback| {
+        posterior(&space, &FeedbackLog { visited: vec![ActionIndex(0)], feedback: vec![feedback] }, &settings)
+            .expect_err("nonsense")
+    };
+    let (inside, outside) = (ActionIndex(1), ActionIndex(4));
+    assert!(matches!(
+        refused(Feedback::Preference { winner: inside, loser: inside }),
+        LearnerError::SelfComparison { entry: 0, .. }
+    ));
+    assert!(matches!(refused(Feedback::Tie { a: inside, b: outside }), LearnerError::UnknownAction { .. }));
+    assert!(matches!(refused(Feedback::Label { action: inside, category: 2 }), LearnerError::UnknownCategory { .. }));
+    assert!(propose(&space, &FeedbackLog::default(), &[outside], &settings, 0).is_err());
+    for settings in [
+        LearnerSettings { preference_noise: f64::NAN, ..LearnerSettings::default() },
+        LearnerSettings { signal_variance: -1.0, ..LearnerSettings::default() },
+        LearnerSettings { ordinal_thresholds: vec![1.0, 0.0], ..LearnerSettings::default() },
+        LearnerSettings { inference: Inference::ExpectationPropagation, ..LearnerSettings::default() },
+        LearnerSettings { samples_per_iteration: 0, ..LearnerSettings::default() },
+    ] {
+        assert!(matches!(
+            propose(&space, &FeedbackLog::default(), &[], &settings, 0),
+            Err(LearnerError::InvalidSetting { .. })
+        ));
+    }
+}
+
+fn any_feedback(actions: u64, categories: usize) -> impl Strategy<Value = Feedback> {
+    let pair = (0..actions, 1..actions).prop_map(move |(a, gap)| (ActionIndex(a), ActionIndex((a + gap) % actions)));
+    prop_oneof![
+        3 => pair.clone().prop_map(|(winner, loser)| Feedback::Preference { winner, loser }),
+        1 => pair.clone().prop_map(|(a, b)| Feedback::Tie { a, b }),
+        1 => pair.prop_map(|(suggested, over)| Feedback::Suggestion { suggested, over }),
+        2 => (0..actions, 0..categories).prop_map(|(a, category)| Feedback::Label { action: ActionIndex(a), category }),
+    ]
+}
+
+fn any_settings() -> impl Strategy<Value = LearnerSettings> {
+    let all = all_settings();
+    ((0..all.len()), 1e-3..2.0_f64, 1e-3..2.0_f64, 0.3..4.0_f64, any::<bool>(), 1_usize..4).prop_map(
+        move |(which, preference, ordinal, factor, many, n)| LearnerSettings {
+            preference_noise: preference,
+            ordinal_noise: ordinal,
+            lengthscale_factor: factor,
+            ordinal_thresholds: if many { vec![-0.5, -0.1, 0.3, 0.7] } else { vec![0.0] },
+            samples_per_iteration: n,
+            ..all[which].clone()
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_log_gives_a_finite_belief_and_a_proposal(
+        settings in any_settings(),
+        feedback in prop::collection::vec(any_feedback(36, 2), 0..60),
+        visited in prop::collection::vec(0_u64..36, 0..40),
+    ) {
+        let space = space(&[3, 4, 3]);
+        let log = FeedbackLog { visited: visited.into_iter().map(ActionIndex).collect(), feedback };
+        exercise(&space, &log, &settings);
+        if let Ok(batch) = propose_batch(&space, &log, &[], &settings, 1) {
+            let distinct: std::collections::HashSet<_> = batch.iter().map(|p| p.action).collect();
+            prop_assert_eq!(distinct.len(), batch.len());
+        }
+    }
+
+    #[test]
+    fn the_cache_never_changes_a_bit(
+        settings in any_settings(),
+        feedback in prop::collection::vec(any_feedback(36, 2), 1..40),
+        stops in prop::collection::vec(0_usize..40, 1..6),
+    ) {
+        let space = space(&[3, 4, 3]);
+        let log_to = |end: usize| {
+            let feedback = feedback[..end.min(feedback.len())].to_vec();
+            let visited = (0..feedback.len() as u64).map(|i| ActionIndex(i * 7 % 36)).collect();
+            FeedbackLog { visited, feedback }
+        };
+        // A learner that has seen prefixes in any order, and logs that were corrected.
+        let mut learner = Learner::default();
+        for stop in stops {
+            learner.posterior(&space, &log_to(stop), &settings).unwrap();
+            let mut corrected = log_to(stop);
+            corrected.feedback.reverse();
+            learner.posterior(&space, &corrected, &settings).unwrap();
+            learner.posterior(&space, &log_to(stop), &settings).unwrap();
+        }
+        let log = log_to(feedback.len());
+        let (fresh, cached) =
+            (posterior(&space, &log, &settings).unwrap(), learner.posterior(&space, &log, &settings).unwrap());
+        for action in (0..36).map(ActionIndex) {
+            let (a, b) = (fresh.predict(action).unwrap(), cached.predict(action).unwrap());
+            prop_assert_eq!(a.mean.to_bits(), b.mean.to_bits());
+            prop_assert_eq!(a.standard_deviation.to_bits(), b.standard_deviation.to_bits());
+        }
+        prop_assert_eq!(
+            propose(&space, &log, &[], &settings, 5).ok(),
+            learner.propose(&space, &log, &[], &settings, 5).ok()
+        );
+    }
+}
