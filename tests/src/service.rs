@@ -4,6 +4,7 @@ use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
 use gaitwright::http::{AppState, router};
+use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
 use gaitwright::store::trials::Trial;
@@ -86,7 +87,7 @@ impl Service {
         let mut new = NewStudy::of(self.subject().await);
         change(&mut new);
         let mut writer = self.store.write().await.unwrap();
-        let study = plan::create(&mut writer, new).await.unwrap();
+        let study = plan::create(&mut writer, &Actor::program(), new).await.unwrap();
         commit(writer).await.unwrap();
         self.director.changed();
         study.id

@@ -100,10 +100,10 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     }
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let plain = browser.open_without_scripts(&format!("{}/studies/{study}/compare", site.origin)).await;
-    plain.click("input[value=b]").await;
-    plain.click("#author").await;
+    plain.click_plainly("input[value=b]").await;
+    plain.click_plainly("#author").await;
     plain.type_text("K2").await;
-    plain.click("main > form button[type=submit]").await;
+    plain.click_plainly("main > form button[type=submit]").await;
     plain.wait_for(".notice.good").await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     assert_eq!(site.service.feedback(study).await.iter().filter(|row| row.author.starts_with('K')).count(), 2);

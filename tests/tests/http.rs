@@ -246,7 +246,7 @@ async fn a_study_of_people_waits_for_each_answer_and_two_front_doors_have_one_ef
         let newest = trials.last().unwrap().id;
         let before = trials[trials.len() - 2].id;
         if through_form {
-            let form = format!("a={newest}&b={before}&answer=a&source=clinician&author=K&note=");
+            let form = format!("a={newest}&b={before}&answer=a&source=clinician&author=K&note=&key={newest}");
             let path = format!("/studies/{study}/compare");
             let saved = service.post_text(&path, "application/x-www-form-urlencoded", &form).await;
             assert_eq!(saved.status, StatusCode::SEE_OTHER, "{}", saved.text);

@@ -3,6 +3,7 @@
 mod body;
 mod logging;
 mod problem;
+mod record;
 mod serve;
 mod solve;
 mod sweep;
@@ -35,6 +36,12 @@ enum Command {
     Solve(solve::Solve),
     /// Optimise one gait for each row of a table of actions.
     Sweep(sweep::Sweep),
+    /// Check the audit trail.
+    Audit(record::Audit),
+    /// Copy a database, also while it is served.
+    Backup(record::Backup),
+    /// Put a copy in place of a database.
+    Restore(record::Restore),
 }
 
 /// Runs the program.
@@ -50,6 +57,9 @@ pub fn run() -> ExitCode {
         Command::Tune(tune) => runtime.block_on(tune.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
+        Command::Audit(audit) => runtime.block_on(audit.run()),
+        Command::Backup(backup) => runtime.block_on(backup.run()),
+        Command::Restore(restore) => runtime.block_on(restore.run()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

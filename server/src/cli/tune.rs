@@ -3,19 +3,19 @@
 use super::body::{Body, Switch};
 use super::serve::{cores_or, interrupted};
 use crate::error::Error;
+use crate::store::audit::Actor;
 use crate::store::studies::{Study, StudyState};
-use crate::store::trials::{Trial, TrialState};
-use crate::store::{Store, TrialId, commit, studies, trials};
-use crate::studies::choice::best_trial;
+use crate::store::trials::Trial;
+use crate::store::{Store, commit, studies, trials};
 use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
 use crate::studies::standing::Standing;
+use crate::studies::summary::{self, Summary};
 use crate::studies::{catalogue, search};
 use crate::workers::{Board, GaitSolver, Pool};
 use clap::Args;
-use gait_optimizer::{SolveStatus, TunedBounds};
+use gait_optimizer::TunedBounds;
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -42,33 +42,6 @@ pub(super) struct Tune {
     /// Print one JSON object at the end instead of lines.
     #[arg(long)]
     json: bool,
-}
-
-/// What `tune --json` prints: a contract for scripts.
-#[derive(Debug, Serialize)]
-struct Summary {
-    study_id: String,
-    state: StudyState,
-    best_trial: Option<u32>,
-    best_action: Option<TunedBounds>,
-    best_gait_rmse_rad: Option<f64>,
-    best_cost_of_transport: Option<f64>,
-    trials: Vec<TrialLine>,
-}
-
-#[derive(Debug, Serialize)]
-struct TrialLine {
-    number: u32,
-    trial_id: TrialId,
-    action: TunedBounds,
-    label: Option<TrialState>,
-    state: TrialState,
-    status: Option<SolveStatus>,
-    gait_rmse_rad: Option<f64>,
-    cost_of_transport: Option<f64>,
-    iterations: Option<u32>,
-    seconds_total: Option<f64>,
-    warm_started_from: Option<u32>,
 }
 
 impl Tune {
@@ -99,7 +72,7 @@ impl Tune {
             Some(ended) => ended?,
             None => eprintln!("interrupted; the same command goes on from here"),
         }
-        self.print(&summary(&standing)?)
+        self.print(&summary::of(&standing).map_err(Error::Learner)?)
     }
 
     /// The unfinished study of the same kind in the database, or a new one.
@@ -128,7 +101,7 @@ impl Tune {
                 seed: self.seed,
                 ..NewStudy::of(subject.id)
             };
-            plan::create(&mut writer, new).await?
+            plan::create(&mut writer, &Actor::terminal(), new).await?
         };
         commit(writer).await?;
         Ok(study)
@@ -224,7 +197,7 @@ fn describe(line: &mut String, trial: &Trial, all: &[Trial]) -> std::fmt::Result
     if let (Some(iterations), Some(seconds)) = (trial.iterations, trial.seconds_total) {
         write!(line, "  {iterations:>4} iterations {seconds:>6.1} s")?;
     }
-    match number_of(trial.warm_started_from, all) {
+    match summary::number_of(trial.warm_started_from, all) {
         Some(from) => write!(line, "  from {from:<4}")?,
         None => line.push_str("  cold     "),
     }
@@ -239,34 +212,4 @@ fn action_line(action: &TunedBounds) -> String {
     let parts: Vec<String> =
         TunedBounds::NAMES.iter().zip(action.to_array()).map(|(name, value)| format!("{name}={value}")).collect();
     parts.join(" ")
-}
-
-fn number_of(id: Option<TrialId>, all: &[Trial]) -> Option<u32> {
-    id.and_then(|id| all.iter().find(|trial| trial.id == id)).map(|trial| trial.number)
-}
-
-fn summary(standing: &Standing) -> Result<Summary, Error> {
-    let best = best_trial(standing).map_err(Error::Learner)?.and_then(|id| standing.trial(id));
-    let line = |trial: &Trial| TrialLine {
-        number: trial.number,
-        trial_id: trial.id,
-        action: trial.action,
-        label: Some(trial.state).filter(|state| state.is_result()),
-        state: trial.state,
-        status: trial.status,
-        gait_rmse_rad: trial.gait_rmse_rad,
-        cost_of_transport: trial.cost_of_transport,
-        iterations: trial.iterations,
-        seconds_total: trial.seconds_total,
-        warm_started_from: number_of(trial.warm_started_from, &standing.trials),
-    };
-    Ok(Summary {
-        study_id: standing.study.id.to_string(),
-        state: standing.study.state,
-        best_trial: best.map(|trial| trial.number),
-        best_action: best.map(|trial| trial.action),
-        best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
-        best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        trials: standing.trials.iter().map(line).collect(),
-    })
 }

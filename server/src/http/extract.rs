@@ -2,39 +2,29 @@
 
 use crate::error::Error;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
-use axum::http::header;
 use axum::http::request::Parts;
+use axum::http::{HeaderMap, header};
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::str::FromStr;
 
-/// A JSON body.
-#[derive(Debug)]
-pub(crate) struct Body<T>(pub(crate) T);
-
-impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
-    type Rejection = Error;
-
-    async fn from_request(request: Request, state: &S) -> Result<Self, Error> {
-        let kind = request.headers().get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("").to_owned();
-        if !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
-            return Err(Error::Malformed(format!("content type {kind:?}: this needs application/json")));
-        }
-        let bytes = axum::body::Bytes::from_request(request, state)
-            .await
-            .map_err(|e| Error::Malformed(format!("the body cannot be read: {}", e.body_text())))?;
-        let mut reader = serde_json::Deserializer::from_slice(&bytes);
-        let value = serde_path_to_error::deserialize(&mut reader).map_err(|e| {
-            let (path, inner) = (e.path().to_string(), e.into_inner());
-            if inner.is_data() && path != "." {
-                Error::Malformed(format!("field {path}: {inner}"))
-            } else {
-                Error::Malformed(format!("not the JSON that is expected here: {inner}"))
-            }
-        })?;
-        reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
-        Ok(Self(value))
+/// Reads a JSON body, naming the field that cannot be read.
+pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
+    let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("");
+    if !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
+        return Err(Error::Malformed(format!("content type {kind:?}: this needs application/json")));
     }
+    let mut reader = serde_json::Deserializer::from_slice(bytes);
+    let value = serde_path_to_error::deserialize(&mut reader).map_err(|e| {
+        let (path, inner) = (e.path().to_string(), e.into_inner());
+        if inner.is_data() && path != "." {
+            Error::Malformed(format!("field {path}: {inner}"))
+        } else {
+            Error::Malformed(format!("not the JSON that is expected here: {inner}"))
+        }
+    })?;
+    reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
+    Ok(value)
 }
 
 /// The identifier in the path.

@@ -4,6 +4,7 @@ pub mod api;
 mod extract;
 mod gait_series;
 mod negotiate;
+mod once;
 pub mod pages;
 mod problem;
 mod router;

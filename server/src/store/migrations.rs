@@ -7,14 +7,14 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 1] = [(1, "studies", include_str!("../../../migrations/0001_studies.sql"))];
+const FILES: [(i64, &str, &str); 2] = [
+    (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
+    (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
+];
 
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
-    let known = FILES[FILES.len() - 1].0;
-    let found = version(pool).await?;
-    if found > known {
-        return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
-    }
+    let found = check_version(pool, path).await?;
+    back_up_before(pool, path, found).await?;
     let migrations = FILES
         .into_iter()
         .map(|(version, description, sql)| {
@@ -23,6 +23,27 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
         })
         .collect();
     Migrator::with_migrations(migrations).run(pool).await?;
+    Ok(())
+}
+
+/// Refuses a file that a newer version of the program wrote; otherwise its version.
+pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult<i64> {
+    let known = FILES[FILES.len() - 1].0;
+    let found = version(pool).await?;
+    if found > known {
+        return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
+    }
+    Ok(found)
+}
+
+/// A file that is about to be changed is copied first: `gaitwright.db.v1`.
+async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
+    let mut copy = path.as_os_str().to_owned();
+    copy.push(format!(".v{found}"));
+    if found == 0 || found == FILES[FILES.len() - 1].0 || Path::new(&copy).exists() {
+        return Ok(());
+    }
+    sqlx::query("vacuum into ?").bind(copy.to_string_lossy().into_owned()).execute(pool).await?;
     Ok(())
 }
 

@@ -4,12 +4,15 @@
 //! writes go through one connection with `BEGIN IMMEDIATE`, so that no writer ever meets `SQLITE_BUSY`.
 //! A transaction never spans CPU or network work.
 
+pub mod audit;
+pub mod backup;
 pub mod devices;
 mod error;
 pub mod events;
 pub mod feedback;
 pub mod gaits;
 mod id;
+pub mod idempotency;
 pub mod jobs;
 mod json;
 mod migrations;
@@ -85,6 +88,11 @@ impl Store {
     /// When no transaction can be begun.
     pub async fn write(&self) -> StoreResult<Writer> {
         Ok(self.writer.begin_with("begin immediate").await?)
+    }
+
+    /// The present second in a form that suits file names.
+    pub fn stamp(&self) -> String {
+        now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect()
     }
 
     /// The file.

@@ -1,6 +1,7 @@
 //! A person's or a script's answer to a comparison: one way in for the form and the REST interface.
 
 use crate::error::Error;
+use crate::store::audit::{self, Actor};
 use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{FeedbackId, StudyId, TrialId, Writer, events, feedback, studies, trials};
@@ -52,7 +53,7 @@ fn unnamed() -> String {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
-pub async fn give(writer: &mut Writer, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
+pub async fn give(writer: &mut Writer, actor: &Actor, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
     let study = studies::get(writer, study).await?;
     if answer.trial_a == answer.trial_b {
         let allowed = "another trial than trial_a: a gait cannot be compared with itself";
@@ -79,6 +80,8 @@ pub async fn give(writer: &mut Writer, study: StudyId, answer: &Answer) -> Resul
     let voice = Voice { source: answer.source, author, note: &answer.note };
     let id = feedback::append(writer, study.id, &said, voice).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
+    let detail = json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": author });
+    audit::append(writer, actor, "preference.give", &format!("preference {id}"), &detail).await?;
     Ok(id)
 }
 
@@ -86,10 +89,20 @@ pub async fn give(writer: &mut Writer, study: StudyId, answer: &Answer) -> Resul
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] when it was taken back already or is not a comparison.
-pub async fn retract(writer: &mut Writer, id: FeedbackId, author: &str, reason: &str) -> Result<FeedbackRow, Error> {
+pub async fn retract(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: FeedbackId,
+    author: &str,
+    reason: &str,
+) -> Result<FeedbackRow, Error> {
     let row = feedback::get(writer, id).await?;
     if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
         return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
+    }
+    let author = author.trim();
+    if author.is_empty() || author.chars().count() > 80 {
+        return Err(Error::invalid("author", author, "1 to 80 characters"));
     }
     let reason = reason.trim();
     if reason.is_empty() || reason.chars().count() > 2000 {
@@ -99,6 +112,8 @@ pub async fn retract(writer: &mut Writer, id: FeedbackId, author: &str, reason: 
         return Err(Error::conflict("this answer was taken back already"));
     }
     events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": id })).await?;
+    let detail = json!({ "study": row.study_id, "author": author, "reason": reason });
+    audit::append(writer, actor, "preference.retract", &format!("preference {id}"), &detail).await?;
     Ok(feedback::get(writer, id).await?)
 }
 

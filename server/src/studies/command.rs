@@ -1,60 +1,62 @@
-//! What a person does to a study or a trial: start, pause, resume, stop, extend; cancel, retry.
+//! What a person does to a study or a trial: start, pause, resume, stop; cancel, retry. Each in one transaction.
 
-use super::director::Director;
 use super::lifecycle::{self, Act};
 use super::record;
 use crate::error::Error;
+use crate::store::audit::{self, Actor};
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
-use crate::store::{StudyId, TrialId, commit, events, studies, trials};
+use crate::store::{StudyId, TrialId, Writer, events, studies, trials};
 use serde_json::json;
+
+/// A study after an act, and the trials whose solves must be told to stop once the act is durable.
+#[derive(Debug)]
+pub struct Done {
+    /// The study.
+    pub study: Study,
+    /// Trials that were cancelled with it.
+    pub cancelled: Vec<TrialId>,
+}
 
 /// Does it, if it is possible where the study stands.
 ///
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] with what is possible instead.
-pub async fn act(director: &Director, id: StudyId, act: Act, reason: &str) -> Result<Study, Error> {
-    let mut writer = director.store().write().await?;
-    let study = studies::get(&mut writer, id).await?;
+pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
+    let study = studies::get(writer, id).await?;
     let state = lifecycle::after(study.state, act)?;
-    if !studies::set_state(&mut writer, &study, state, reason).await? {
+    if !studies::set_state(writer, &study, state, reason).await? {
         return Err(Error::conflict("the study changed at the same moment; try again"));
     }
-    events::append(&mut writer, id, "study_changed", &json!({ "state": state, "reason": reason })).await?;
-    let changed = studies::get(&mut writer, id).await?;
-    let open = trials::of_study(&mut writer, id).await?.into_iter().filter(|trial| trial.state.is_open());
-    let open: Vec<TrialId> = open.map(|trial| trial.id).collect();
-    commit(writer).await?;
+    let mut cancelled = Vec::new();
     if act == Act::Stop {
-        for trial in open {
-            match cancel(director, trial, "the study was stopped").await {
-                // It ended by itself a moment before.
-                Ok(_) | Err(Error::Conflict(_)) => {}
-                Err(error) => return Err(error),
-            }
+        for trial in trials::of_study(writer, id).await?.into_iter().filter(|trial| trial.state.is_open()) {
+            record::cancelled(writer, trial.id, "the study was stopped").await?;
+            cancelled.push(trial.id);
         }
     }
-    director.changed();
-    Ok(changed)
+    events::append(writer, id, "study_changed", &json!({ "state": state, "reason": reason })).await?;
+    let detail = json!({ "from": study.state, "to": state, "reason": reason });
+    audit::append(writer, actor, &format!("study.{}", act.as_str()), &format!("study {id}"), &detail).await?;
+    Ok(Done { study: studies::get(writer, id).await?, cancelled })
 }
 
-/// Ends an open trial; its solve stops within one iteration.
+/// Ends an open trial.
 ///
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] when it has ended.
-pub async fn cancel(director: &Director, id: TrialId, reason: &str) -> Result<Trial, Error> {
-    record::cancelled(director.store(), id, reason).await?;
-    director.cancel_solve(id);
-    director.changed();
-    Ok(trials::get(&mut *director.store().read().await?, id).await?)
+pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &str) -> Result<Trial, Error> {
+    record::cancelled(writer, id, reason).await?;
+    audit::append(writer, actor, "trial.cancel", &format!("trial {id}"), &json!({ "reason": reason })).await?;
+    Ok(trials::get(writer, id).await?)
 }
 
 /// Lets a trial that gave no result run once more.
 ///
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] when it has a result or is open.
-pub async fn retry(director: &Director, id: TrialId) -> Result<Trial, Error> {
-    record::retried(director.store(), id).await?;
-    director.changed();
-    Ok(trials::get(&mut *director.store().read().await?, id).await?)
+pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<Trial, Error> {
+    record::retried(writer, id).await?;
+    audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?;
+    Ok(trials::get(writer, id).await?)
 }

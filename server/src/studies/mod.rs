@@ -18,4 +18,5 @@ pub mod record;
 pub mod search;
 pub mod seed;
 pub mod standing;
+pub mod summary;
 pub mod trial_state;

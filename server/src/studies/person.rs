@@ -1,10 +1,12 @@
 //! Adding a subject: one way in for the form and the REST interface.
 
 use crate::error::Error;
+use crate::store::audit::{self, Actor};
 use crate::store::subjects::{self, PSEUDONYM_UNIQUE, Subject};
 use crate::store::{OnConstraint, Writer};
 use gait_optimizer::Subject as Body;
 use serde::Deserialize;
+use serde_json::json;
 
 /// A subject to add.
 #[derive(Debug, Clone, Deserialize)]
@@ -25,16 +27,19 @@ pub struct NewSubject {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the pseudonym is taken.
-pub async fn add(writer: &mut Writer, new: &NewSubject) -> Result<Subject, Error> {
+pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<Subject, Error> {
     let pseudonym = new.pseudonym.trim();
     check_pseudonym(pseudonym)?;
     let body = Body::new(new.height_m, new.body_mass_kg)?;
     if new.notes.chars().count() > 4000 {
         return Err(Error::invalid("notes", new.notes.chars().count(), "at most 4000 characters"));
     }
-    subjects::insert(writer, pseudonym, body, &new.notes)
+    let subject = subjects::insert(writer, pseudonym, body, &new.notes)
         .await
-        .on_constraint(PSEUDONYM_UNIQUE, || Error::conflict(format!("there is a subject {pseudonym:?} already")))
+        .on_constraint(PSEUDONYM_UNIQUE, || Error::conflict(format!("there is a subject {pseudonym:?} already")))?;
+    let detail = json!({ "pseudonym": pseudonym, "height_m": body.height_m, "body_mass_kg": body.body_mass_kg });
+    audit::append(writer, actor, "subject.add", &format!("subject {}", subject.id), &detail).await?;
+    Ok(subject)
 }
 
 /// A pseudonym that could be a person's address, number or date of birth is refused.

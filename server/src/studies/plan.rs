@@ -2,6 +2,7 @@
 
 use super::{catalogue, search};
 use crate::error::Error;
+use crate::store::audit::{self, Actor};
 use crate::store::studies::{FeedbackMode, Study, StudyPlan, StudyState};
 use crate::store::{DeviceId, ReferenceGaitId, SubjectId, Writer, devices, events, reference_gaits, studies, subjects};
 use gait_learner::{LearnerSettings, SearchSpace};
@@ -109,12 +110,14 @@ pub const LARGEST_SEED: u64 = (1 << 53) - 1;
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference.
-pub async fn create(writer: &mut Writer, new: NewStudy) -> Result<Study, Error> {
+pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result<Study, Error> {
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
     let plan = checked(writer, new).await?;
     let study = studies::insert(writer, &plan, state).await?;
     let payload = json!({ "state": study.state, "reason": "created" });
     events::append(writer, study.id, "study_changed", &payload).await?;
+    let detail = json!({ "name": study.plan.name, "state": study.state, "seed": study.plan.seed });
+    audit::append(writer, actor, "study.create", &format!("study {}", study.id), &detail).await?;
     Ok(study)
 }
 

@@ -113,33 +113,27 @@ pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
 ///
 /// # Errors
 /// A conflict when the trial has ended, or what the database reports.
-pub async fn cancelled(store: &Store, trial: TrialId, reason: &str) -> Result<(), Error> {
-    let mut writer = store.write().await?;
-    let row = trials::get(&mut writer, trial).await?;
+pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Result<(), Error> {
+    let row = trials::get(writer, trial).await?;
     let state = trial_state::after(row.state, Happening::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
-    jobs::cancel(&mut writer, trial).await?;
+    jobs::cancel(writer, trial).await?;
     let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
-    trials::finish(&mut writer, trial, &end).await?;
+    trials::finish(writer, trial, &end).await?;
     let payload = json!({ "trial_id": trial, "number": row.number, "state": state });
-    events::append(&mut writer, row.study_id, "trial_ended", &payload).await?;
-    commit(writer).await?;
-    Ok(())
+    Ok(events::append(writer, row.study_id, "trial_ended", &payload).await?)
 }
 
 /// Lets a trial that gave no result run once more.
 ///
 /// # Errors
 /// A conflict when the trial has a result or is open, or what the database reports.
-pub async fn retried(store: &Store, trial: TrialId) -> Result<(), Error> {
-    let mut writer = store.write().await?;
-    let row = trials::get(&mut writer, trial).await?;
+pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
+    let row = trials::get(writer, trial).await?;
     trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
-    jobs::reopen(&mut writer, trial).await?;
-    trials::requeue(&mut writer, trial, "").await?;
+    jobs::reopen(writer, trial).await?;
+    trials::requeue(writer, trial, "").await?;
     let payload = json!({ "trial_id": trial, "number": row.number, "state": TrialState::Queued });
-    events::append(&mut writer, row.study_id, "trial_queued", &payload).await?;
-    commit(writer).await?;
-    Ok(())
+    Ok(events::append(writer, row.study_id, "trial_queued", &payload).await?)
 }
 
 async fn give_up_or_requeue(

@@ -102,6 +102,7 @@ impl Tab {
         if !scripts {
             page.execute(SetScriptExecutionDisabledParams::new(true)).await.unwrap();
         }
+        page.bring_to_front().await.unwrap();
         page.goto(address).await.unwrap();
         Self { page, requests, complaints }
     }
@@ -121,6 +122,13 @@ impl Tab {
     pub(crate) async fn click(&self, selector: &str) {
         self.wait_for(selector).await;
         self.page.find_element(selector).await.unwrap().click().await.unwrap();
+    }
+
+    /// Clicks an element that is in view, without running any script in the page.
+    pub(crate) async fn click_plainly(&self, selector: &str) {
+        self.wait_for(selector).await;
+        let point = self.page.find_element(selector).await.unwrap().clickable_point().await.unwrap();
+        self.page.click(point).await.unwrap();
     }
 
     /// Replaces the text of a field.

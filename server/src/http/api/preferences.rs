@@ -2,13 +2,15 @@
 
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Body, Id};
+use crate::http::extract::Id;
+use crate::http::once::OnceWith;
 use crate::store::feedback::{self, FeedbackRow, Said};
-use crate::store::{FeedbackId, StudyId, commit, studies};
+use crate::store::{FeedbackId, StudyId, studies};
 use crate::studies::answer::{self, Answer};
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderName, StatusCode, header};
+use axum::http::StatusCode;
+use axum::response::Response;
 use serde::Deserialize;
 
 /// `GET /studies/{id}/preferences`: as given, retracted ones included.
@@ -32,14 +34,16 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<FeedbackId>) -> 
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
-    Body(answer): Body<Answer>,
-) -> Result<(StatusCode, [(HeaderName, String); 1], Json<FeedbackRow>), Error> {
-    let mut writer = app.write().await?;
-    let given = answer::give(&mut writer, id, &answer).await?;
+    OnceWith(once, answer): OnceWith<Answer>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let given = answer::give(&mut writer, &once.actor, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
-    commit(writer).await?;
-    app.director.changed();
-    Ok((StatusCode::CREATED, [(header::LOCATION, format!("/api/v1/preferences/{given}"))], Json(row)))
+    let location = format!("/api/v1/preferences/{given}");
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &row).await
 }
 
 /// Why an answer is taken back.
@@ -59,11 +63,12 @@ fn unnamed() -> String {
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id): Id<FeedbackId>,
-    Body(why): Body<Retract>,
-) -> Result<Json<FeedbackRow>, Error> {
-    let mut writer = app.write().await?;
-    let row = answer::retract(&mut writer, id, &why.author, &why.reason).await?;
-    commit(writer).await?;
-    app.director.changed();
-    Ok(Json(row))
+    OnceWith(once, why): OnceWith<Retract>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = answer::retract(&mut writer, &once.actor, id, &why.author, &why.reason).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &row).await
 }

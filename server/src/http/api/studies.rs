@@ -2,16 +2,18 @@
 
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Body, Id, Params};
+use crate::http::extract::{Id, Params};
+use crate::http::once::{Once, OnceWith};
 use crate::store::studies::{self, Study};
 use crate::store::trials::{self, TrialCounts};
-use crate::store::{Connection, StudyId, commit};
+use crate::store::{Connection, StudyId};
 use crate::studies::command;
 use crate::studies::lifecycle::{Act, acts_of_people};
 use crate::studies::plan::{self, NewStudy};
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderName, StatusCode, header};
+use axum::http::StatusCode;
+use axum::response::Response;
 use serde::{Deserialize, Serialize};
 
 /// A study as answered.
@@ -79,38 +81,46 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Res
 /// `POST`: makes one, and starts it unless `start` is false.
 pub(super) async fn create(
     State(app): State<AppState>,
-    Body(new): Body<NewStudy>,
-) -> Result<(StatusCode, [(HeaderName, String); 1], Json<StudyView>), Error> {
-    let mut writer = app.write().await?;
-    let study = plan::create(&mut writer, new).await?;
+    OnceWith(once, new): OnceWith<NewStudy>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let study = plan::create(&mut writer, &once.actor, new).await?;
     let view = StudyView::of(&mut writer, study).await?;
-    commit(writer).await?;
-    app.director.changed();
     let location = format!("/api/v1/studies/{}", view.study.id);
-    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(view)))
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &view).await
 }
 
 /// `POST {id}/start`.
-pub(super) async fn start(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Json<StudyView>, Error> {
-    done(&app, id, Act::Start).await
+pub(super) async fn start(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
+    act(&app, id, &once, Act::Start).await
 }
 
 /// `POST {id}/pause`.
-pub(super) async fn pause(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Json<StudyView>, Error> {
-    done(&app, id, Act::Pause).await
+pub(super) async fn pause(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
+    act(&app, id, &once, Act::Pause).await
 }
 
 /// `POST {id}/resume`.
-pub(super) async fn resume(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Json<StudyView>, Error> {
-    done(&app, id, Act::Resume).await
+pub(super) async fn resume(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
+    act(&app, id, &once, Act::Resume).await
 }
 
 /// `POST {id}/stop`.
-pub(super) async fn stop(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Json<StudyView>, Error> {
-    done(&app, id, Act::Stop).await
+pub(super) async fn stop(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
+    act(&app, id, &once, Act::Stop).await
 }
 
-async fn done(app: &AppState, id: StudyId, act: Act) -> Result<Json<StudyView>, Error> {
-    let study = command::act(&app.director, id, act, "").await?;
-    Ok(Json(StudyView::of(&mut *app.read().await?, study).await?))
+async fn act(app: &AppState, id: StudyId, once: &Once, act: Act) -> Result<Response, Error> {
+    let mut writer = match once.begin(app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let done = command::act(&mut writer, &once.actor, id, act, "").await?;
+    let view = StudyView::of(&mut writer, done.study).await?;
+    let answer = once.finish(app, writer, StatusCode::OK, None, &view).await?;
+    done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
+    Ok(answer)
 }

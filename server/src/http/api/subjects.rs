@@ -2,13 +2,15 @@
 
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Body, Id};
+use crate::http::extract::Id;
+use crate::http::once::OnceWith;
+use crate::store::SubjectId;
 use crate::store::subjects::{self, Subject};
-use crate::store::{SubjectId, commit};
 use crate::studies::person::{self, NewSubject};
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderName, StatusCode, header};
+use axum::http::StatusCode;
+use axum::response::Response;
 
 /// `GET`: all of them.
 pub(super) async fn list(State(app): State<AppState>) -> Result<Json<Vec<Subject>>, Error> {
@@ -23,10 +25,13 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<SubjectId>) -> R
 /// `POST`: adds one.
 pub(super) async fn create(
     State(app): State<AppState>,
-    Body(new): Body<NewSubject>,
-) -> Result<(StatusCode, [(HeaderName, String); 1], Json<Subject>), Error> {
-    let mut writer = app.write().await?;
-    let subject = person::add(&mut writer, &new).await?;
-    commit(writer).await?;
-    Ok((StatusCode::CREATED, [(header::LOCATION, format!("/api/v1/subjects/{}", subject.id))], Json(subject)))
+    OnceWith(once, new): OnceWith<NewSubject>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let subject = person::add(&mut writer, &once.actor, &new).await?;
+    let location = format!("/api/v1/subjects/{}", subject.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &subject).await
 }

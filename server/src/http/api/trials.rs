@@ -4,12 +4,13 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
 use crate::http::negotiate::{csv_answer, wants_csv};
+use crate::http::once::Once;
 use crate::store::trials::{self, Trial};
 use crate::store::{Connection, StudyId, TrialId, gaits, studies};
 use crate::studies::command;
 use axum::Json;
 use axum::extract::State;
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use gait_optimizer::{IterationRecord, TunedBounds};
 use serde::{Deserialize, Serialize};
@@ -66,13 +67,25 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Res
 }
 
 /// `POST /trials/{id}/cancel`.
-pub(super) async fn cancel(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
-    Ok(Json(command::cancel(&app.director, id, "cancelled on request").await?))
+pub(super) async fn cancel(State(app): State<AppState>, Id(id): Id<TrialId>, once: Once) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let trial = command::cancel(&mut writer, &once.actor, id, "cancelled on request").await?;
+    let answer = once.finish(&app, writer, StatusCode::OK, None, &trial).await?;
+    app.director.cancel_solve(id);
+    Ok(answer)
 }
 
 /// `POST /trials/{id}/retry`.
-pub(super) async fn retry(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
-    Ok(Json(command::retry(&app.director, id).await?))
+pub(super) async fn retry(State(app): State<AppState>, Id(id): Id<TrialId>, once: Once) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let trial = command::retry(&mut writer, &once.actor, id).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &trial).await
 }
 
 /// `GET /trials/{id}/iterations`: of the running solve, or as recorded.

@@ -5,7 +5,9 @@ use super::study::answer_in_words;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
+use crate::store::audit::Actor;
 use crate::store::feedback::Source;
+use crate::store::idempotency::{self, Kept};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
 use crate::store::{FeedbackId, StudyId, TrialId, commit, feedback, studies};
@@ -30,6 +32,7 @@ pub(super) struct Choice {
 struct ComparePage {
     study: Study,
     trials: Vec<Offered>,
+    key: FeedbackId,
     saved: Option<Saved>,
 }
 
@@ -83,7 +86,7 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>, Params
             retracted: row.retraction.is_some(),
         })
     });
-    page(&ComparePage { study: standing.study, trials, saved })
+    page(&ComparePage { study: standing.study, trials, key: FeedbackId::fresh(), saved })
 }
 
 /// The form as submitted.
@@ -96,6 +99,7 @@ pub(super) struct Submitted {
     author: String,
     #[serde(default)]
     note: String,
+    key: FeedbackId,
 }
 
 /// `POST /studies/{id}/compare`.
@@ -112,8 +116,19 @@ pub(super) async fn post(
         author: form.author,
         note: form.note,
     };
+    let actor = Actor::anonymous();
     let mut writer = app.write().await?;
-    let saved = answer::give(&mut writer, id, &answer).await?;
+    // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
+    let key = format!("form {}", form.key);
+    let saved = match idempotency::find(&mut writer, &actor, &key).await? {
+        Some(before) => before.body,
+        None => {
+            let saved = answer::give(&mut writer, &actor, id, &answer).await?.to_string();
+            let kept = Kept { request: key.clone(), status: 303, location: None, body: saved.clone() };
+            idempotency::keep(&mut writer, &actor, &key, &kept).await?;
+            saved
+        }
+    };
     commit(writer).await?;
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")))
@@ -134,7 +149,7 @@ pub(super) async fn retract(
     Form(form): Form<Retract>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    answer::retract(&mut writer, form.feedback, &form.author, &form.reason).await?;
+    answer::retract(&mut writer, &Actor::anonymous(), form.feedback, &form.author, &form.reason).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.feedback)))

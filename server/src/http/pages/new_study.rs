@@ -4,6 +4,7 @@ use super::error::{Page, PageError, page};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::extract::Form;
+use crate::store::audit::Actor;
 use crate::store::studies::FeedbackMode;
 use crate::store::subjects::{self, Subject};
 use crate::store::{StudyId, SubjectId, commit};
@@ -108,7 +109,7 @@ async fn create(app: &AppState, fields: &Fields) -> Result<StudyId, Error> {
             body_mass_kg: number("body_mass_kg", &fields.body_mass_kg, "a number of kilograms")?,
             notes: String::new(),
         };
-        person::add(&mut writer, &new).await?.id
+        person::add(&mut writer, &Actor::anonymous(), &new).await?.id
     } else {
         number::<SubjectId>("subject", &fields.subject, "a subject of the list")?
     };
@@ -122,7 +123,7 @@ async fn create(app: &AppState, fields: &Fields) -> Result<StudyId, Error> {
         seed: number("seed", &fields.seed, "a whole number")?,
         ..NewStudy::of(subject)
     };
-    let study = plan::create(&mut writer, new).await?;
+    let study = plan::create(&mut writer, &Actor::anonymous(), new).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(study.id)

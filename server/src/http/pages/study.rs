@@ -6,10 +6,11 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id};
 use crate::plots::{Chart, Stroke};
+use crate::store::audit::Actor;
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
-use crate::store::{StudyId, TrialId, devices, events, reference_gaits, studies, subjects, trials};
+use crate::store::{StudyId, TrialId, commit, devices, events, reference_gaits, studies, subjects, trials};
 use crate::studies::choice::best_trial;
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
@@ -128,7 +129,11 @@ pub(super) async fn post(
         .into_iter()
         .find(|act| button(*act).is_some_and(|b| b.act == form.act))
         .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop"))?;
-    command::act(&app.director, id, act, "").await?;
+    let mut writer = app.write().await?;
+    let done = command::act(&mut writer, &Actor::anonymous(), id, act, "").await?;
+    commit(writer).await?;
+    done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
+    app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}")))
 }
 

@@ -1,0 +1,111 @@
+//! Requests that may be repeated: with an Idempotency-Key, the effect happens once and the answer stays the same.
+
+use super::AppState;
+use super::extract::body;
+use crate::error::Error;
+use crate::store::audit::Actor;
+use crate::store::idempotency::{self, Kept, fingerprint};
+use crate::store::{Writer, commit};
+use axum::body::Bytes;
+use axum::extract::{FromRequest, Request};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+static IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
+static REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
+
+/// A request that changes something: who sends it, its key and its fingerprint.
+#[derive(Debug)]
+pub(crate) struct Once {
+    /// Who sends it.
+    pub(crate) actor: Actor,
+    key: Option<String>,
+    request: String,
+}
+
+/// [`Once`] with a JSON body.
+#[derive(Debug)]
+pub(crate) struct OnceWith<T>(pub(crate) Once, pub(crate) T);
+
+impl Once {
+    /// Begins the transaction of the effect. `Err` of the inner result: the answer that was given before.
+    pub(crate) async fn begin(&self, app: &AppState) -> Result<Result<Writer, Response>, Error> {
+        let mut writer = app.write().await?;
+        let Some(key) = &self.key else { return Ok(Ok(writer)) };
+        match idempotency::find(&mut writer, &self.actor, key).await? {
+            None => Ok(Ok(writer)),
+            Some(kept) if kept.request == self.request => {
+                let mut answer = response(&kept);
+                answer.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
+                Ok(Err(answer))
+            }
+            Some(_) => Err(Error::conflict("this Idempotency-Key was used for another request: take a new one")),
+        }
+    }
+
+    /// Keeps the answer, makes the effect durable and tells the director.
+    pub(crate) async fn finish<T: Serialize>(
+        &self,
+        app: &AppState,
+        mut writer: Writer,
+        status: StatusCode,
+        location: Option<String>,
+        body: &T,
+    ) -> Result<Response, Error> {
+        let body = serde_json::to_string(body).map_err(|e| Error::Internal(e.to_string()))?;
+        let kept = Kept { request: self.request.clone(), status: status.as_u16(), location, body };
+        if let Some(key) = &self.key {
+            idempotency::keep(&mut writer, &self.actor, key, &kept).await?;
+        }
+        commit(writer).await?;
+        app.director.changed();
+        Ok(response(&kept))
+    }
+
+    fn new(headers: &HeaderMap, method: &str, path: &str, bytes: &[u8]) -> Result<Self, Error> {
+        let key = match headers.get(&IDEMPOTENCY_KEY) {
+            None => None,
+            Some(value) => Some(value.to_str().ok().filter(|key| (1..=200).contains(&key.len())).ok_or_else(|| {
+                Error::Malformed("Idempotency-Key: 1 to 200 printable ASCII characters are accepted".to_owned())
+            })?),
+        };
+        Ok(Self { actor: Actor::anonymous(), key: key.map(str::to_owned), request: fingerprint(method, path, bytes) })
+    }
+}
+
+fn response(kept: &Kept) -> Response {
+    let status = StatusCode::from_u16(kept.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    let mut answer = (status, [(header::CONTENT_TYPE, "application/json")], kept.body.clone()).into_response();
+    if let Some(location) = kept.location.as_ref().and_then(|l| HeaderValue::from_str(l).ok()) {
+        answer.headers_mut().insert(header::LOCATION, location);
+    }
+    answer
+}
+
+async fn read<S: Send + Sync>(request: Request, state: &S) -> Result<(Once, HeaderMap, Bytes), Error> {
+    let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
+    let headers = request.headers().clone();
+    let bytes = Bytes::from_request(request, state)
+        .await
+        .map_err(|e| Error::Malformed(format!("the body cannot be read: {}", e.body_text())))?;
+    Ok((Once::new(&headers, &method, &path, &bytes)?, headers, bytes))
+}
+
+impl<S: Send + Sync> FromRequest<S> for Once {
+    type Rejection = Error;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Error> {
+        Ok(read(request, state).await?.0)
+    }
+}
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for OnceWith<T> {
+    type Rejection = Error;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Error> {
+        let (once, headers, bytes) = read(request, state).await?;
+        Ok(Self(once, body(&headers, &bytes)?))
+    }
+}

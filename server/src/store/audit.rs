@@ -1,0 +1,165 @@
+//! The audit trail: who did what, when and why, chained by hashes so that a change of the past is found.
+
+use super::{Connection, Instant, StoreResult, json, now};
+use serde::Serialize;
+use serde_json::{Value, json};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+/// Hash before the first row.
+const ORIGIN: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+/// Rows read at a time when the chain is walked.
+const BATCH: i64 = 1000;
+
+/// Who acts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Actor(String);
+
+impl Actor {
+    /// The program itself.
+    pub fn program() -> Self {
+        Self(concat!("gaitwright ", env!("CARGO_PKG_VERSION")).to_owned())
+    }
+
+    /// Whoever runs the command line.
+    pub fn terminal() -> Self {
+        Self("command line".to_owned())
+    }
+
+    /// Whoever reaches the service without signing in.
+    pub fn anonymous() -> Self {
+        Self("not signed in".to_owned())
+    }
+
+    /// As stored.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+/// A row of the trail.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AuditRow {
+    /// Order.
+    pub seq: i64,
+    /// When.
+    pub at: Instant,
+    /// Who.
+    pub actor: String,
+    /// What was done: `subject.add`, `study.pause`, ...
+    pub action: String,
+    /// To what: `study 0190...`.
+    pub object: String,
+    /// What exactly, with the reason where there is one.
+    pub detail: Value,
+    /// Hash of the row before.
+    pub previous: String,
+    /// Hash of this row with it.
+    pub hash: String,
+}
+
+/// Appends a row to the transaction of the change.
+///
+/// # Errors
+/// What the database reports.
+pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &str, detail: &Value) -> StoreResult<()> {
+    let last = sqlx::query("select hash from audit order by seq desc limit 1").fetch_optional(&mut *db).await?;
+    let previous: String = match last {
+        Some(row) => row.try_get(0)?,
+        None => ORIGIN.to_owned(),
+    };
+    let at = now();
+    let hash = hash(&previous, &at.to_string(), actor.as_str(), action, object, detail);
+    sqlx::query("insert into audit (at, actor, action, object, detail, previous, hash) values (?, ?, ?, ?, ?, ?, ?)")
+        .bind(at)
+        .bind(actor.as_str())
+        .bind(action)
+        .bind(object)
+        .bind(json::to_text("audit detail", detail)?)
+        .bind(previous)
+        .bind(hash)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// At most `limit` rows before `before`, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn page(db: &mut Connection, before: Option<i64>, limit: u32) -> StoreResult<Vec<AuditRow>> {
+    let rows = sqlx::query("select * from audit where ? is null or seq < ? order by seq desc limit ?")
+        .bind(before)
+        .bind(before)
+        .bind(limit)
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// What walking the chain found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// Every row follows from the one before.
+    Whole {
+        /// How many rows.
+        rows: u64,
+        /// Hash of the last one.
+        last: String,
+    },
+    /// This row does not.
+    Broken {
+        /// Its sequence number.
+        seq: i64,
+    },
+}
+
+/// Walks the whole chain.
+///
+/// # Errors
+/// What the database reports.
+pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
+    let (mut rows, mut last, mut after) = (0_u64, ORIGIN.to_owned(), 0_i64);
+    loop {
+        let batch = sqlx::query("select * from audit where seq > ? order by seq limit ?")
+            .bind(after)
+            .bind(BATCH)
+            .fetch_all(&mut *db)
+            .await?;
+        if batch.is_empty() {
+            return Ok(Verdict::Whole { rows, last });
+        }
+        for raw in &batch {
+            let seq: i64 = raw.try_get("seq")?;
+            // A row that cannot even be read was not written by this program.
+            let Ok(row) = from_row(raw) else { return Ok(Verdict::Broken { seq }) };
+            let at: String = raw.try_get("at")?;
+            let expected = hash(&last, &at, &row.actor, &row.action, &row.object, &row.detail);
+            // No row is ever deleted: the numbers have no gap.
+            if seq != after + 1 || row.previous != last || row.hash != expected {
+                return Ok(Verdict::Broken { seq });
+            }
+            (rows, last, after) = (rows + 1, row.hash, seq);
+        }
+    }
+}
+
+/// Hash of a row and the one before: of an object with sorted keys, so that there is one way to write it.
+fn hash(previous: &str, at: &str, actor: &str, action: &str, object: &str, detail: &Value) -> String {
+    let whole =
+        json!({"action": action, "actor": actor, "at": at, "detail": detail, "object": object, "previous": previous});
+    json::sha256(whole.to_string().as_bytes())
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<AuditRow> {
+    Ok(AuditRow {
+        seq: row.try_get("seq")?,
+        at: row.try_get("at")?,
+        actor: row.try_get("actor")?,
+        action: row.try_get("action")?,
+        object: row.try_get("object")?,
+        detail: json::column(row, "detail")?,
+        previous: row.try_get("previous")?,
+        hash: row.try_get("hash")?,
+    })
+}

@@ -1,0 +1,69 @@
+//! Copies of the record: consistent while the service runs, checked before they are trusted.
+
+use super::migrations;
+use super::{Store, StoreError, StoreResult};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
+use sqlx::{Row, SqlitePool};
+use std::path::Path;
+
+/// Writes a compact copy of an open record to a new file and checks the copy.
+///
+/// # Errors
+/// When the file exists, cannot be written, or the copy is not whole.
+pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
+    into_file(&store.readers, to).await
+}
+
+/// Writes a compact copy of a record that another process may own, and checks the copy.
+///
+/// # Errors
+/// As [`of_store`].
+pub async fn of_file(from: &Path, to: &Path) -> StoreResult<()> {
+    let pool = open_read_only(from).await?;
+    let done = into_file(&pool, to).await;
+    pool.close().await;
+    done
+}
+
+/// Checks that a file is a whole record of a version that this program knows.
+///
+/// # Errors
+/// [`StoreError::NewerSchema`], [`StoreError::Damaged`] with what the database found.
+pub async fn check(file: &Path) -> StoreResult<()> {
+    let pool = open_read_only(file).await?;
+    let found = check_open(&pool, file).await;
+    pool.close().await;
+    found
+}
+
+/// A connection to read a file that another process may own.
+///
+/// # Errors
+/// When it cannot be opened.
+pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
+    let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
+    Ok(SqlitePoolOptions::new().max_connections(1).connect_with(options).await?)
+}
+
+async fn into_file(pool: &SqlitePool, to: &Path) -> StoreResult<()> {
+    if to.exists() {
+        let source = std::io::ErrorKind::AlreadyExists.into();
+        return Err(StoreError::Open { path: to.to_owned(), source });
+    }
+    sqlx::query("vacuum into ?").bind(to.to_string_lossy().into_owned()).execute(pool).await?;
+    check(to).await
+}
+
+async fn check_open(pool: &SqlitePool, file: &Path) -> StoreResult<()> {
+    migrations::check_version(pool, file).await?;
+    let damaged = |reason: String| StoreError::Damaged { what: "database file", reason };
+    let integrity: String = sqlx::query("pragma integrity_check").fetch_one(pool).await?.try_get(0)?;
+    if integrity != "ok" {
+        return Err(damaged(integrity));
+    }
+    if let Some(row) = sqlx::query("pragma foreign_key_check").fetch_optional(pool).await? {
+        let table: String = row.try_get(0)?;
+        return Err(damaged(format!("a row of {table} points at nothing")));
+    }
+    Ok(())
+}

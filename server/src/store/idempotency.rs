@@ -1,0 +1,65 @@
+//! Answers to requests with an Idempotency-Key, kept in the transaction of their effect.
+
+use super::audit::Actor;
+use super::{Connection, StoreResult, json, now};
+use sqlx::Row;
+
+/// What was answered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Kept {
+    /// SHA-256 of the request.
+    pub request: String,
+    /// HTTP status.
+    pub status: u16,
+    /// Location header.
+    pub location: Option<String>,
+    /// JSON body.
+    pub body: String,
+}
+
+/// The fingerprint of a request.
+pub fn fingerprint(method: &str, path: &str, body: &[u8]) -> String {
+    let mut whole = format!("{method} {path}\n").into_bytes();
+    whole.extend_from_slice(body);
+    json::sha256(&whole)
+}
+
+/// What was answered to this key before.
+///
+/// # Errors
+/// What the database reports.
+pub async fn find(db: &mut Connection, actor: &Actor, key: &str) -> StoreResult<Option<Kept>> {
+    let row = sqlx::query("select * from idempotency_keys where actor = ? and key = ?")
+        .bind(actor.as_str())
+        .bind(key)
+        .fetch_optional(db)
+        .await?;
+    let Some(row) = row else { return Ok(None) };
+    Ok(Some(Kept {
+        request: row.try_get("request")?,
+        status: row.try_get("status")?,
+        location: row.try_get("location")?,
+        body: row.try_get("body")?,
+    }))
+}
+
+/// Keeps an answer.
+///
+/// # Errors
+/// What the database reports.
+pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &Kept) -> StoreResult<()> {
+    sqlx::query(
+        "insert into idempotency_keys (actor, key, request, status, location, body, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(actor.as_str())
+    .bind(key)
+    .bind(&kept.request)
+    .bind(kept.status)
+    .bind(&kept.location)
+    .bind(&kept.body)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(())
+}

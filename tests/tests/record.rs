@@ -1,0 +1,207 @@
+//! The record: append-only, chained, copied, and a repeated request has one effect.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+use gaitwright::store::audit::{self, Verdict};
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::{Store, StoreError, backup};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+use std::path::Path;
+use tempfile::TempDir;
+
+async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    (folder, service)
+}
+
+async fn post_with_key(service: &Service, path: &str, key: &str, body: &Value) -> Answer {
+    let request = Request::post(path)
+        .header("content-type", "application/json")
+        .header("idempotency-key", key)
+        .body(Body::from(body.to_string()))
+        .unwrap();
+    service.send(request).await
+}
+
+async fn audit_rows(service: &Service) -> usize {
+    audit::page(&mut service.store.read().await.unwrap(), None, 10_000).await.unwrap().len()
+}
+
+/// Another program that opens the file and does what it likes.
+async fn intruder(database: &Path) -> SqlitePool {
+    SqlitePool::connect_with(SqliteConnectOptions::new().filename(database)).await.unwrap()
+}
+
+#[tokio::test]
+async fn a_repeated_request_has_one_effect_and_the_same_answer() {
+    let (_folder, service) = service().await;
+    let body = json!({"pseudonym": "S01", "height_m": 1.8, "body_mass_kg": 70.0});
+    let first = post_with_key(&service, "/api/v1/subjects", "key-1", &body).await;
+    let second = post_with_key(&service, "/api/v1/subjects", "key-1", &body).await;
+    assert_eq!((first.status, &first.text), (StatusCode::CREATED, &second.text));
+    assert_eq!(first.headers["location"], second.headers["location"]);
+    assert_eq!(second.status, StatusCode::CREATED);
+    assert!(second.headers.contains_key("idempotency-replayed") && !first.headers.contains_key("idempotency-replayed"));
+    assert_eq!(audit_rows(&service).await, 1);
+
+    let other = json!({"pseudonym": "S02", "height_m": 1.8, "body_mass_kg": 70.0});
+    let mistake = post_with_key(&service, "/api/v1/subjects", "key-1", &other).await;
+    assert_eq!(mistake.status, StatusCode::CONFLICT);
+    // A refused request keeps its key free.
+    let bad = json!({"pseudonym": "S02", "height_m": 17.27, "body_mass_kg": 70.0});
+    assert_eq!(
+        post_with_key(&service, "/api/v1/subjects", "key-2", &bad).await.status,
+        StatusCode::UNPROCESSABLE_ENTITY
+    );
+    assert_eq!(post_with_key(&service, "/api/v1/subjects", "key-2", &other).await.status, StatusCode::CREATED);
+
+    let study = json!({"subject_id": first.json()["id"], "trial_budget": 1, "start": false});
+    let made = post_with_key(&service, "/api/v1/studies", "key-3", &study).await;
+    assert_eq!(post_with_key(&service, "/api/v1/studies", "key-3", &study).await.text, made.text);
+    assert_eq!(service.fetch("/api/v1/studies").await.json()["studies"].as_array().unwrap().len(), 1);
+    let start = format!("/api/v1/studies/{}/start", made.json()["id"].as_str().unwrap());
+    let started = post_with_key(&service, &start, "key-4", &json!({})).await;
+    assert_eq!(post_with_key(&service, &start, "key-4", &json!({})).await.text, started.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn every_change_leaves_exactly_one_row_in_the_audit_trail() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let held = service.study(|new| (new.trial_budget, new.start) = (3, false)).await;
+    let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});
+    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await.json();
+    let form = "application/x-www-form-urlencoded";
+
+    let before = audit_rows(&service).await;
+    for (count, (path, kind, body)) in [
+        (
+            "/api/v1/subjects".to_owned(),
+            "application/json",
+            json!({"pseudonym": "X", "height_m": 1.8, "body_mass_kg": 70}).to_string(),
+        ),
+        ("/api/v1/studies".to_owned(), "application/json", json!({"subject_id": subject, "start": false}).to_string()),
+        (format!("/api/v1/studies/{held}/start"), "application/json", String::new()),
+        (format!("/api/v1/studies/{held}/pause"), "application/json", String::new()),
+        (format!("/api/v1/studies/{held}/resume"), "application/json", String::new()),
+        (format!("/studies/{held}/do"), form, "act=stop".to_owned()),
+        (format!("/api/v1/studies/{study}/preferences"), "application/json", answer.to_string()),
+        (
+            format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap()),
+            "application/json",
+            json!({"reason": "r"}).to_string(),
+        ),
+        (
+            format!("/studies/{study}/compare"),
+            form,
+            format!("a={}&b={}&answer=b&source=subject&author=K&key={}", trials[0].id, trials[1].id, trials[0].id),
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let done = service.post_text(&path, kind, &body).await;
+        assert!(done.status.is_success() || done.status.is_redirection(), "{path}: {}", done.text);
+        assert_eq!(audit_rows(&service).await, before + count + 1, "{path}");
+    }
+    let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(verdict, Verdict::Whole { rows, .. } if rows as usize == before + 9));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn one_changed_byte_in_the_audit_trail_is_found() {
+    let (folder, service) = service().await;
+    for number in 0..5 {
+        let body = json!({"pseudonym": format!("S{number}"), "height_m": 1.8, "body_mass_kg": 70.0});
+        service.post("/api/v1/subjects", &body).await;
+    }
+    service.stop().await;
+    let database = folder.path().join("a.db");
+    let mut bytes = std::fs::read(&database).unwrap();
+    let needle = b"\"pseudonym\":\"S2\"";
+    let places: Vec<usize> = (0..bytes.len() - needle.len()).filter(|&i| bytes[i..].starts_with(needle)).collect();
+    assert_eq!(places.len(), 1);
+    bytes[places[0] + needle.len() - 2] = b'7';
+    std::fs::write(&database, bytes).unwrap();
+    let pool = backup::open_read_only(&database).await.unwrap();
+    let verdict = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
+    assert_eq!(verdict, Verdict::Broken { seq: 3 });
+}
+
+#[tokio::test]
+async fn evidence_is_append_only_even_for_other_programs() {
+    let (folder, service) = service().await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    service.stop().await;
+    let pool = intruder(&folder.path().join("a.db")).await;
+    for sql in [
+        "update feedback set author = 'x'",
+        "delete from feedback",
+        "update audit set actor = 'x'",
+        "delete from audit",
+        "update events set kind = 'x'",
+        "delete from events",
+        "update gaits set speed_m_s = 0",
+        "delete from trials",
+        "update trials set gait_rmse_rad = 0.001",
+        "update trials set action_index = 0",
+    ] {
+        let refused = sqlx::query(sql).execute(&pool).await;
+        assert!(refused.is_err(), "{sql} was allowed");
+    }
+}
+
+#[tokio::test]
+async fn a_newer_schema_is_refused_and_left_alone() {
+    let (folder, service) = service().await;
+    service.stop().await;
+    let database = folder.path().join("a.db");
+    let pool = intruder(&database).await;
+    sqlx::query(
+        "insert into _sqlx_migrations (version, description, success, checksum, execution_time) values (99, 'x', 1, x'00', 0)",
+    )
+    .execute(&pool)
+    .await
+    .unwrap();
+    pool.close().await;
+    let before = std::fs::read(&database).unwrap();
+    let refused = Store::open(&database).await;
+    assert!(matches!(refused, Err(StoreError::NewerSchema { found: 99, .. })), "{refused:?}");
+    assert_eq!(std::fs::read(&database).unwrap(), before);
+}
+
+#[tokio::test]
+async fn a_copy_made_while_the_service_runs_is_whole_and_goes_on() {
+    let (folder, service) = service().await;
+    let study = service.study(|new| new.trial_budget = 10).await;
+    service.wait_for_trials(study, 3).await;
+    let copy = folder.path().join("copy.db");
+    backup::of_file(&folder.path().join("a.db"), &copy).await.unwrap();
+    assert!(backup::of_store(&service.store, &copy).await.is_err(), "a copy is never overwritten");
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let whole = service.trials(study).await;
+    service.stop().await;
+
+    let again = Service::start(&copy, Analytic::default(), 1).await;
+    again.wait_for(study, &[StudyState::Finished]).await;
+    let trials = again.trials(study).await;
+    let actions = |trials: &[gaitwright::store::trials::Trial]| -> Vec<_> {
+        trials.iter().map(|t| (t.action_index, t.gait_rmse_rad.map(f64::to_bits))).collect()
+    };
+    assert_eq!(actions(&trials), actions(&whole), "the copy goes on to the same trials");
+    again.stop().await;
+    std::fs::write(&copy, b"not a database at all").unwrap();
+    assert!(backup::check(&copy).await.is_err());
+}
