@@ -61,6 +61,9 @@ pub enum Error {
     /// The request can be read, but a field is not acceptable.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),
+    /// The request comes from where it may not come from.
+    #[error("{0}")]
+    Forbidden(String),
     /// The request does not fit the present state.
     #[error("{0}")]
     Conflict(String),

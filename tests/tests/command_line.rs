@@ -88,3 +88,9 @@ fn a_warm_start_file_of_another_kind_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("x.json: not a file of `gaitwright solve --out`"));
 }
+
+#[test]
+fn a_service_without_sign_in_listens_to_this_machine_only() {
+    refused(&["serve", "--listen", "0.0.0.0:0"], "--allow-remote");
+    refused(&["serve", "--listen", "here"], "--listen");
+}

@@ -366,3 +366,29 @@ async fn the_form_for_a_new_study_comes_back_with_what_was_wrong() {
     assert!(service.fetch(made.headers["location"].to_str().unwrap()).await.text.contains("S07"));
     service.stop().await;
 }
+
+#[tokio::test]
+async fn another_site_in_the_same_browser_may_not_change_anything() {
+    let (_folder, service) = service().await;
+    let send = |headers: &[(&str, &str)]| {
+        let mut request = axum::http::Request::post("/api/v1/subjects").header("content-type", "application/json");
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        let body = json!({"pseudonym": "S01", "height_m": 1.8, "body_mass_kg": 70.5}).to_string();
+        request.body(axum::body::Body::from(body)).unwrap()
+    };
+    for foreign in [
+        &[("sec-fetch-site", "cross-site")][..],
+        &[("sec-fetch-site", "same-site")],
+        &[("origin", "http://evil.example"), ("host", "127.0.0.1:8080")],
+        &[("origin", "null"), ("host", "127.0.0.1:8080")],
+    ] {
+        let answer = service.send(send(foreign)).await;
+        is_problem(&answer, StatusCode::FORBIDDEN, "/problems/forbidden", "another origin");
+    }
+    assert_eq!(service.fetch("/api/v1/subjects").await.json().as_array().unwrap().len(), 2);
+    let ours = [("origin", "http://127.0.0.1:8080"), ("host", "127.0.0.1:8080")];
+    assert_eq!(service.send(send(&ours)).await.status, StatusCode::CREATED);
+    service.stop().await;
+}

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gait_learner::{LearnerSettings, Partner};
 use gaitwright::store::StudyId;
 use gaitwright::store::feedback::{Said, Source};
 use gaitwright::store::studies::StudyState;
@@ -45,7 +46,9 @@ async fn undisturbed(seed: u64, trials: u32) -> Vec<String> {
 async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 15).await;
+    let learner =
+        LearnerSettings { partner: Partner::Previous, buffer: 1, repeats: false, ..LearnerSettings::default() };
+    let study = service.study(|new| (new.trial_budget, new.learner) = (15, learner)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
 
     let trials = service.trials(study).await;

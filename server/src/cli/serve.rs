@@ -17,6 +17,9 @@ pub(super) struct Serve {
     /// Where to listen.
     #[arg(long, env = "GAITWRIGHT_LISTEN", default_value = "127.0.0.1:8080", value_name = "ADDRESS:PORT")]
     listen: SocketAddr,
+    /// Listen on an address that other machines reach, though there is no sign-in.
+    #[arg(long)]
+    allow_remote: bool,
     /// The SQLite file; made if it does not exist.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
@@ -27,6 +30,11 @@ pub(super) struct Serve {
 
 impl Serve {
     pub(super) async fn run(self) -> Result<(), Error> {
+        if !self.listen.ip().is_loopback() && !self.allow_remote {
+            let allowed = "a loopback address such as 127.0.0.1:8080: there is no sign-in yet, whoever reaches the service \
+                           may change everything; --allow-remote listens all the same";
+            return Err(Error::invalid("listen", self.listen.to_string(), allowed));
+        }
         let store = Store::open(&self.database).await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;

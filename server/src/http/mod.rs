@@ -8,6 +8,7 @@ mod once;
 pub mod pages;
 mod problem;
 mod router;
+mod same_origin;
 mod state;
 mod static_files;
 

@@ -60,6 +60,7 @@ impl From<&Error> for Problem {
                     detail,
                 )
             },
+            Error::Forbidden(_) => Self::new(StatusCode::FORBIDDEN, "/problems/forbidden", "Not allowed", detail),
             Error::Conflict(_) => {
                 Self::new(StatusCode::CONFLICT, "/problems/conflict", "Not possible in the present state", detail)
             }

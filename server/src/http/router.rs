@@ -1,9 +1,10 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, api, pages, static_files};
+use super::{AppState, api, pages, same_origin, static_files};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderName, HeaderValue, header};
+use axum::middleware;
 use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
@@ -27,6 +28,7 @@ pub fn router(state: AppState) -> Router {
         .nest("/api/v1", api::routes())
         .route("/static/{*path}", get(static_files::get))
         .fallback(pages::error::no_such_page)
+        .layer(middleware::from_fn(same_origin::check))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
         .layer(CatchPanicLayer::new())
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))

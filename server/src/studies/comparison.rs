@@ -4,10 +4,10 @@ use super::standing::Standing;
 use crate::store::TrialId;
 use crate::store::feedback::Said;
 use crate::store::trials::TrialState;
-use gait_learner::{LearnerError, comparisons_to_ask, what_to_ask};
+use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask};
 
-/// The earlier converged trials that a new converged trial is compared with: with LineCoSpar, the last
-/// `buffer` of them. `standing` is read before the new trial's result is in it.
+/// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
+/// as the learner's settings say. `standing` is read before the new trial's result is in it.
 ///
 /// # Errors
 /// When the learner refuses the log.
@@ -30,13 +30,24 @@ pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> Said {
     }
 }
 
-/// The pair of trials that a person should compare now, newest first, if there is one that nobody answered.
+/// The pair of trials that a person should compare now, if there is one: the newest converged trial with a
+/// partner that nobody has compared it with.
 ///
 /// # Errors
 /// When the learner refuses the log.
 pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
     let plan = &standing.study.plan;
-    let question = what_to_ask(&plan.search_space, &standing.log_of_converged(), &plan.learner)?;
+    let log = standing.log_of_converged();
+    let Some(&newest) = log.visited.last() else { return Ok(None) };
+    let questions = comparisons_to_ask(&plan.search_space, &log, newest, &plan.learner)?;
+    let open = questions.into_iter().find(|q| !is_answered(&log, q.action, q.against));
     let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
-    Ok(question.and_then(|q| Some((converged(q.action)?, converged(q.against)?))))
+    Ok(open.and_then(|q| Some((converged(q.action)?, converged(q.against)?))))
+}
+
+fn is_answered(log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {
+    log.feedback.iter().any(|feedback| {
+        let (first, second) = feedback.actions();
+        second.is_some_and(|second| (first, second) == (a, b) || (second, first) == (a, b))
+    })
 }

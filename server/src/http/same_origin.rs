@@ -1,0 +1,30 @@
+//! Changes come from our own pages or from programs, never from another site in the same browser.
+
+use crate::error::Error;
+use axum::extract::Request;
+use axum::http::{HeaderMap, Method, header};
+use axum::middleware::Next;
+use axum::response::Response;
+
+/// Refuses a change that a page of another origin sends.
+pub(super) async fn check(request: Request, next: Next) -> Result<Response, Error> {
+    let reads = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
+    if !reads && !is_ours(request.headers()) {
+        return Err(Error::Forbidden("a page of another origin may not change anything here".to_owned()));
+    }
+    Ok(next.run(request).await)
+}
+
+/// Browsers say where a request comes from; programs do not, and need not.
+fn is_ours(headers: &HeaderMap) -> bool {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    match text(&header::HeaderName::from_static("sec-fetch-site")) {
+        Some("same-origin" | "none") => true,
+        Some(_) => false,
+        None => match (text(&header::ORIGIN), text(&header::HOST)) {
+            (Some(origin), Some(host)) => origin.split_once("://").is_some_and(|(_, from)| from == host),
+            (Some(_), None) => false,
+            (None, _) => true,
+        },
+    }
+}
