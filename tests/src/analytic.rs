@@ -99,7 +99,15 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             stride_length_m: 1.3,
             durations_s: [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1],
             vhip_m_s: [1.0; 4],
-            attempts: Vec::new(),
+            attempts: vec![gait_optimizer::Attempt {
+                strategy: "analytic".to_owned(),
+                status: SolveStatus::Converged,
+                iterations: 3,
+                seconds: 0.0,
+                objective: 0.1,
+                gait_rmse_rad: rmse,
+                chosen: true,
+            }],
         },
         gait: gait(assignment, rmse),
         warm_start: WarmStart {

@@ -57,7 +57,7 @@ fn other_nonsense_is_refused() {
     refused(&["tune", "--muscles", "maybe"], "possible values: on, off");
     refused(&["solve", "--mesh", "4,4"], "four whole numbers");
     refused(&["solve", "--mesh", "0,4,6,6"], "mesh.ds2 = 0");
-    refused(&["solve", "--tolerance", "5"], "tolerance: 5");
+    refused(&["solve", "--tolerance", "5"], "tolerance = 5");
     refused(&["solve", "--warm", "nowhere.json"], "cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "cannot read nowhere.csv");
 }
