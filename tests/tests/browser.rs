@@ -89,8 +89,11 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     page.wait_for("input[name=answer]").await;
     page.run("document.querySelector('input[name=answer]').focus()").await;
     page.press("ArrowRight").await;
+    let chosen = "document.querySelector('input[name=answer]:checked')?.value ?? 'nothing'";
+    assert_eq!(page.value(chosen).await, "no_difference");
     page.run("document.querySelector('#author').focus()").await;
     page.type_text("K1").await;
+    assert_eq!(page.value("document.querySelector('#author').value").await, "K1");
     page.press("Enter").await;
     page.wait_for(".notice.good").await;
     assert!(page.text(".notice.good").await.contains("no difference between trial"));
