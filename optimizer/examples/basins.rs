@@ -1,9 +1,11 @@
 //! Which local optima the cold guesses reach: objective, Gait RMSE and iterations of each.
 //!
 //! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--grid off]`: the guesses of the
-//! catalogue, or with `--grid on` a grid of routes, knee flexions and barriers; one CSV row each.
+//! catalogue, or with `--grid on` a grid of routes, timings and knee flexions; one CSV row each.
 
-use gait_optimizer::{CancelToken, ColdGuess, ColdRoute, GaitProblem, SolveOptions, Subject, solve_from_guesses};
+use gait_optimizer::{
+    CancelToken, ColdGuess, ColdRoute, GaitProblem, GuessTiming, SolveOptions, Subject, solve_from_guesses,
+};
 use std::error::Error;
 
 fn argument(name: &str, default: &str) -> String {
@@ -23,15 +25,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     if argument("--grid", "off") == "on" {
         let base = guesses[0];
         guesses.clear();
-        let base = ColdGuess { route: ColdRoute::Direct, ..base };
-        for knee_flexion in [0.4, 0.6, 0.8] {
-            guesses.push(ColdGuess { knee_flexion, ..base });
-        }
-        for barrier in [1e-3, 1e-2] {
-            guesses.push(ColdGuess { barrier, ..base });
-        }
-        for (stride_time_s, stride_length_m) in [(1.0, 1.05), (1.1, 1.15), (1.3, 1.3)] {
-            guesses.push(ColdGuess { stride_time_s, stride_length_m, ..base });
+        for route in [ColdRoute::Direct, ColdRoute::MuscleTracking] {
+            for knee_flexion in [0.5, 1.0] {
+                guesses.push(ColdGuess { route, knee_flexion, timing: GuessTiming::EarlyRise, ..base });
+            }
         }
     }
     println!("subject,guess,status,iterations,seconds,objective,gait_rmse_rad");

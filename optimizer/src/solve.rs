@@ -20,7 +20,7 @@ use thiserror::Error;
 mod cold_guesses;
 mod run;
 
-pub use cold_guesses::{Attempt, BasinChoice, ColdGuess, ColdRoute};
+pub use cold_guesses::{Attempt, BasinChoice, ColdGuess, ColdRoute, GuessTiming};
 use cold_guesses::{Choice, choose, try_guesses};
 use run::{Context, Run};
 

@@ -2,7 +2,6 @@
 
 use super::GuessSettings;
 use crate::body::{InverseDynamics, PointState};
-use crate::gait_problem::programme::STEP_FRACTIONS;
 use crate::gait_problem::{GaitProgramme, PointVariables};
 use crate::muscle::MUSCLE_COUNT;
 use crate::walking::{BEZIER_COEFFICIENTS, basis};
@@ -21,7 +20,7 @@ pub fn guess(programme: &GaitProgramme, postures: &[Vec<[f64; 9]>], settings: &G
     let put = |x: &mut [f64], index: usize, value: f64| x[index] = value / layout.scale[index];
     let speed = settings.stride_length_m / settings.stride_time_s;
     for (d, domain) in layout.domains.iter().enumerate() {
-        let share = STEP_FRACTIONS[d % 4 + 1] - STEP_FRACTIONS[d % 4];
+        let share = programme.stride_fraction(d, 1.0) - programme.stride_fraction(d, 0.0);
         let duration = share * settings.stride_time_s;
         put(&mut x, domain.duration, duration);
         let coefficients = fit(&postures[d]);

@@ -8,7 +8,6 @@ use super::{ColdStartError, GuessSettings};
 use crate::body::PointState;
 use crate::gait::Axis;
 use crate::gait_problem::GaitProgramme;
-use crate::gait_problem::programme::stride_fraction;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
@@ -33,7 +32,7 @@ fn instants(programme: &GaitProgramme) -> Vec<Instant> {
     let mut result: Vec<Instant> = Vec::new();
     for (d, domain) in programme.layout.domains.iter().enumerate() {
         for k in 0..domain.points {
-            let fraction = stride_fraction(d, domain.sigma(k));
+            let fraction = programme.stride_fraction(d, domain.sigma(k));
             match result.last_mut() {
                 Some(last) if k == 0 && d > 0 => last.members.push((d, k)),
                 _ => result.push(Instant { members: vec![(d, k)], fraction }),

@@ -102,6 +102,7 @@ pub struct GaitProgramme {
     bounds: VariableBounds,
     settings: GaitSettings,
     reference: ReferenceGait,
+    timing: StrideTiming,
     structure: Arc<Structure>,
 }
 
@@ -123,13 +124,18 @@ struct Structure {
     blocks: EliminationBlocks,
 }
 
-/// Stride fractions at the domain boundaries of one step, in the cold start's timing.
-pub const STEP_FRACTIONS: [f64; 5] = [0.0, 0.07, 0.12, 0.33, 0.50];
+/// Stride fractions at the domain boundaries of the cold start's motion and of the tracked reference, from 0 to 1.
+pub type StrideTiming = [f64; 9];
 
-/// Stride fraction of point k of domain d in the cold start's timing.
-pub fn stride_fraction(d: usize, sigma: f64) -> f64 {
-    let (step, kind) = (d / 4, d % 4);
-    0.5 * step as f64 + STEP_FRACTIONS[kind] + sigma * (STEP_FRACTIONS[kind + 1] - STEP_FRACTIONS[kind])
+/// Both steps alike.
+pub const EVEN_TIMING: StrideTiming = [0.0, 0.07, 0.12, 0.33, 0.50, 0.57, 0.62, 0.83, 1.0];
+
+fn reference_points(layout: &Layout, reference: &ReferenceGait, timing: &StrideTiming) -> Vec<Vec<[f64; 7]>> {
+    let at = |d: usize, sigma: f64| timing[d] + sigma * (timing[d + 1] - timing[d]);
+    let domains = layout.domains.iter().enumerate();
+    domains
+        .map(|(d, domain)| (0..domain.points).map(|k| reference.seven_angles(at(d, domain.sigma(k)))).collect())
+        .collect()
 }
 
 impl GaitProgramme {
@@ -165,14 +171,7 @@ impl GaitProgramme {
             .zip(&contacts)
             .map(|(domain, rows)| rows.iter().map(|row| contact_target(&model, domain.stance, *row)).collect())
             .collect();
-        let reference_angles = layout
-            .domains
-            .iter()
-            .enumerate()
-            .map(|(d, domain)| {
-                (0..domain.points).map(|k| reference.seven_angles(stride_fraction(d, domain.sigma(k)))).collect()
-            })
-            .collect();
+        let reference_angles = reference_points(&layout, reference, &EVEN_TIMING);
         let phases = [PhaseTerms::new(&model, Side::Left), PhaseTerms::new(&model, Side::Right)];
         let mut programme = Self {
             limits: ActiveLimits::new(&settings.limits, bounds),
@@ -180,6 +179,7 @@ impl GaitProgramme {
             bounds: variable_bounds(&layout, bounds, &settings.limits, device),
             settings: *settings,
             reference: reference.clone(),
+            timing: EVEN_TIMING,
             weights: ObjectiveWeights { cost_of_transport: 1.0, tracking: 0.0 },
             structure: Arc::new(Structure::default()),
             model,
@@ -203,6 +203,19 @@ impl GaitProgramme {
         programme.weights = ObjectiveWeights { cost_of_transport: 0.0, tracking };
         set_row_bounds(&mut programme.rows, &self.settings.limits, true);
         programme
+    }
+
+    /// The same programme with another timing of the tracked reference.
+    #[must_use]
+    pub fn with_timing(mut self, timing: &StrideTiming) -> Self {
+        self.timing = *timing;
+        self.reference_angles = reference_points(&self.layout, &self.reference, timing);
+        self
+    }
+
+    /// Stride fraction of a relative time of domain d in the timing of the tracked reference.
+    pub fn stride_fraction(&self, d: usize, sigma: f64) -> f64 {
+        self.timing[d] + sigma * (self.timing[d + 1] - self.timing[d])
     }
 
     /// Parts of the objective at x.

@@ -5,6 +5,7 @@ use super::{CONVERGED_VIOLATION, GaitProblem, IterationRecord, SolveError, Solve
 use crate::cold_start::GuessSettings;
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
+use crate::gait_problem::programme::{EVEN_TIMING, StrideTiming};
 use crate::metrics::gait_rmse;
 use crate::nlp::{NlpResult, NonlinearProgram};
 use crate::subject::ModelError;
@@ -16,7 +17,7 @@ use std::sync::mpsc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ColdRoute {
-    /// Tracks the reference again with muscles: keeps the natural swing knee.
+    /// Tracks the reference again with muscles.
     MuscleTracking,
     /// Straight from the muscle guess on the tracked motion.
     Direct,
@@ -26,6 +27,26 @@ pub enum ColdRoute {
 
 /// Place of the knee among the reference's angles.
 const KNEE: usize = 2;
+
+/// Share of the stride that each domain of a cold guess takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum GuessTiming {
+    /// Both steps alike.
+    #[default]
+    Even,
+    /// The step on the prosthesis rises early onto its toe, the other late.
+    EarlyRise,
+}
+
+impl GuessTiming {
+    pub(super) fn fractions(self) -> StrideTiming {
+        match self {
+            Self::Even => EVEN_TIMING,
+            Self::EarlyRise => [0.0, 0.04, 0.06, 0.15, 0.5, 0.54, 0.56, 0.86, 1.0],
+        }
+    }
+}
 
 /// One way to begin cold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -39,24 +60,31 @@ pub struct ColdGuess {
     pub stride_time_s: f64,
     /// Stride length, m.
     pub stride_length_m: f64,
+    /// Shares of the domains.
+    pub timing: GuessTiming,
     /// First barrier parameter of the cost phase.
     pub barrier: f64,
 }
 
 impl ColdGuess {
-    const NATURAL: Self = Self {
-        route: ColdRoute::MuscleTracking,
+    /// The plainest guess: the basin with the natural swing knee.
+    pub const NATURAL: Self = Self {
+        route: ColdRoute::Direct,
         knee_flexion: 1.0,
         stride_time_s: 1.2,
         stride_length_m: 1.15,
+        timing: GuessTiming::Even,
         barrier: 1e-4,
     };
 
     /// The guesses of a cold start, the first [`SolveOptions::cold_guesses`](super::SolveOptions) of which are tried.
-    pub const CATALOGUE: [Self; 4] = [
+    /// With muscles the timing decides the basin (natural or stiff swing knee); route, knee flexion, stride and barrier
+    /// hardly matter (`examples/basins.rs`).
+    pub const CATALOGUE: [Self; 5] = [
         Self::NATURAL,
-        Self { route: ColdRoute::Direct, ..Self::NATURAL },
-        Self { route: ColdRoute::Direct, knee_flexion: 0.5, ..Self::NATURAL },
+        Self { timing: GuessTiming::EarlyRise, ..Self::NATURAL },
+        Self { route: ColdRoute::MuscleTracking, ..Self::NATURAL },
+        Self { route: ColdRoute::MuscleTracking, timing: GuessTiming::EarlyRise, ..Self::NATURAL },
         Self { route: ColdRoute::PlainOptimum, ..Self::NATURAL },
     ];
 
@@ -93,6 +121,9 @@ impl ColdGuess {
             ColdRoute::PlainOptimum => "cold, from the optimum without muscles",
         }
         .to_owned();
+        if self.timing == GuessTiming::EarlyRise {
+            label.push_str(", early rise");
+        }
         let normal = Self::NATURAL;
         for (name, value, usual, unit) in [
             ("knee flexion x", self.knee_flexion, normal.knee_flexion, ""),

@@ -118,7 +118,7 @@ impl<'a> Run<'a> {
         let (problem, programme) = (self.context.problem, self.context.programme);
         let settings = guess.settings();
         let tracked_problem = guess.tracked(problem);
-        let plain = tracked_problem.programme(false)?;
+        let plain = tracked_problem.programme(false)?.with_timing(&guess.timing.fractions());
         let postures = cold_start::posture::solve(&plain, &settings)?;
         let first = cold_start::motion::guess(&plain, &postures, &settings);
         let tracking_settings =
@@ -146,7 +146,10 @@ impl<'a> Run<'a> {
             if guess.route == ColdRoute::MuscleTracking {
                 tracked = self.phase(
                     Phase::MuscleTracking,
-                    &tracked_problem.programme(true)?.for_tracking(TRACKING_WEIGHT),
+                    &tracked_problem
+                        .programme(true)?
+                        .with_timing(&guess.timing.fractions())
+                        .for_tracking(TRACKING_WEIGHT),
                     &StartPoint::Cold(with_muscles),
                     NlpSettings { mu_initial: MU_MUSCLE_TRACKING, ..tracking_settings },
                 )?;
