@@ -183,7 +183,8 @@ fn linearised_step(
         let state = PointState::new(&q[i], &[0.0; 9], &[0.0; 9]);
         let last = i + 1 == count;
         let mut grounded = [false; 4];
-        if !last {
+        let within = !last;
+        if within {
             for &(d, k) in &instant.members {
                 for (contact, target, foot_point) in programme.contact_targets_at(d, right_step, stride) {
                     let seen = grounded[foot_point] && contact.axis == Axis::Z;

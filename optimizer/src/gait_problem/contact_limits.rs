@@ -102,7 +102,7 @@ pub(super) fn values(
         g[height.row] = value;
     }
     if let Some(row) = rows.phase_rate {
-        g[row] = programme.hip_phase(context, point)[1];
+        g[row] = context.hip_phase(point)[1];
     }
     if let Some((foot_point, row)) = rows.touchdown {
         g[row] = state.contact_velocity(&programme.foot_points[foot_point])[1];
@@ -165,6 +165,7 @@ pub(super) fn jacobian(
 }
 
 /// Hessian: link-space part into `link`, durations written directly.
+#[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
     programme: &GaitProgramme,
     context: &PointContext<'_>,

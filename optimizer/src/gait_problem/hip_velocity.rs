@@ -19,7 +19,7 @@ pub(super) fn values(
     x: &[f64],
     g: &mut [f64],
 ) {
-    let [dp, dpd, dpdd] = programme.hip_phase(context, point);
+    let [dp, dpd, dpdd] = context.hip_phase(point);
     if let Some(row) = rows.hip_phase {
         let travelled = context.hip_velocity * context.duration * context.layout.sigma(context.k);
         g[row] = dp - programme.layout.value(x, context.layout.phase_start) - travelled;

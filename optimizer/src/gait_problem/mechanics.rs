@@ -255,6 +255,7 @@ pub(super) fn jacobian(
 }
 
 /// Accumulates the Hessian of the rows of one point in link space, and writes the force columns.
+#[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
     programme: &GaitProgramme,
     context: &PointContext<'_>,

@@ -50,7 +50,7 @@ fn phase_of(programme: &GaitProgramme, context: &PointContext<'_>, point: &Point
         Some(end) => {
             let start = programme.layout.value(x, layout.phase_start);
             let width = programme.layout.value(x, end) - start;
-            let [dp, dpd, dpdd] = programme.hip_phase(context, point);
+            let [dp, dpd, dpdd] = context.hip_phase(point);
             (Phase { s: (dp - start) / width, rate: dpd / width, acceleration: dpdd / width }, width)
         }
     }
@@ -143,6 +143,7 @@ pub(super) fn jacobian(
 }
 
 /// Hessian.
+#[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
     programme: &GaitProgramme,
     context: &PointContext<'_>,

@@ -44,6 +44,12 @@ impl PhaseTerms {
         self.0.into_iter()
     }
 
+    /// dp and its first two derivatives at a point.
+    #[inline]
+    pub(super) fn derivatives(&self, point: &PointVariables) -> [f64; 3] {
+        [self.along(&point.q), self.along(&point.qd), self.along(&point.qdd)]
+    }
+
     #[inline]
     fn along(&self, a: &[f64; 9]) -> f64 {
         self.0.iter().map(|&(i, c)| c * a[i]).sum()
@@ -74,6 +80,12 @@ pub(super) struct PointContext<'a> {
 }
 
 impl PointContext<'_> {
+    /// dp and its first two derivatives at the point.
+    #[inline]
+    pub(super) fn hip_phase(&self, point: &PointVariables) -> [f64; 3] {
+        self.phase.derivatives(point)
+    }
+
     #[inline]
     pub(super) fn phase_terms(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
         self.phase.terms()
@@ -314,17 +326,6 @@ impl GaitProgramme {
 
     pub(super) fn contact_point(&self, row: ContactRow) -> &ContactPoint {
         &self.foot_points[super::rows::foot_point_index(row.point, row.side)]
-    }
-
-    /// dp and its first two derivatives at a point.
-    #[inline]
-    pub(super) fn hip_phase(&self, context: &PointContext<'_>, point: &PointVariables) -> [f64; 3] {
-        self.phase_along(&context.phase, point)
-    }
-
-    #[inline]
-    pub(super) fn phase_along(&self, phase: &PhaseTerms, point: &PointVariables) -> [f64; 3] {
-        [phase.along(&point.q), phase.along(&point.qd), phase.along(&point.qdd)]
     }
 
     fn phase_of_stance(&self, stance: Side) -> PhaseTerms {

@@ -23,7 +23,7 @@ pub(super) fn values(
         for interval in 0..layout.intervals {
             let z: [[f64; 3]; 3] = std::array::from_fn(|i| {
                 let point = programme.layout.point_variables(x, context.d, 2 * interval + i);
-                programme.phase_along(&context.phase, &point)
+                context.phase.derivatives(&point)
             });
             for order in 0..2 {
                 let row = first + 4 * interval + 2 * order;
@@ -36,7 +36,7 @@ pub(super) fn values(
     }
     if let (Some(row), Some(end)) = (rows.phase_end, layout.phase_end) {
         let point = programme.layout.point_variables(x, context.d, layout.last());
-        g[row] = programme.phase_along(&context.phase, &point)[0] - programme.layout.value(x, end);
+        g[row] = context.phase.derivatives(&point)[0] - programme.layout.value(x, end);
     }
 }
 
@@ -59,7 +59,7 @@ pub(super) fn jacobian(
         for interval in 0..layout.intervals {
             let z: [[f64; 3]; 3] = std::array::from_fn(|i| {
                 let point = programme.layout.point_variables(x, context.d, 2 * interval + i);
-                programme.phase_along(&context.phase, &point)
+                context.phase.derivatives(&point)
             });
             for order in 0..2 {
                 let (state_offset, slope_offset) = if order == 0 { (Q, QD) } else { (QD, QDD) };

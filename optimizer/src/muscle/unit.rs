@@ -103,6 +103,7 @@ impl Muscle {
     }
 }
 
+#[allow(clippy::unnecessary_wraps)] // the table's entries are optional
 const fn attach(
     coordinate: usize,
     lever_m: f64,

@@ -132,7 +132,9 @@ impl ColdGuess {
             ("barrier ", self.barrier, normal.barrier, ""),
         ] {
             if value != usual {
-                label.push_str(&format!(", {name}{value}{unit}"));
+                for part in [", ", name, &value.to_string(), unit] {
+                    label.push_str(part);
+                }
             }
         }
         label
@@ -206,7 +208,8 @@ impl Choice {
         let gait = gait_of(context.problem, programme, &result.x);
         let violation = programme.violations(&result.x).first().map_or(0.0, |v| v.amount);
         let mut status = status_of(result.status);
-        if status == SolveStatus::Converged && !(violation <= CONVERGED_VIOLATION) {
+        let met = violation <= CONVERGED_VIOLATION; // false for NaN
+        if status == SolveStatus::Converged && !met {
             status = SolveStatus::Stalled;
         }
         Self {
@@ -260,6 +263,7 @@ fn try_guess(
 }
 
 /// What the threads tell the calling one.
+#[allow(clippy::large_enum_variant)] // a handful of messages per solve end, each moved once
 enum Message {
     Iteration(IterationRecord),
     Done(usize, Result<Tried, SolveError>),

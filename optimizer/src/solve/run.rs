@@ -63,6 +63,7 @@ impl<'a> Run<'a> {
         self.begun.elapsed().as_secs_f64()
     }
 
+    #[allow(clippy::needless_pass_by_value)] // the settings are made for the call
     fn phase(
         &mut self,
         phase: Phase,
@@ -181,6 +182,7 @@ impl<'a> Run<'a> {
 }
 
 /// An interrupted result in the shape of `programme`: its multipliers carry no information.
+#[allow(clippy::needless_pass_by_value)] // the replaced vectors are not needed any more
 fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
     let (n, m) = (programme.variables(), programme.rows());
     NlpResult {

@@ -57,6 +57,7 @@ pub const CYCLE: [Domain; 8] = {
 
 impl Side {
     /// The other leg.
+    #[must_use]
     pub const fn other(self) -> Self {
         match self {
             Self::Left => Self::Right,
