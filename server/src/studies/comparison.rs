@@ -39,7 +39,14 @@ pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, 
     let plan = &standing.study.plan;
     let log = standing.log_of_converged();
     let Some(&newest) = log.visited.last() else { return Ok(None) };
-    let questions = comparisons_to_ask(&plan.search_space, &log, newest, &plan.learner)?;
+    // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
+    // best one, and with it the question.
+    let mut before = log.clone();
+    before.feedback.retain(|feedback| match feedback.actions() {
+        (a, Some(b)) => a != newest && b != newest,
+        (_, None) => true,
+    });
+    let questions = comparisons_to_ask(&plan.search_space, &before, newest, &plan.learner)?;
     let open = questions.into_iter().find(|q| !is_answered(&log, q.action, q.against));
     let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
     Ok(open.and_then(|q| Some((converged(q.action)?, converged(q.against)?))))

@@ -102,6 +102,7 @@ impl Tab {
         if !scripts {
             page.execute(SetScriptExecutionDisabledParams::new(true)).await.unwrap();
         }
+        page.execute(SetDeviceMetricsOverrideParams::new(1280, 900, 1.0, false)).await.unwrap();
         page.bring_to_front().await.unwrap();
         page.goto(address).await.unwrap();
         Self { page, requests, complaints }
