@@ -29,11 +29,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             let phase = serde_json::json!(record.phase);
             match phases.last_mut() {
                 Some((name, count)) if *name == phase => *count += 1,
-                _ => phases.push((phase, 1)),
+                _ => phases.push((phase, 0)), // the record of the start is not an iteration
             }
         },
         &CancelToken::new(),
     )?;
-    println!("{}", serde_json::json!({ "report": outcome.report, "records_by_phase": phases }));
+    println!("{}", serde_json::json!({ "report": outcome.report, "iterations_by_phase": phases }));
     Ok(())
 }

@@ -6,6 +6,7 @@
 """
 
 import argparse
+import hashlib
 import json
 import subprocess
 import sys
@@ -37,7 +38,7 @@ PHASES = {
 class Solver:
     """A gait programme with its functions, in the virtual machine or compiled, and IPOPT on it."""
 
-    def __init__(self, options, backend="vm"):
+    def __init__(self, options, backend="vm", cache=None):
         started = time.perf_counter()
         self.gait = Gait(options, read_reference(REFERENCE))
         self.functions = self.gait.programme.functions()
@@ -45,21 +46,26 @@ class Solver:
         self.compile_s = 0.0
         if backend == "c":
             started = time.perf_counter()
-            self._compile()
+            self._compile(cache)
             self.compile_s = time.perf_counter() - started
         self.f, self.g, self.grad_f, self.jac_g, self.hess_lag = self.functions
         self.backend = backend
 
-    def _compile(self):
-        self.directory = tempfile.TemporaryDirectory(prefix="gait_casadi_")
-        folder = Path(self.directory.name)
+    def _compile(self, cache):
+        """Generates C for all functions; a library already compiled from the same text is taken from `cache`."""
         generator = ca.CodeGenerator("gait.c")
         for function in self.functions:
             generator.add(function)
-        generator.generate(str(folder) + "/")
-        library = folder / "gait.so"
-        command = ["gcc", "-O2", "-march=native", "-fPIC", "-shared", str(folder / "gait.c"), "-o", str(library), "-lm"]
-        subprocess.run(command, check=True)
+        text = generator.dump()
+        if cache is None:
+            self.directory = tempfile.TemporaryDirectory(prefix="gait_casadi_")
+            cache = self.directory.name
+        library = Path(cache) / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.so"
+        if not library.exists():
+            source = library.with_suffix(".c")
+            source.write_text(text)
+            flags = ["-O2", "-march=native", "-fPIC", "-shared"]
+            subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
         self.functions = [ca.external(function.name(), str(library)) for function in self.functions]
 
     def solve(self, x0, phase, extra=None, quiet=True):
@@ -123,14 +129,15 @@ def solve(options):
     start = np.array(options["start"], dtype=float)
     backend = options.get("backend", "vm")
     quiet = not options.get("verbose", False)
-    plain = Solver(problem | {"muscles": False}, backend)
+    cache = options.get("cache")
+    plain = Solver(problem | {"muscles": False}, backend, cache)
     assert start.size == plain.gait.layout.n, f"start has {start.size} variables, not {plain.gait.layout.n}"
     phases, setup, compilation = OrderedDict(), plain.setup_s, plain.compile_s
     x, phases["tracking"] = plain.solve(start, PHASES["tracking"], quiet=quiet)
     last = plain
     guess_s = 0.0
     if problem.get("muscles", False):
-        last = Solver(problem, backend)
+        last = Solver(problem, backend, cache)
         setup, compilation = setup + last.setup_s, compilation + last.compile_s
         started = time.perf_counter()
         x = muscle_guess.guess(plain.gait, last.gait, x)
@@ -162,7 +169,7 @@ def solve(options):
 def time_functions(options):
     """Seconds of one evaluation of each function, median of `repetitions`."""
     backend = options.get("backend", "vm")
-    solver = Solver(options["problem"], backend)
+    solver = Solver(options["problem"], backend, options.get("cache"))
     x = np.array(options["x"], dtype=float)
     m = solver.g.size1_out(0)
     arguments = {

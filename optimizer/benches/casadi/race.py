@@ -57,7 +57,7 @@ def run_ours(program, arguments, limit):
         "status": report["status"],
         "solved": report["status"] == "converged",
         "iterations": report["iterations"],
-        "by_phase": {name: count for name, count in result["records_by_phase"]},
+        "by_phase": {name: count for name, count in result["iterations_by_phase"]},
         "objective": report["objective"],
         "violation": report["max_violation"],
         "wall": report["seconds_total"],
@@ -69,7 +69,7 @@ def run_ours(program, arguments, limit):
 def run_casadi(start, arguments, limit, folder):
     problem = {"subject": {"H": start["subject"]["height_m"], "M": start["subject"]["body_mass_kg"]}}
     problem |= {"muscles": arguments.muscles, "bounds": start["bounds"]}
-    options = {"problem": problem, "start": start["start"], "backend": arguments.backend}
+    options = {"problem": problem, "start": start["start"], "backend": arguments.backend, "cache": str(folder)}
     given, result = folder / "options.json", folder / "result.json"
     given.write_text(json.dumps(options))
     timed([sys.executable, str(HERE / "gait_casadi.py"), "solve", str(given), str(result)], limit)
