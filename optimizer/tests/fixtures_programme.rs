@@ -33,7 +33,7 @@ fn programme(muscles: bool) -> GaitProgramme {
 const DOMAINS: [&str; 8] = ["DS2_R", "DS3_R", "SS2_R", "SS1_R", "DS2_L", "DS3_L", "SS2_L", "SS1_L"];
 
 /// The group of the fixture that a row belongs to.
-fn group(name: &RowName) -> String {
+fn group(name: RowName) -> String {
     use RowKind as K;
     match name.place {
         Place::Point { domain, point } => {
@@ -85,7 +85,7 @@ fn whole_programme_agrees_off_the_solution() {
         for (i, (row, value)) in programme.rows.names.iter().zip(&g).enumerate() {
             // The fixture writes dp_dot - minimum >= 0; here the minimum is the row's bound.
             let value = if row.kind == RowKind::PhaseRate { value - programme.rows.lower[i] } else { *value };
-            let entry = sums.entry(group(row)).or_insert((0, 0.0, 0.0, 0.0));
+            let entry = sums.entry(group(*row)).or_insert((0, 0.0, 0.0, 0.0));
             entry.0 += 1;
             entry.1 += value;
             entry.2 += value * value;

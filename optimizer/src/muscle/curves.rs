@@ -118,22 +118,22 @@ mod tests {
             if nu < 0.0 { (1.0 + nu) / (1.0 - 5.0 * nu) } else { 1.5 - 0.5 * (1.0 - nu) / (1.0 + 37.8 * nu) }
         };
         let (mut square, mut worst) = (0.0_f64, 0.0_f64);
-        let samples = 20_001;
+        let samples = 20_001_u32;
         for k in 0..samples {
-            let nu = -1.0 + 2.0 * k as f64 / (samples - 1) as f64;
+            let nu = -1.0 + 2.0 * f64::from(k) / f64::from(samples - 1);
             let error = (force_velocity(nu).value - published_fv(nu)).abs();
             square += error * error;
             worst = worst.max(error);
         }
-        let rms = (square / samples as f64).sqrt();
+        let rms = (square / f64::from(samples)).sqrt();
         assert!(rms > 0.003 && rms < 0.0045, "{rms}");
         assert!(worst > 0.045 && worst < 0.053, "{worst}");
         let mut worst_se = 0.0_f64;
         let mut worst_fl = 0.0_f64;
-        for k in 0..=2000 {
-            let e = -0.05 + 1e-4 * k as f64 * 0.5;
+        for k in 0..=2000_u32 {
+            let e = -0.05 + 1e-4 * f64::from(k) * 0.5;
             worst_se = worst_se.max((tendon_force(e).value - (e.max(0.0) / 0.04).powi(2)).abs());
-            let x = 0.4 + 1.2 * k as f64 / 2000.0;
+            let x = 0.4 + 1.2 * f64::from(k) / 2000.0;
             let published = (0.05_f64.ln() * ((x - 1.0) / 0.56).abs().powi(3)).exp();
             worst_fl = worst_fl.max((force_length(x).value - published).abs());
         }
