@@ -115,7 +115,7 @@ async fn every_change_leaves_exactly_one_row_in_the_audit_trail() {
         assert_eq!(audit_rows(&service).await, before + count + 1, "{path}");
     }
     let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, Verdict::Whole { rows, .. } if rows as usize == before + 9));
+    assert!(matches!(verdict, Verdict::Whole { rows, .. } if rows == before as u64 + 9));
     service.stop().await;
 }
 

@@ -120,14 +120,13 @@ pub(super) async fn post(
     let mut writer = app.write().await?;
     // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
     let key = format!("form {}", form.key);
-    let saved = match idempotency::find(&mut writer, &actor, &key).await? {
-        Some(before) => before.body,
-        None => {
-            let saved = answer::give(&mut writer, &actor, id, &answer).await?.to_string();
-            let kept = Kept { request: key.clone(), status: 303, location: None, body: saved.clone() };
-            idempotency::keep(&mut writer, &actor, &key, &kept).await?;
-            saved
-        }
+    let saved = if let Some(before) = idempotency::find(&mut writer, &actor, &key).await? {
+        before.body
+    } else {
+        let saved = answer::give(&mut writer, &actor, id, &answer).await?.to_string();
+        let kept = Kept { request: key.clone(), status: 303, location: None, body: saved.clone() };
+        idempotency::keep(&mut writer, &actor, &key, &kept).await?;
+        saved
     };
     commit(writer).await?;
     app.director.changed();
