@@ -15,7 +15,7 @@ const MU_MUSCLE_TRACKING: f64 = 1e-2;
 const TRACKING_WEIGHT: f64 = 10.0;
 const TRACKING_TOLERANCE: f64 = 1e-3;
 /// First barrier parameter of a warm start.
-const MU_WARM: f64 = 1e-5;
+const MU_WARM: f64 = 1e-7;
 /// First barrier parameter of a cost phase that may not choose its own.
 const MU_COST: f64 = 1e-4;
 /// Longest run of iterations that do not try the unregularised matrix again after it had the wrong inertia.
@@ -173,8 +173,8 @@ impl<'a> Run<'a> {
                 tolerance: self.context.options.tolerance,
                 mu_initial: MU_COST,
                 mu_warm: Some(MU_WARM),
-                warm_bound_push: 1e-4,
-                warm_bound_fraction: 1e-4,
+                warm_bound_push: 1e-7,
+                warm_bound_fraction: 1e-7,
                 ..NlpSettings::default()
             },
         )
