@@ -115,7 +115,7 @@ impl From<SolveError> for Error {
         match error {
             SolveError::Model(error) => error.into(),
             SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
-            SolveError::ColdStart(_) | SolveError::Solver(_) => Self::Internal(error.to_string()),
+            SolveError::Solver(_) => Self::Internal(error.to_string()),
         }
     }
 }
