@@ -61,6 +61,17 @@ pub enum Error {
     /// The request can be read, but a field is not acceptable.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),
+    /// The body is larger than is accepted.
+    #[error("{0}")]
+    TooLarge(String),
+    /// The address exists, but not with this method.
+    #[error("{method} is not possible at {path}")]
+    MethodNotAllowed {
+        /// The method.
+        method: String,
+        /// The address.
+        path: String,
+    },
     /// The request comes from where it may not come from.
     #[error("{0}")]
     Forbidden(String),

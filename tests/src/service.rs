@@ -3,7 +3,7 @@
 use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
-use gaitwright::http::{AppState, router};
+use gaitwright::http::{AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
@@ -133,7 +133,7 @@ impl Service {
 
     /// The router.
     pub fn router(&self) -> Router {
-        router(AppState { director: self.director.clone() })
+        router(AppState { director: self.director.clone(), hosts: Hosts::new(([127, 0, 0, 1], 0).into(), &[]) })
     }
 
     /// `GET`.

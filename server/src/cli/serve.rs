@@ -1,7 +1,7 @@
 //! `gaitwright serve`.
 
 use crate::error::Error;
-use crate::http::{AppState, router};
+use crate::http::{AppState, Hosts, router};
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
 use crate::studies::director::Director;
@@ -20,6 +20,9 @@ pub(super) struct Serve {
     /// Listen on an address that other machines reach, though there is no sign-in.
     #[arg(long)]
     allow_remote: bool,
+    /// A name under which browsers reach the service, besides its address and localhost; may be given several times.
+    #[arg(long, env = "GAITWRIGHT_HOST_NAMES", value_delimiter = ',', value_name = "NAME")]
+    host_name: Vec<String>,
     /// The SQLite file; made if it does not exist.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
@@ -46,7 +49,7 @@ impl Serve {
         let address = listener.local_addr().map_err(|e| Error::Internal(e.to_string()))?;
         let pool = Pool::new(cores_or(self.workers), Arc::new(GaitSolver), Arc::new(Board::default()));
         let director = Director::new(store.clone(), pool, None);
-        let app = router(AppState { director: director.clone() });
+        let app = router(AppState { director: director.clone(), hosts: Hosts::new(address, &self.host_name) });
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await }

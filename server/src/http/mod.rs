@@ -3,6 +3,7 @@
 pub mod api;
 mod extract;
 mod gait_series;
+mod host;
 mod negotiate;
 mod once;
 pub mod pages;
@@ -12,5 +13,9 @@ mod same_origin;
 mod state;
 mod static_files;
 
+pub use host::Hosts;
 pub use router::router;
 pub use state::AppState;
+
+/// Largest request body: the largest legitimate one is a reference gait.
+const BODY_LIMIT_BYTES: usize = 1 << 20;

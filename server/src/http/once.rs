@@ -1,7 +1,7 @@
 //! Requests that may be repeated: with an Idempotency-Key, the effect happens once and the answer stays the same.
 
 use super::AppState;
-use super::extract::body;
+use super::extract::{body, unreadable};
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::idempotency::{self, Kept, fingerprint};
@@ -87,9 +87,7 @@ fn response(kept: &Kept) -> Response {
 async fn read<S: Send + Sync>(request: Request, state: &S) -> Result<(Once, HeaderMap, Bytes), Error> {
     let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
     let headers = request.headers().clone();
-    let bytes = Bytes::from_request(request, state)
-        .await
-        .map_err(|e| Error::Malformed(format!("the body cannot be read: {}", e.body_text())))?;
+    let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
     Ok((Once::new(&headers, &method, &path, &bytes)?, headers, bytes))
 }
 

@@ -1,6 +1,6 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, api, pages, same_origin, static_files};
+use super::{AppState, BODY_LIMIT_BYTES, api, host, pages, same_origin, static_files};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderName, HeaderValue, header};
@@ -9,9 +9,6 @@ use axum::routing::get;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::trace::TraceLayer;
-
-/// Largest request body: the largest legitimate one is a reference gait.
-const BODY_LIMIT_BYTES: usize = 1 << 20;
 
 /// Everything comes from this origin; no inline scripts, no inline styles, no frames.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
@@ -28,7 +25,10 @@ pub fn router(state: AppState) -> Router {
         .nest("/api/v1", api::routes())
         .route("/static/{*path}", get(static_files::get))
         .fallback(pages::error::no_such_page)
+        .method_not_allowed_fallback(pages::error::no_such_method)
         .layer(middleware::from_fn(same_origin::check))
+        .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
+        .layer(middleware::from_fn(pages::error::problems_as_pages))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
         .layer(CatchPanicLayer::new())
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))

@@ -1,5 +1,6 @@
 //! What every handler can reach.
 
+use super::host::Hosts;
 use crate::store::{Reader, Store, StoreResult, Writer};
 use crate::studies::director::Director;
 
@@ -8,6 +9,8 @@ use crate::studies::director::Director;
 pub struct AppState {
     /// Runs the studies.
     pub director: Director,
+    /// The names that the service answers to.
+    pub hosts: Hosts,
 }
 
 impl AppState {

@@ -69,6 +69,6 @@ pub(super) async fn retract(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = answer::retract(&mut writer, &once.actor, id, &why.author, &why.reason).await?;
+    let row = answer::retract(&mut writer, &once.actor, None, id, &why.author, &why.reason).await?;
     once.finish(&app, writer, StatusCode::OK, None, &row).await
 }

@@ -26,6 +26,7 @@ struct GaitPage {
     from: Option<(TrialId, u32)>,
     has_gait: bool,
     charts: Vec<Drawn>,
+    phases: [(&'static str, &'static str); 4],
     trial: Trial,
 }
 
@@ -66,6 +67,7 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Pag
         from,
         has_gait,
         charts,
+        phases: gait_charts::PHASES,
         trial,
     })
 }
