@@ -1,5 +1,6 @@
 //! Logs: to stderr, `RUST_LOG` decides how much, `GAITWRIGHT_LOG_FORMAT=json` how.
 
+use super::output::tell;
 use tracing_subscriber::EnvFilter;
 
 pub(super) fn start() {
@@ -11,6 +12,6 @@ pub(super) fn start() {
         builder.with_target(false).try_init()
     };
     if let Err(error) = started {
-        eprintln!("gaitwright: no logs: {error}");
+        tell(&format!("gaitwright: no logs: {error}"));
     }
 }

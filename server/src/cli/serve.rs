@@ -1,5 +1,6 @@
 //! `gaitwright serve`.
 
+use super::numbers::workers;
 use crate::error::Error;
 use crate::http::{AppState, Hosts, router};
 use crate::store::{Store, commit};
@@ -27,7 +28,7 @@ pub(super) struct Serve {
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
     /// How many solves at the same time; default: the number of cores.
-    #[arg(long, env = "GAITWRIGHT_WORKERS", value_name = "NUMBER")]
+    #[arg(long, env = "GAITWRIGHT_WORKERS", value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
 }
 
