@@ -10,7 +10,7 @@ mod study;
 
 use divan::{Bencher, black_box};
 use gait_learner::{Learner, LearnerSettings, Method};
-use study::{earlier, space, study};
+use study::{earlier, page, space, study};
 
 /// Counts what an iteration allocates: the column "max alloc" is the memory it holds at once beside the study's cache.
 #[global_allocator]
@@ -63,13 +63,5 @@ fn page_of_answers(bencher: Bencher, comparisons: usize) {
     let space = space();
     let log = study(&space, comparisons);
     let belief = gait_learner::posterior(&space, &log, &LearnerSettings::default()).expect("valid");
-    let best = belief.best().expect("tried");
-    bencher.bench_local(|| {
-        for dimension in 0..8 {
-            black_box(belief.marginal(dimension).expect("exists"));
-        }
-        black_box(belief.slice(4, 5, best).expect("exists"));
-        black_box(belief.best_of_visited(1000, 1).expect("factors"));
-        black_box(belief.agreement());
-    });
+    bencher.bench_local(|| page(&belief));
 }

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use gait_learner::{Learner, LearnerSettings, Method};
 use rustix::time::{ClockId, clock_gettime};
-use study::{earlier, space, study};
+use study::{earlier, page, space, study};
 
 /// Processor time that this thread has used.
 fn used() -> Duration {
@@ -80,6 +80,15 @@ fn main() {
                     black_box(learner.propose(&space, &log, &[], &settings, 7).expect("valid").action);
                 },
             );
+        }
+    }
+    if "page_of_answers".contains(&filter) {
+        for comparisons in [50, 200].into_iter().filter(|&count| only.is_none_or(|only| only == count)) {
+            let log = study(&space, comparisons);
+            for (name, method) in [("page, linecospar", Method::LineCoSpar), ("page, eubo", Method::Eubo)] {
+                let belief = gait_learner::posterior(&space, &log, &LearnerSettings::of(method)).expect("valid");
+                measure(name, comparisons, || (), |()| page(&belief));
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! The study that the benches measure.
 
-use gait_learner::{ActionIndex, Dimension, Feedback, FeedbackLog, SearchSpace};
+use std::hint::black_box;
+
+use gait_learner::{ActionIndex, Dimension, Feedback, FeedbackLog, Posterior, SearchSpace};
 
 /// Table I's grid of 11,664 actions.
 pub fn space() -> SearchSpace {
@@ -63,4 +65,21 @@ pub fn earlier(log: &FeedbackLog) -> FeedbackLog {
         visited: log.visited[..log.visited.len() - 1].to_vec(),
         feedback: log.feedback[..log.feedback.len() - 2].to_vec(),
     }
+}
+
+/// What a page about a study shows: every dimension's marginal, a slice, the actions tried by their probability of
+/// being the best from 1,000 joint draws, how likely each is to converge and to be preferred to the best, and how far
+/// the model agrees with the answers.
+pub fn page(belief: &Posterior) {
+    let best = belief.best().expect("tried");
+    for dimension in 0..belief.space().dimensions().len() {
+        black_box(belief.marginal(dimension).expect("exists"));
+    }
+    black_box(belief.slice(4, 5, best).expect("exists"));
+    black_box(belief.best_of_visited(1000, 1).expect("factors"));
+    for &action in belief.visited() {
+        black_box(belief.probability_of_converging(action).expect("exists"));
+        black_box(belief.preference_probability(action, best).expect("exists"));
+    }
+    black_box(belief.agreement());
 }
