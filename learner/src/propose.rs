@@ -93,20 +93,37 @@ pub fn propose_batch(
     settings: &LearnerSettings,
     seed: u64,
 ) -> Result<Vec<Proposal>> {
-    let belief = Learner::default().posterior(space, log, settings)?;
-    let mut pending = pending.to_vec();
-    let mut proposals = Vec::new();
-    for _ in 0..settings.samples_per_iteration {
-        match propose_from(&belief, &pending, seed) {
-            Ok(proposal) => {
-                pending.push(proposal.action);
-                proposals.push(proposal);
+    Learner::default().propose_batch(space, log, pending, settings, seed)
+}
+
+impl Learner {
+    /// As [`propose_batch`].
+    ///
+    /// # Errors
+    /// As [`propose_batch`].
+    pub fn propose_batch(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        pending: &[ActionIndex],
+        settings: &LearnerSettings,
+        seed: u64,
+    ) -> Result<Vec<Proposal>> {
+        let belief = self.posterior(space, log, settings)?;
+        let mut pending = pending.to_vec();
+        let mut proposals = Vec::new();
+        for _ in 0..settings.samples_per_iteration {
+            match propose_from(&belief, &pending, seed) {
+                Ok(proposal) => {
+                    pending.push(proposal.action);
+                    proposals.push(proposal);
+                }
+                Err(LearnerError::Exhausted { .. }) if !proposals.is_empty() => break,
+                Err(error) => return Err(error),
             }
-            Err(LearnerError::Exhausted { .. }) if !proposals.is_empty() => break,
-            Err(error) => return Err(error),
         }
+        Ok(proposals)
     }
-    Ok(proposals)
 }
 
 fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Result<Proposal> {

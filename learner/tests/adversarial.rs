@@ -347,5 +347,13 @@ proptest! {
             propose(&space, &log, &[], &settings, 5).ok(),
             learner.propose(&space, &log, &[], &settings, 5).ok()
         );
+        prop_assert_eq!(
+            propose_batch(&space, &log, &[ActionIndex(2)], &settings, 5).ok(),
+            learner.propose_batch(&space, &log, &[ActionIndex(2)], &settings, 5).ok()
+        );
+        prop_assert_eq!(
+            what_to_ask(&space, &log, &settings).unwrap(),
+            learner.what_to_ask(&space, &log, &settings).unwrap()
+        );
     }
 }
