@@ -95,6 +95,19 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
+/// Whether all values, of padded length, are finite.
+#[inline(always)]
+pub(super) fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0f64; LANES];
+    for block in values.as_chunks::<LANES>().0 {
+        for k in 0..LANES {
+            // Zero unless the value is infinite or not a number.
+            sums[k] += block[k] * 0.0;
+        }
+    }
+    sums.iter().all(|s| *s == 0.0)
+}
+
 /// Lower triangle (and what shares a tile with it) of S -= X G^T + G X^T over the first `count` columns of X and G and
 /// the first `size` columns of S.
 #[inline(always)]

@@ -40,8 +40,8 @@ pub(super) struct Front {
     pub border: Vec<usize>,
     /// (position in the matrix values, offset in the numbers of the front).
     pub sources: Vec<(u32, u32)>,
-    /// Child front and the place of each entry of its border.
-    pub children: Vec<(usize, Vec<Place>)>,
+    /// Child front and the places of its border.
+    pub children: Vec<(usize, ChildMap)>,
     /// Multiplications and additions of a factorisation.
     pub flops: f64,
 
@@ -66,6 +66,28 @@ pub(super) enum Place {
     Variable(u32),
     Row(u32),
     Slot(u32),
+}
+
+/// Where the border of a child lies in its parent: first variables, then slots in ascending order.
+#[derive(Debug, Default)]
+pub(super) struct ChildMap {
+    pub variables: Vec<u32>,
+    pub slots: Vec<u32>,
+}
+
+impl ChildMap {
+    /// `None` for places in another order.
+    pub(super) fn new(places: impl Iterator<Item = Place>) -> Option<Self> {
+        let mut map = Self::default();
+        for place in places {
+            match place {
+                Place::Variable(variable) if map.slots.is_empty() => map.variables.push(variable),
+                Place::Slot(slot) if map.slots.last().is_none_or(|last| *last < slot) => map.slots.push(slot),
+                _ => return None,
+            }
+        }
+        Some(map)
+    }
 }
 
 impl Front {

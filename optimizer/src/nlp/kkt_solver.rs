@@ -49,6 +49,8 @@ pub(super) trait KktSolver: Send {
     fn factor(&mut self, values: &[f64]) -> Option<Inertia>;
     /// Overwrites `rhs` by the solution with the last factorisation.
     fn solve(&mut self, rhs: &mut [f64]);
+    /// Marks the rows (indices of the matrix) whose diagonal the last factorisation took for zero.
+    fn mark_neglected(&self, _neglected: &mut [bool]) {}
     /// Stored entries of the factor.
     fn factor_entries(&self) -> usize;
     /// The last solution's residual was bad. True when the same matrix, factorised again, will be treated by another

@@ -44,7 +44,7 @@ pub(super) fn choose(
     if settings.linear_solver == LinearSolver::Supernodal {
         return Ok(Box::new(other));
     }
-    let front_of = ordering::block_of_index(blocks);
+    let front_of = ordering::block_of_index_raised(form, blocks);
     let plain = multifrontal(&front_of, &alike, settings.threads)?;
     if settings.linear_solver == LinearSolver::Auto && plain.flops() > WORTHWHILE * other.flops() {
         return Ok(Box::new(other));
@@ -91,6 +91,12 @@ impl KktSolver for Ladder {
     fn solve(&mut self, rhs: &mut [f64]) {
         if let Some(method) = self.methods.get_mut(self.in_use) {
             method.solve(rhs);
+        }
+    }
+
+    fn mark_neglected(&self, neglected: &mut [bool]) {
+        if let Some(method) = self.methods.get(self.in_use) {
+            method.mark_neglected(neglected);
         }
     }
 

@@ -12,8 +12,8 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::bunch_kaufman::{self, Pivots, inverse_pair};
-use super::dense_kernels::{LANES, dot, padded, subtract_columns, subtract_range};
-use super::front::{Front, PivotKind, Place};
+use super::dense_kernels::{LANES, all_finite, dot, padded, subtract_columns, subtract_range};
+use super::front::{ChildMap, Front, PivotKind, Place};
 use super::kkt_solver::{Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::status::NlpError;
@@ -213,8 +213,9 @@ fn analyse(
             let offset = front.offset(places[first], places[last]);
             front.sources.push((u32::try_from(q).ok()?, u32::try_from(offset).ok()?));
         }
-        front.children =
-            children[f].iter().map(|&c| (c, fronts[c].border.iter().map(|&i| places[i]).collect())).collect();
+        for &child in &children[f] {
+            front.children.push((child, ChildMap::new(fronts[child].border.iter().map(|&i| places[i]))?));
+        }
         fronts.push(front);
     }
     Some(fronts)
@@ -336,19 +337,30 @@ fn factor_front<S: Simd>(
         &mut own.inertia,
         &mut work.columns,
     );
-    own.broke_down = !(done && reduced.iter().all(|v| v.is_finite()));
+    own.broke_down = !(done && all_finite(reduced));
 }
 
-/// Adds a child's Schur complement.
+/// Adds a child's Schur complement. Its border is in elimination order, in which a front's variables come before its
+/// slots, so places that are slots ascend.
 #[inline(always)]
-fn add_child(front: &Front, numbers: &mut [f64], child: &Front, child_numbers: &[f64], map: &[Place]) {
+fn add_child(front: &Front, numbers: &mut [f64], child: &Front, child_numbers: &[f64], map: &ChildMap) {
     let first = child.pivot_slots();
     let schur = &child_numbers[child.reduced..];
-    for (column, &place) in map.iter().enumerate() {
-        let source = &schur[(first + column) * child.wide + first..][..map.len()];
-        for (value, &other) in source.iter().zip(map).skip(column) {
-            // The border is in elimination order, so most pairs of slots ascend.
-            numbers[front.offset(place, other)] += value;
+    let count = map.variables.len();
+    for column in 0..count + map.slots.len() {
+        let source = &schur[(first + column) * child.wide + first..][..count + map.slots.len()];
+        let target = if let Some(&variable) = map.variables.get(column) {
+            for (value, &other) in source.iter().zip(&map.variables).skip(column) {
+                numbers[front.offset(Place::Variable(variable), Place::Variable(other))] += value;
+            }
+            &mut numbers[front.coupling + variable as usize * front.wide..][..front.wide]
+        } else {
+            let slot = map.slots[column - count] as usize;
+            &mut numbers[front.reduced + slot * front.wide..][..front.wide]
+        };
+        let begin = column.max(count);
+        for (value, &slot) in source[begin..].iter().zip(&map.slots[begin - count..]) {
+            target[slot as usize] += value;
         }
     }
 }
@@ -412,6 +424,14 @@ impl KktSolver for Multifrontal {
         debug_assert_eq!(x.len(), self.order);
         let (fronts, factors, space) = (&self.fronts, &self.factors, &mut self.solution);
         self.architecture.dispatch(Solve { fronts, factors, space, x });
+    }
+
+    fn mark_neglected(&self, neglected: &mut [bool]) {
+        for (front, factor) in self.fronts.iter().zip(&self.factors) {
+            for &row in &factor.null_space.rows[..factor.null_space.rank] {
+                neglected[front.rows[row]] = true;
+            }
+        }
     }
 
     fn factor_entries(&self) -> usize {

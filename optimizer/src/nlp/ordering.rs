@@ -4,7 +4,7 @@
 //! it is structurally matched with, so that no supernode begins with a lone row, whose diagonal may be zero.
 //! Without: approximate minimum degree, left to the factorisation.
 
-use super::formulation::Formulation;
+use super::formulation::{Formulation, RowKind};
 use super::kkt::couplings;
 use super::problem::EliminationBlocks;
 use super::status::NlpError;
@@ -52,9 +52,37 @@ pub(super) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Re
     Ok(())
 }
 
+/// Block of each index, with every equality row that no variable of its block can take moved up to the parent of the
+/// block: eliminated in its block its pivot would be the regularisation alone. Only rows that no lower block couples
+/// with are looked at; the others have a pivot from below.
+pub(super) fn block_of_index_raised(form: &Formulation, blocks: &EliminationBlocks) -> Vec<usize> {
+    let mut of = block_of_index(blocks);
+    let pattern = form.program.jacobian_pattern();
+    let mut from_below = vec![false; form.m];
+    for j in 0..form.n {
+        for &i in &pattern.row_indices[pattern.column_starts[j]..pattern.column_starts[j + 1]] {
+            from_below[i] |= of[j] < of[form.n + i];
+        }
+    }
+    let candidate = |i: usize| matches!(form.rows[i], RowKind::Equality(_)) && !from_below[i];
+    let partner = match_rows(form, |i, j| candidate(i) && of[j] == of[form.n + i]);
+    let mut variables = vec![0usize; blocks.parent.len()];
+    for j in 0..form.n {
+        variables[of[j]] += 1;
+    }
+    let raised: Vec<usize> = (0..form.m).filter(|&i| candidate(i) && partner[i].is_none()).collect();
+    for i in raised {
+        let own = of[form.n + i];
+        if let (true, Some(parent)) = (variables[own] > 0, blocks.parent[own]) {
+            of[form.n + i] = parent;
+        }
+    }
+    of
+}
+
 /// Elimination order from blocks: position -> index.
 pub(super) fn block_order(form: &Formulation, blocks: &EliminationBlocks) -> Vec<usize> {
-    let partner = match_rows(form, Some(blocks));
+    let partner = match_rows(form, |i, j| blocks.block_of_variable[j] == blocks.block_of_row[i]);
     let mut row_of_variable = vec![None; form.n];
     for (i, variable) in partner.iter().enumerate() {
         if let Some(j) = variable {
@@ -77,9 +105,9 @@ pub(super) fn block_order(form: &Formulation, blocks: &EliminationBlocks) -> Vec
     members.into_iter().flatten().collect()
 }
 
-/// Structural matching of rows with variables (inside their block when there are blocks) by augmenting paths; a row
-/// without a partner gets `None`.
-pub(super) fn match_rows(form: &Formulation, blocks: Option<&EliminationBlocks>) -> Vec<Option<usize>> {
+/// Structural matching of rows with free variables by augmenting paths, along the entries that `allowed` (row, variable)
+/// admits; a row without a partner gets `None`.
+fn match_rows(form: &Formulation, allowed: impl Fn(usize, usize) -> bool) -> Vec<Option<usize>> {
     let pattern = form.program.jacobian_pattern();
     let mut columns_of_row: Vec<Vec<usize>> = vec![Vec::new(); form.m];
     for j in 0..form.n {
@@ -88,7 +116,7 @@ pub(super) fn match_rows(form: &Formulation, blocks: Option<&EliminationBlocks>)
         }
         for q in pattern.column_starts[j]..pattern.column_starts[j + 1] {
             let i = pattern.row_indices[q];
-            if blocks.is_none_or(|b| b.block_of_variable[j] == b.block_of_row[i]) {
+            if allowed(i, j) {
                 columns_of_row[i].push(j);
             }
         }
