@@ -99,8 +99,7 @@ impl Front {
         let rows: Vec<usize> = pivots.iter().copied().filter(is_row).collect();
         let mut front = Self { border, ..Self::default() };
         if rows.len() >= FEWEST_ROWS && rows.len() <= variables.len() {
-            front.others =
-                pivots.iter().copied().filter(|i| kinds[*i] != PivotKind::Variable && !is_row(i)).collect();
+            front.others = pivots.iter().copied().filter(|i| kinds[*i] != PivotKind::Variable && !is_row(i)).collect();
             (front.variables, front.rows) = (variables, rows);
         } else {
             front.others = pivots.to_vec();

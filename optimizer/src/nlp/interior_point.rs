@@ -326,7 +326,6 @@ impl<'p> Run<'p> {
             Goal::Feasibility { .. } => self.form.program.objective(&self.point.w[..self.form.n]),
         };
         let step = session.last_step;
-        if std::env::var("LOG").is_ok() { eprintln!("{} {:?} obj {:.8} viol {:.1e} dual {:.1e} mu {:.1e} a {:.3} dw {:.1e} trials {} factor {} solves {} fallbacks {}", session.iterations, self.phase(), objective, self.program_violation(), now.dual, self.mu, step.alpha_primal, step.delta_w, step.trials, session.newton.tally.factorisations, session.newton.tally.backsolves, session.newton.solver_fallbacks()); }
         (session.observer)(&NlpIteration {
             number: session.iterations,
             phase: self.phase(),

@@ -56,7 +56,6 @@ pub(super) fn choose(
     });
     let two_stages = multifrontal(&front_of, &variables.chain(rows).collect::<Vec<_>>(), settings.threads)?;
     let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), Box::new(plain)];
-    if std::env::var("PLAIN").is_ok() { methods.remove(0); }
     if settings.linear_solver == LinearSolver::Auto {
         methods.push(Box::new(other));
     }

@@ -87,7 +87,8 @@ impl Multifrontal {
         let order = column_starts.len() - 1;
         let fail = |reason: &str| NlpError::Analysis { order, reason: reason.to_owned() };
         let members = postordered(column_starts, row_indices, front_of);
-        let fronts = analyse(column_starts, row_indices, &members, kinds).ok_or_else(|| fail("a front is too large"))?;
+        let fronts =
+            analyse(column_starts, row_indices, &members, kinds).ok_or_else(|| fail("a front is too large"))?;
         let factors = fronts.iter().map(Factor::new).collect();
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
         let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };

@@ -238,8 +238,7 @@ fn solve_for_slots<S: Simd>(
     }
     let (first, free) = (front.first_free(rank), front.variables.len() - rank);
     for t in 0..rank {
-        x[t * wide + first..t * wide + first + free]
-            .copy_from_slice(&lu[t * tall + rank..t * tall + rank + free]);
+        x[t * wide + first..t * wide + first + free].copy_from_slice(&lu[t * tall + rank..t * tall + rank + free]);
     }
     for t in (0..rank).rev() {
         let l = &lu[t * tall..(t + 1) * tall];
