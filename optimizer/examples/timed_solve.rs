@@ -1,6 +1,7 @@
 //! One cold solve with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
-//! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]`
+//! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
+//! [--guesses 1]` (one guess, as the other side has one start; the service tries two).
 
 use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, Subject, solve};
 use std::error::Error;
@@ -8,13 +9,14 @@ use std::error::Error;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut subject = 1;
     let mut muscles = false;
-    let mut options = SolveOptions::default();
+    let mut options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
         match argument.as_str() {
             "--muscles" => muscles = true,
             "--subject" => subject = value()?.parse()?,
+            "--guesses" => options.cold_guesses = value()?.parse()?,
             "--threads" => options.threads = value()?.parse()?,
             other => return Err(format!("unknown argument {other}").into()),
         }

@@ -26,10 +26,10 @@ fn vectors_mut<S: Simd>(values: &mut [f64]) -> &mut [S::f64s] {
     S::as_mut_simd_f64s(values).0
 }
 
+/// Entries [from, from + length) of column k.
 #[inline(always)]
-fn column<S: Simd>(x: &[f64], stride: usize, k: u32) -> &[S::f64s] {
-    let k = k as usize;
-    vectors::<S>(&x[k * stride..(k + 1) * stride])
+fn column<S: Simd>(x: &[f64], stride: usize, k: u32, from: usize, length: usize) -> &[S::f64s] {
+    vectors::<S>(&x[k as usize * stride + from..][..length])
 }
 
 /// y -= f a.
@@ -64,13 +64,29 @@ pub(super) fn subtract_two<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64, b
 /// y -= sum of f x_k over the terms (k, f), x_k being columns of x.
 #[inline(always)]
 pub(super) fn subtract_columns<S: Simd>(simd: S, y: &mut [f64], x: &[f64], stride: usize, terms: &[(u32, f64)]) {
-    let y = vectors_mut::<S>(y);
+    let length = y.len();
+    subtract_columns_within(simd, y, x, stride, terms, 0, length);
+}
+
+/// The same in the entries [from, to), multiples of [`LANES`], only.
+#[inline(always)]
+pub(super) fn subtract_columns_within<S: Simd>(
+    simd: S,
+    y: &mut [f64],
+    x: &[f64],
+    stride: usize,
+    terms: &[(u32, f64)],
+    from: usize,
+    to: usize,
+) {
+    let length = to - from;
+    let y = vectors_mut::<S>(&mut y[from..to]);
     let (groups, rest) = terms.as_chunks::<4>();
     for [ta, tb, tc, td] in groups {
-        let a = column::<S>(x, stride, ta.0);
-        let b = column::<S>(x, stride, tb.0);
-        let c = column::<S>(x, stride, tc.0);
-        let d = column::<S>(x, stride, td.0);
+        let a = column::<S>(x, stride, ta.0, from, length);
+        let b = column::<S>(x, stride, tb.0, from, length);
+        let c = column::<S>(x, stride, tc.0, from, length);
+        let d = column::<S>(x, stride, td.0, from, length);
         let (fa, fb) = (simd.splat_f64s(-ta.1), simd.splat_f64s(-tb.1));
         let (fc, fd) = (simd.splat_f64s(-tc.1), simd.splat_f64s(-td.1));
         for ((((y, a), b), c), d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
@@ -80,7 +96,7 @@ pub(super) fn subtract_columns<S: Simd>(simd: S, y: &mut [f64], x: &[f64], strid
     }
     for &(k, f) in rest {
         let f = simd.splat_f64s(-f);
-        for (y, a) in y.iter_mut().zip(column::<S>(x, stride, k)) {
+        for (y, a) in y.iter_mut().zip(column::<S>(x, stride, k, from, length)) {
             *y = simd.mul_add_f64s(*a, f, *y);
         }
     }
@@ -111,43 +127,70 @@ pub(super) fn all_finite(values: &[f64]) -> bool {
     sums.iter().all(|s| *s == 0.0)
 }
 
-/// Lower triangle (and what shares a tile with it) of S -= X G^T + G X^T over the first `count` columns of X and G and
-/// the first `size` columns of S.
+/// Lower triangle (and what shares a tile with it) of S -= X G^T + G X^T over the first `count` columns of X and G and the
+/// first `size` columns of S. `coupled`, by block of [`LANES`] rows: whether X is not zero there. Where it is zero G has
+/// few columns, so zero factors are skipped.
+#[allow(clippy::too_many_arguments)] // a kernel
 #[inline(always)]
 pub(super) fn subtract_symmetric_product<S: Simd>(
     simd: S,
     s: &mut [f64],
     x: &[f64],
     g: &[f64],
+    coupled: &[bool],
     stride: usize,
     count: usize,
     size: usize,
 ) {
     let per_block = LANES / S::F64_LANES;
-    let height = stride / S::F64_LANES;
     let mut j = 0;
     while j < size {
-        let first = j / LANES * per_block;
-        if size - j >= 4 {
-            let mut i = first;
-            while i + 2 <= height {
-                product_tile::<S, 2, 4>(simd, s, x, g, stride, count, i, j);
-                i += 2;
+        let width = if size - j >= 4 { 4 } else { 1 };
+        let own = j / LANES;
+        let mut block = own;
+        while block < coupled.len() {
+            // A run of blocks of one kind.
+            let kind = coupled[block];
+            let end = (block..coupled.len()).find(|&b| coupled[b] != kind).unwrap_or(coupled.len());
+            let (from, to) = (block * per_block, end * per_block);
+            match (coupled[own], kind) {
+                (true, true) if width == 4 => product_tiles::<S, 4>(simd, s, x, g, stride, count, from, to, j),
+                (true, true) => product_tiles::<S, 1>(simd, s, x, g, stride, count, from, to, j),
+                (false, true) => subtract_outer(simd, s, x, g, stride, count, from, to, j, width),
+                (true, false) => subtract_outer(simd, s, g, x, stride, count, from, to, j, width),
+                (false, false) => {}
             }
-            if i < height {
-                product_tile::<S, 1, 4>(simd, s, x, g, stride, count, i, j);
-            }
-            j += 4;
-        } else {
-            for i in first..height {
-                product_tile::<S, 1, 1>(simd, s, x, g, stride, count, i, j);
-            }
-            j += 1;
+            block = end;
         }
+        j += width;
     }
 }
 
-/// V vectors by W columns of the product, from vector i and column j on.
+/// Vectors [from, to) by W columns of the product, from column j on.
+#[allow(clippy::too_many_arguments)] // a kernel
+#[inline(always)]
+fn product_tiles<S: Simd, const W: usize>(
+    simd: S,
+    s: &mut [f64],
+    x: &[f64],
+    g: &[f64],
+    stride: usize,
+    count: usize,
+    from: usize,
+    to: usize,
+    j: usize,
+) {
+    let mut i = from;
+    while i + 2 <= to {
+        product_tile::<S, 2, W>(simd, s, x, g, stride, count, i, j);
+        i += 2;
+    }
+    if i < to {
+        product_tile::<S, 1, W>(simd, s, x, g, stride, count, i, j);
+    }
+}
+
+/// V vectors by W columns of X G^T + G X^T.
 #[allow(clippy::too_many_arguments)] // a kernel
 #[inline(always)]
 fn product_tile<S: Simd, const V: usize, const W: usize>(
@@ -177,6 +220,37 @@ fn product_tile<S: Simd, const V: usize, const W: usize>(
         let column = &mut s[(j + c) * stride..(j + c + 1) * stride];
         for (out, sum) in vectors_mut::<S>(column)[i..].iter_mut().zip(&sum[c]) {
             *out = simd.sub_f64s(*out, *sum);
+        }
+    }
+}
+
+/// Vectors [from, to) by `width` columns, from column j on, of S -= A B^T.
+#[allow(clippy::too_many_arguments)] // a kernel
+#[inline(always)]
+fn subtract_outer<S: Simd>(
+    simd: S,
+    s: &mut [f64],
+    a: &[f64],
+    b: &[f64],
+    stride: usize,
+    count: usize,
+    from: usize,
+    to: usize,
+    j: usize,
+    width: usize,
+) {
+    for (a, b) in a.chunks_exact(stride).zip(b.chunks_exact(stride)).take(count) {
+        let rows = &vectors::<S>(a)[from..to];
+        let factors = &b[j..j + width];
+        if factors.iter().all(|f| *f == 0.0) {
+            continue;
+        }
+        for (c, f) in factors.iter().enumerate() {
+            let f = simd.splat_f64s(-f);
+            let column = &mut s[(j + c) * stride..(j + c + 1) * stride];
+            for (out, row) in vectors_mut::<S>(column)[from..to].iter_mut().zip(rows) {
+                *out = simd.mul_add_f64s(*row, f, *out);
+            }
         }
     }
 }

@@ -10,7 +10,7 @@
 //! All numbers of a front lie in one array; the *slots* of its reduced matrix are, in this order: spare slots for
 //! deferred rows, free variables, other pivots, border.
 
-use super::dense_kernels::padded;
+use super::dense_kernels::{LANES, padded};
 
 /// What an index of the matrix is to the factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +49,10 @@ pub(super) struct Front {
     pub tall: usize,
     /// Column stride of what is as long as the slots: couplings, reduced matrix.
     pub wide: usize,
+    /// By block of [`LANES`] slots: whether a row of stage 1, or a free variable, couples with one of them; and the
+    /// ranges of slots in which one does.
+    pub coupled: Vec<bool>,
+    pub ranges: Vec<(usize, usize)>,
     /// Offsets: transposed Jacobian (becomes L and U), coupling of the variables with the slots, coupling of the rows
     /// with the slots (becomes X), diagonal of the rows, reduced matrix. The Hessian is at 0.
     pub jacobian: usize,
@@ -164,6 +168,30 @@ impl Front {
             (Row(e), Slot(s)) | (Slot(s), Row(e)) => self.row_coupling + e as usize * self.wide + s as usize,
             (Slot(i), Slot(j)) => self.reduced + i.min(j) as usize * self.wide + i.max(j) as usize,
         }
+    }
+
+    /// Notes which slots the rows of stage 1 couple with; the sources must be complete. No child contributes to rows.
+    pub(super) fn note_couplings_of_rows(&mut self) {
+        let mut blocks = vec![false; self.wide / LANES];
+        if !self.rows.is_empty() {
+            // Deferred rows and free variables.
+            blocks[..self.first_other().div_ceil(LANES)].fill(true);
+            for &(_, offset) in &self.sources {
+                let offset = offset as usize;
+                if offset >= self.row_coupling && offset < self.row_diagonal {
+                    blocks[(offset - self.row_coupling) % self.wide / LANES] = true;
+                }
+            }
+        }
+        let mut at = 0;
+        for run in blocks.chunk_by(|a, b| a == b) {
+            let from = at;
+            at += run.len() * LANES;
+            if run[0] {
+                self.ranges.push((from, at));
+            }
+        }
+        self.coupled = blocks;
     }
 
     /// Positions in the matrix values of the diagonals of the rows of stage 1.

@@ -217,6 +217,7 @@ fn analyse(
             let offset = front.offset(places[first], places[last]);
             front.sources.push((u32::try_from(q).ok()?, u32::try_from(offset).ok()?));
         }
+        front.note_couplings_of_rows();
         for &child in &children[f] {
             front.children.push((child, ChildMap::new(fronts[child].border.iter().map(|&i| places[i]))?));
         }

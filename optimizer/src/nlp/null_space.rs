@@ -16,7 +16,7 @@
 
 use pulp::Simd;
 
-use super::dense_kernels::{LANES, subtract, subtract_columns, subtract_symmetric_product};
+use super::dense_kernels::{LANES, subtract, subtract_columns_within, subtract_symmetric_product};
 use super::front::{Front, MOST_DEFERRED};
 
 /// A pivot below this share of its row's largest entry defers the row.
@@ -141,9 +141,11 @@ pub(super) fn eliminate<S: Simd>(
                 work.terms.push((k, 0.5 * h));
             }
         }
-        subtract_columns(simd, column, x, wide, &work.terms);
+        for &(from, to) in &front.ranges {
+            subtract_columns_within(simd, column, x, wide, &work.terms, from, to);
+        }
     }
-    subtract_symmetric_product(simd, reduced, x, g, wide, rank, front.slots());
+    subtract_symmetric_product(simd, reduced, x, g, &front.coupled, wide, rank, front.slots());
     true
 }
 
@@ -235,7 +237,9 @@ fn solve_for_slots<S: Simd>(
         let column = &mut rest[..wide];
         terms.clear();
         terms.extend((0u32..).zip(&u[..t]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
-        subtract_columns(simd, column, done, wide, terms);
+        for &(from, to) in &front.ranges {
+            subtract_columns_within(simd, column, done, wide, terms, from, to);
+        }
         let inverse = 1.0 / u[t];
         for v in column {
             *v *= inverse;
@@ -250,6 +254,8 @@ fn solve_for_slots<S: Simd>(
         let (left, done) = x.split_at_mut((t + 1) * wide);
         terms.clear();
         terms.extend((0u32..).zip(&l[t + 1..rank]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
-        subtract_columns(simd, &mut left[t * wide..], done, wide, terms);
+        for &(from, to) in &front.ranges {
+            subtract_columns_within(simd, &mut left[t * wide..], done, wide, terms, from, to);
+        }
     }
 }
