@@ -3,7 +3,7 @@
 use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
-use gaitwright::http::{AppState, router};
+use gaitwright::http::{Access, AppState, router};
 use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
@@ -27,6 +27,8 @@ pub struct Service {
     pub store: Store,
     /// What runs its studies.
     pub director: Director,
+    /// Who may do what: everybody everything, unless a test says otherwise.
+    pub access: Arc<Access>,
     work: JoinHandle<()>,
 }
 
@@ -66,7 +68,7 @@ impl Service {
             let director = director.clone();
             async move { director.run().await.unwrap() }
         });
-        Self { store, director, work }
+        Self { store, director, access: Arc::new(Access::without_sign_in()), work }
     }
 
     /// Stops it and closes the record.
@@ -133,7 +135,7 @@ impl Service {
 
     /// The router.
     pub fn router(&self) -> Router {
-        router(AppState { director: self.director.clone() })
+        router(AppState { director: self.director.clone(), access: Arc::clone(&self.access) })
     }
 
     /// `GET`.

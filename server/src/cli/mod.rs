@@ -1,6 +1,7 @@
 //! The command line. Data goes to stdout, progress and logs to stderr.
 
 mod body;
+mod config;
 mod logging;
 mod problem;
 mod record;
@@ -10,7 +11,9 @@ mod sweep;
 mod tune;
 
 use crate::error::Error;
+use crate::http::openapi;
 use clap::{Parser, Subcommand};
+use config::{Flags, Settings};
 use std::process::ExitCode;
 
 /// Exit code when the input is at fault, as with every usage error.
@@ -38,6 +41,10 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Check the audit trail.
     Audit(record::Audit),
+    /// Show the settings of the service.
+    Config(config::Config),
+    /// Print the description of the REST interface (OpenAPI 3.1).
+    Openapi,
     /// Copy a database, also while it is served.
     Backup(record::Backup),
     /// Put a copy in place of a database.
@@ -47,17 +54,28 @@ enum Command {
 /// Runs the program.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
-    logging::start();
+    let settings = match &cli.command {
+        Command::Serve(serve) => serve.settings(),
+        _ => Settings::read(&Flags::default()),
+    };
+    let settings = match settings {
+        Ok(settings) => settings,
+        Err(error) => return report(&error),
+    };
+    let (filter, json) = settings.log();
+    logging::start(filter, json);
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(error) => return report(&Error::Internal(error.to_string())),
     };
     let done = match cli.command {
-        Command::Serve(serve) => runtime.block_on(serve.run()),
+        Command::Serve(serve) => runtime.block_on(serve.run(&settings)),
         Command::Tune(tune) => runtime.block_on(tune.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
         Command::Audit(audit) => runtime.block_on(audit.run()),
+        Command::Config(config) => config.run(),
+        Command::Openapi => openapi::text().map(|text| print!("{text}")).map_err(|e| Error::Internal(e.to_string())),
         Command::Backup(backup) => runtime.block_on(backup.run()),
         Command::Restore(restore) => runtime.block_on(restore.run()),
     };

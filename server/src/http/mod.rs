@@ -1,16 +1,22 @@
 //! The HTTP face: REST under `/api/v1`, pages for people, static files.
 
 pub mod api;
+mod blind_motion;
 mod extract;
 mod gait_series;
+mod identify;
+mod may;
 mod negotiate;
 mod once;
+pub mod openapi;
 pub mod pages;
+mod pages_of;
 mod problem;
+mod revision;
 mod router;
 mod same_origin;
 mod state;
 mod static_files;
 
 pub use router::router;
-pub use state::AppState;
+pub use state::{Access, AppState};

@@ -1,13 +1,42 @@
 //! What every handler can reach.
 
+use crate::access::BackOff;
 use crate::store::{Reader, Store, StoreResult, Writer};
 use crate::studies::director::Director;
+use std::sync::Arc;
 
 /// What every handler can reach.
 #[derive(Debug, Clone)]
 pub struct AppState {
     /// Runs the studies.
     pub director: Director,
+    /// How people and programs say who they are.
+    pub access: Arc<Access>,
+}
+
+/// How people and programs say who they are.
+#[derive(Debug)]
+pub struct Access {
+    /// Nobody needs to sign in, and whoever is there may do everything.
+    pub open: bool,
+    /// A session without a sign of life for so long has ended.
+    pub idle_seconds: f64,
+    /// Browsers reach the service through TLS.
+    pub secure: bool,
+    /// Failed attempts.
+    pub back_off: BackOff,
+}
+
+impl Access {
+    /// Everybody signs in.
+    pub fn by_sign_in(idle_seconds: f64) -> Self {
+        Self { open: false, idle_seconds, secure: false, back_off: BackOff::default() }
+    }
+
+    /// Nobody signs in: for one person on one machine.
+    pub fn without_sign_in() -> Self {
+        Self { open: true, ..Self::by_sign_in(3600.0) }
+    }
 }
 
 impl AppState {

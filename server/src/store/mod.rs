@@ -16,14 +16,21 @@ pub mod idempotency;
 pub mod jobs;
 mod json;
 mod migrations;
+pub mod presentations;
 pub mod reference_gaits;
+pub mod schema;
+pub mod sessions;
 pub mod studies;
 pub mod subjects;
 mod time;
+pub mod tokens;
 pub mod trials;
+pub mod users;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
-pub use id::{DeviceId, FeedbackId, JobId, ReferenceGaitId, StudyId, SubjectId, TrialId};
+pub use id::{
+    DeviceId, FeedbackId, JobId, PresentationId, ReferenceGaitId, StudyId, SubjectId, TokenId, TrialId, UserId,
+};
 pub use time::{Instant, now};
 
 use sqlx::pool::PoolConnection;

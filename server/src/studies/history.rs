@@ -5,9 +5,10 @@ use super::standing::Standing;
 use crate::store::TrialId;
 use gait_learner::LearnerError;
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// The recommendation after some results.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Milestone {
     /// Number of the trial after whose proposal's predecessors this held: 1, 2, ...
     pub iteration: u32,

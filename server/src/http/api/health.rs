@@ -6,9 +6,10 @@ use crate::store::jobs;
 use axum::Json;
 use axum::extract::State;
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// What `/health` answers.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 pub struct Health {
     /// `ready`.
     pub status: &'static str,
@@ -26,6 +27,12 @@ pub struct Health {
 ///
 /// # Errors
 /// When it does not.
+#[utoipa::path(
+    get,
+    path = "/health",
+    tag = "health",
+    responses((status = 200, description = "The service is ready", body = Health)),
+)]
 pub async fn get(State(app): State<AppState>) -> Result<Json<Health>, Error> {
     let (jobs_queued, jobs_running) = jobs::depth(&mut *app.read().await?).await?;
     let version = env!("CARGO_PKG_VERSION");

@@ -2,10 +2,11 @@
 
 use super::error::{Page, PageError, page};
 use super::study::answer_in_words;
+use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
-use crate::store::audit::Actor;
+use crate::http::may::May;
 use crate::store::feedback::Source;
 use crate::store::idempotency::{self, Kept};
 use crate::store::studies::Study;
@@ -53,7 +54,12 @@ struct Saved {
 }
 
 /// `GET /studies/{id}/compare`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>, Params(choice): Params<Choice>) -> Page {
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Params(choice): Params<Choice>,
+) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
@@ -104,6 +110,7 @@ pub(super) struct Submitted {
 
 /// `POST /studies/{id}/compare`.
 pub(super) async fn post(
+    may: May<access::Answer>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Submitted>,
@@ -112,20 +119,19 @@ pub(super) async fn post(
         trial_a: form.a,
         trial_b: form.b,
         answer: form.answer,
-        source: form.source,
-        author: form.author,
+        source: Some(form.source),
+        author: Some(form.author),
         note: form.note,
     };
-    let actor = Actor::anonymous();
     let mut writer = app.write().await?;
     // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
     let key = format!("form {}", form.key);
-    let saved = if let Some(before) = idempotency::find(&mut writer, &actor, &key).await? {
+    let saved = if let Some(before) = idempotency::find(&mut writer, &may.caller.actor, &key).await? {
         before.body
     } else {
-        let saved = answer::give(&mut writer, &actor, id, &answer).await?.to_string();
+        let saved = answer::give(&mut writer, &may.caller, id, &answer).await?.to_string();
         let kept = Kept { request: key.clone(), status: 303, location: None, body: saved.clone() };
-        idempotency::keep(&mut writer, &actor, &key, &kept).await?;
+        idempotency::keep(&mut writer, &may.caller.actor, &key, &kept).await?;
         saved
     };
     commit(writer).await?;
@@ -143,12 +149,13 @@ pub(super) struct Retract {
 
 /// `POST /studies/{id}/retract`.
 pub(super) async fn retract(
+    may: May<access::Answer>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Retract>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    answer::retract(&mut writer, &Actor::anonymous(), form.feedback, &form.author, &form.reason).await?;
+    answer::retract(&mut writer, &may.caller, form.feedback, Some(&form.author), &form.reason).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.feedback)))

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::http::problem::Problem;
 use askama::Template;
 use axum::http::StatusCode;
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{Html, IntoResponse, Redirect, Response};
 
 /// An error that is shown as a page.
 #[derive(Debug)]
@@ -26,6 +26,9 @@ impl IntoResponse for PageError {
     fn into_response(self) -> Response {
         if !self.0.is_input() {
             tracing::error!(error = %self.0, "a page failed");
+        }
+        if matches!(self.0, Error::NotSignedIn(_)) {
+            return Redirect::to("/sign-in").into_response();
         }
         let problem = Problem::from(&self.0);
         let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);

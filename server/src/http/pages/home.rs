@@ -2,8 +2,10 @@
 
 use super::error::{Page, page};
 use super::format::words;
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
+use crate::http::may::May;
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, studies, subjects, trials};
@@ -29,7 +31,7 @@ struct Row {
 }
 
 /// `GET /`.
-pub(super) async fn get(State(app): State<AppState>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Page {
     let mut reader = app.read().await?;
     let mut rows = Vec::new();
     for study in studies::page(&mut reader, None, PAGE).await? {

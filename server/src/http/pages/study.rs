@@ -2,11 +2,12 @@
 
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
+use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id};
+use crate::http::may::May;
 use crate::plots::{Chart, Stroke};
-use crate::store::audit::Actor;
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
@@ -95,7 +96,7 @@ struct AnswerRow {
 }
 
 /// `GET /studies/{id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let last_event = events::last(&mut reader, id).await?;
@@ -109,7 +110,7 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Pag
 }
 
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
-pub(super) async fn live(State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+pub(super) async fn live(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
     page(&read_live(&app, id).await?)
 }
 
@@ -121,6 +122,7 @@ pub(super) struct Do {
 
 /// `POST /studies/{id}/do`.
 pub(super) async fn post(
+    may: May<Run>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Do>,
@@ -130,7 +132,7 @@ pub(super) async fn post(
         .find(|act| button(*act).is_some_and(|b| b.act == form.act))
         .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop"))?;
     let mut writer = app.write().await?;
-    let done = command::act(&mut writer, &Actor::anonymous(), id, act, "").await?;
+    let done = command::act(&mut writer, &may.caller.actor, id, act, "").await?;
     commit(writer).await?;
     done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
     app.director.changed();
