@@ -62,6 +62,15 @@ impl Service {
         let mut writer = store.write().await.unwrap();
         catalogue::ensure(&mut writer).await.unwrap();
         commit(writer).await.unwrap();
+        Self::over(store, solver, workers)
+    }
+
+    /// Starts a service on a record as it is, adding nothing to it.
+    pub async fn start_as_is(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
+        Self::over(Store::open(database).await.unwrap(), solver, workers)
+    }
+
+    fn over(store: Store, solver: impl Evaluate, workers: usize) -> Self {
         let pool = Pool::new(workers, Arc::new(solver), Arc::new(Board::default()));
         let director = Director::new(store.clone(), pool, None);
         let work = tokio::spawn({
@@ -135,7 +144,7 @@ impl Service {
 
     /// The router.
     pub fn router(&self) -> Router {
-        router(AppState { director: self.director.clone(), access: Arc::clone(&self.access) })
+        router(AppState::new(self.director.clone(), Arc::clone(&self.access)))
     }
 
     /// `GET`.

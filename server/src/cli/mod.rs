@@ -7,6 +7,7 @@ mod problem;
 mod record;
 mod serve;
 mod solve;
+pub mod study;
 mod sweep;
 mod tune;
 
@@ -49,6 +50,12 @@ enum Command {
     Backup(record::Backup),
     /// Put a copy in place of a database.
     Restore(record::Restore),
+    /// Write a whole study into one file.
+    Export(study::Export),
+    /// Add the study of such a file to a database.
+    Import(study::Import),
+    /// Drop old trajectories; what was learned from them stays.
+    Prune(study::Prune),
 }
 
 /// Runs the program.
@@ -78,6 +85,9 @@ pub fn run() -> ExitCode {
         Command::Openapi => openapi::text().map(|text| print!("{text}")).map_err(|e| Error::Internal(e.to_string())),
         Command::Backup(backup) => runtime.block_on(backup.run()),
         Command::Restore(restore) => runtime.block_on(restore.run()),
+        Command::Export(export) => runtime.block_on(export.run()),
+        Command::Import(import) => runtime.block_on(import.run()),
+        Command::Prune(prune) => runtime.block_on(prune.run()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

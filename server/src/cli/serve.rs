@@ -74,7 +74,7 @@ impl Serve {
 
         let pool = Pool::new(cores_or(workers), Arc::new(GaitSolver), Arc::new(Board::default()));
         let director = Director::new(store.clone(), pool, None);
-        let app = router(AppState { director: director.clone(), access: Arc::new(access) });
+        let app = router(AppState::new(director.clone(), Arc::new(access)));
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await }

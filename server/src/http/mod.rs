@@ -6,6 +6,7 @@ mod extract;
 mod gait_series;
 mod identify;
 mod may;
+pub mod metrics;
 mod negotiate;
 mod once;
 pub mod openapi;

@@ -1,6 +1,6 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, api, identify, openapi, pages, same_origin, static_files};
+use super::{AppState, api, identify, metrics, openapi, pages, same_origin, static_files};
 use crate::error::Error;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -38,9 +38,12 @@ pub fn router(state: AppState) -> Router {
         .route("/health", get(api::health::get))
         .merge(api)
         .route("/api/openapi.json", get(description))
+        .route("/metrics", get(metrics::get))
+        .route("/ready", get(api::health::ready))
         .route("/static/{*path}", get(static_files::get))
         .fallback(pages::error::no_such_page)
         .layer(middleware::from_fn_with_state(state.clone(), identify::identify))
+        .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
         .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, SLOWEST_ANSWER))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))

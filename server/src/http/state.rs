@@ -1,5 +1,6 @@
 //! What every handler can reach.
 
+use super::metrics::Requests;
 use crate::access::BackOff;
 use crate::store::{Reader, Store, StoreResult, Writer};
 use crate::studies::director::Director;
@@ -12,6 +13,8 @@ pub struct AppState {
     pub director: Director,
     /// How people and programs say who they are.
     pub access: Arc<Access>,
+    /// What was asked of the service so far.
+    pub requests: Arc<Requests>,
 }
 
 /// How people and programs say who they are.
@@ -40,6 +43,11 @@ impl Access {
 }
 
 impl AppState {
+    /// A service over a director.
+    pub fn new(director: Director, access: Arc<Access>) -> Self {
+        Self { director, access, requests: Arc::default() }
+    }
+
     /// The record.
     pub fn store(&self) -> &Store {
         self.director.store()

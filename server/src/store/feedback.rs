@@ -233,6 +233,24 @@ pub async fn comparisons(db: &mut Connection, study: StudyId, after: i64, limit:
     rows.iter().map(from_row).collect()
 }
 
+/// At most `limit` comparisons by people about trials of a study, as heard: the newest of them.
+///
+/// # Errors
+/// What the database reports.
+pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
+    let rows = sqlx::query(
+        "select * from (select f.*, r.author as retracted_by, r.reason as retracted_because, \
+         r.created_at as retracted_at from feedback f left join retractions r on r.feedback_seq = f.seq \
+         where f.study_id = ? and f.source in ('subject', 'clinician', 'script') order by f.seq desc limit ?) \
+         order by seq",
+    )
+    .bind(study)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// The version of what a study has heard: changes with every row and every retraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LogVersion {

@@ -4,6 +4,7 @@
 //! writes go through one connection with `BEGIN IMMEDIATE`, so that no writer ever meets `SQLITE_BUSY`.
 //! A transaction never spans CPU or network work.
 
+pub mod archive;
 pub mod audit;
 pub mod backup;
 pub mod devices;
@@ -24,6 +25,7 @@ pub mod studies;
 pub mod subjects;
 mod time;
 pub mod tokens;
+pub mod totals;
 pub mod trials;
 pub mod users;
 

@@ -273,6 +273,19 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
+/// Studies that ended before an instant.
+///
+/// # Errors
+/// What the database reports.
+pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where state in ('finished', 'stopped') and updated_at < ? order by id")
+            .bind(at)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// What can be changed of a study in place.
 #[derive(Debug, Clone)]
 pub struct Limits {

@@ -222,6 +222,24 @@ pub async fn page(db: &mut Connection, study: StudyId, after: u32, limit: u32) -
     rows.iter().map(from_row).collect()
 }
 
+/// At most `limit` trials of a study with numbers below `before`, by number: the newest of them.
+///
+/// # Errors
+/// What the database reports.
+pub async fn newest(db: &mut Connection, study: StudyId, before: Option<u32>, limit: u32) -> StoreResult<Vec<Trial>> {
+    let rows = sqlx::query(
+        "select * from (select * from trials where study_id = ? and (? is null or number < ?) \
+         order by number desc limit ?) order by number",
+    )
+    .bind(study)
+    .bind(before)
+    .bind(before)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// Moves a trial to `running`.
 ///
 /// # Errors

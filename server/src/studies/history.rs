@@ -1,10 +1,12 @@
 //! The best action by iteration: what the study would have recommended after each result.
 
-use super::choice::best_trial;
+use super::choice::best_to_show;
 use super::standing::Standing;
 use crate::store::TrialId;
+use crate::store::trials::Trial;
 use gait_learner::LearnerError;
 use serde::Serialize;
+use std::collections::HashMap;
 use utoipa::ToSchema;
 
 /// The recommendation after some results.
@@ -28,22 +30,29 @@ pub struct Milestone {
 /// # Errors
 /// When the learner refuses the log.
 pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
-    let milestone = |iteration: u32, id: TrialId| {
-        standing.trial(id).map(|best| Milestone {
-            iteration,
-            trial_id: id,
-            number: best.number,
-            gait_rmse_rad: best.gait_rmse_rad,
-            cost_of_transport: best.cost_of_transport,
-        })
-    };
-    let mut history: Vec<Milestone> =
-        standing.trials.iter().filter_map(|trial| milestone(trial.number - 1, trial.best_before?)).collect();
+    let mut history = known(standing);
     let last = standing.trials.iter().rev().find(|trial| trial.state.is_result()).map(|trial| trial.number);
-    if let (Some(last), Some(best)) = (last, best_trial(standing)?)
+    if let (Some(last), Some(best)) = (last, best_to_show(standing)?)
         && history.last().is_none_or(|milestone| milestone.iteration < last)
     {
-        history.extend(milestone(last, best));
+        history.extend(standing.trial(best).map(|best| milestone(last, best)));
     }
     Ok(history)
+}
+
+/// What is known without asking the learner: the best when each trial was proposed.
+pub fn known(standing: &Standing) -> Vec<Milestone> {
+    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+    let best_before = |trial: &Trial| by_id.get(&trial.best_before?).map(|best| milestone(trial.number - 1, best));
+    standing.trials.iter().filter_map(best_before).collect()
+}
+
+fn milestone(iteration: u32, best: &Trial) -> Milestone {
+    Milestone {
+        iteration,
+        trial_id: best.id,
+        number: best.number,
+        gait_rmse_rad: best.gait_rmse_rad,
+        cost_of_transport: best.cost_of_transport,
+    }
 }

@@ -39,6 +39,22 @@ impl Standing {
         Ok(Self { study, trials, feedback, version, closed, skipped })
     }
 
+    /// The newest trials of a large study and the best one, for showing: the learner is not asked about it.
+    ///
+    /// # Errors
+    /// What the database reports.
+    pub async fn newest(db: &mut Connection, study: Study, limit: u32) -> StoreResult<Self> {
+        let version = feedback::version(db, study.id).await?;
+        let mut trials = trials::newest(db, study.id, None, limit).await?;
+        if let Some(best) = trials.last().and_then(|newest| newest.best_before)
+            && !trials.iter().any(|trial| trial.id == best)
+        {
+            trials.insert(0, trials::get(db, best).await?);
+        }
+        let feedback = feedback::newest_of_people(db, study.id, limit).await?;
+        Ok(Self { study, trials, feedback, version, closed: Vec::new(), skipped: Vec::new() })
+    }
+
     /// The trial with this identifier.
     pub fn trial(&self, id: TrialId) -> Option<&Trial> {
         self.trials.iter().find(|trial| trial.id == id)

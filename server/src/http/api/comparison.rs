@@ -8,7 +8,7 @@ use crate::http::may::May;
 use crate::store::studies::{self, StudyState};
 use crate::store::trials::{self, TrialCounts};
 use crate::store::{Connection, StudyId, schema};
-use crate::studies::choice::best_trial;
+use crate::studies::choice::best_to_show;
 use crate::studies::standing::Standing;
 use axum::Json;
 use axum::extract::State;
@@ -79,7 +79,7 @@ async fn row(db: &mut Connection, id: StudyId) -> Result<Compared, Error> {
     let counts = trials::counts(db, id).await?;
     let standing = Standing::read(db, study).await?;
     let (standing, best) = tokio::task::spawn_blocking(move || {
-        let best = best_trial(&standing);
+        let best = best_to_show(&standing);
         (standing, best)
     })
     .await

@@ -11,8 +11,9 @@ use crate::store::feedback::Source;
 use crate::store::idempotency::{self, Kept};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
-use crate::store::{FeedbackId, StudyId, TrialId, commit, feedback, studies};
+use crate::store::{FeedbackId, StudyId, TrialId, commit, feedback, studies, trials};
 use crate::studies::answer::{self, Answer, Verdict};
+use crate::studies::choice::MANY;
 use crate::studies::comparison::open_question;
 use crate::studies::standing::Standing;
 use askama::Template;
@@ -53,6 +54,9 @@ struct Saved {
     retracted: bool,
 }
 
+/// So many trials of a large study are offered.
+const OFFERED: u32 = 200;
+
 /// `GET /studies/{id}/compare`.
 pub(super) async fn get(
     _: May<Read>,
@@ -62,13 +66,18 @@ pub(super) async fn get(
 ) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
+    let standing = if large {
+        Standing::newest(&mut reader, study, OFFERED).await?
+    } else {
+        Standing::read(&mut reader, study).await?
+    };
     let saved = match choice.saved {
         Some(saved) => Some(feedback::get(&mut reader, saved).await?),
         None => None,
     };
     drop(reader);
-    let question = open_question(&standing).map_err(Error::Learner)?;
+    let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
     let mut trials: Vec<Offered> = standing
         .trials
         .iter()

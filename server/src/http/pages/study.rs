@@ -12,7 +12,7 @@ use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{StudyId, TrialId, commit, devices, events, reference_gaits, studies, subjects, trials};
-use crate::studies::choice::best_trial;
+use crate::studies::choice::{MANY, best_trial};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
@@ -95,6 +95,9 @@ struct AnswerRow {
     at: String,
 }
 
+/// So many trials of a large study are shown; the downloads have all of them.
+const SHOWN: u32 = 200;
+
 /// `GET /studies/{id}`.
 pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
     let mut reader = app.read().await?;
@@ -160,10 +163,15 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let large = counts.total as usize >= MANY;
+    let standing = if large {
+        Standing::newest(&mut reader, study, SHOWN).await?
+    } else {
+        Standing::read(&mut reader, study).await?
+    };
     drop(reader);
     let (standing, figures) = tokio::task::spawn_blocking(move || {
-        let figures = figures(&standing);
+        let figures = figures(&standing, large);
         (standing, figures)
     })
     .await
@@ -178,7 +186,12 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
     Ok(view(standing, counts, &figures, running))
 }
 
-fn figures(standing: &Standing) -> Result<Figures, gait_learner::LearnerError> {
+fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
+    if large {
+        let best = standing.trials.last().and_then(|newest| newest.best_before);
+        let question = standing.study.state == StudyState::Waiting;
+        return Ok(Figures { best, history: history::known(standing), question });
+    }
     let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
     Ok(Figures { best: best_trial(standing)?, history: history::of(standing)?, question })
 }
