@@ -4,75 +4,20 @@
 //! `cargo bench -p gait-learner`. One comparison and one label per action tried; the log before the newest answers is
 //! in the cache, as in a running study (`warm`), or nothing is (`cold`: a program just started).
 
-#![allow(clippy::expect_used, missing_docs)]
+#![allow(clippy::expect_used, missing_docs, unreachable_pub)]
+
+mod study;
 
 use divan::{Bencher, black_box};
-use gait_learner::{ActionIndex, Dimension, Feedback, FeedbackLog, Learner, LearnerSettings, Method, SearchSpace};
+use gait_learner::{Learner, LearnerSettings, Method};
+use study::{earlier, page, space, study};
+
+/// Counts what an iteration allocates: the column "max alloc" is the memory it holds at once beside the study's cache.
+#[global_allocator]
+static ALLOCATOR: divan::AllocProfiler = divan::AllocProfiler::system();
 
 fn main() {
     divan::main();
-}
-
-fn space() -> SearchSpace {
-    let dimensions = [2, 3, 3, 3, 4, 6, 3, 3]
-        .iter()
-        .enumerate()
-        .map(|(d, &n)| Dimension {
-            name: format!("a{}", d + 1),
-            values: (0..n).map(f64::from).collect(),
-            lengthscale: 1.0,
-        })
-        .collect();
-    SearchSpace::new(dimensions).expect("valid")
-}
-
-/// A study in which the actions tried approach an optimum, as they do, each compared with the best so far.
-fn study(space: &SearchSpace, comparisons: usize) -> FeedbackLog {
-    let mut state = 12345_u64;
-    let mut random = move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        state
-    };
-    let optimum = [1, 2, 0, 1, 2, 3, 1, 0];
-    let utility = |action: ActionIndex| -> f64 {
-        space.levels(action).iter().zip(optimum).map(|(&l, o)| -((l as f64 - f64::from(o)).powi(2))).sum()
-    };
-    let mut log = FeedbackLog::default();
-    let mut best = None;
-    while log.visited.len() <= comparisons {
-        let mut action = ActionIndex(random() % space.len());
-        for _ in 0..log.visited.len().min(40) / 10 {
-            let other = ActionIndex(random() % space.len());
-            if utility(other) > utility(action) && !log.visited.contains(&other) {
-                action = other;
-            }
-        }
-        if log.visited.contains(&action) {
-            continue;
-        }
-        let category = usize::from(utility(action) > -16.0);
-        log.feedback.push(Feedback::Label { action, category });
-        if let Some(incumbent) = best {
-            let better = utility(action) > utility(incumbent);
-            let (winner, loser) = if better { (action, incumbent) } else { (incumbent, action) };
-            log.feedback.push(Feedback::Preference { winner, loser });
-            best = Some(winner);
-        } else {
-            best = Some(action);
-        }
-        log.visited.push(action);
-    }
-    log
-}
-
-/// The log before the last action.
-fn earlier(log: &FeedbackLog) -> FeedbackLog {
-    FeedbackLog {
-        visited: log.visited[..log.visited.len() - 1].to_vec(),
-        feedback: log.feedback[..log.feedback.len() - 2].to_vec(),
-    }
 }
 
 fn warm(bencher: Bencher, settings: &LearnerSettings, comparisons: usize) {
@@ -118,13 +63,5 @@ fn page_of_answers(bencher: Bencher, comparisons: usize) {
     let space = space();
     let log = study(&space, comparisons);
     let belief = gait_learner::posterior(&space, &log, &LearnerSettings::default()).expect("valid");
-    let best = belief.best().expect("tried");
-    bencher.bench_local(|| {
-        for dimension in 0..8 {
-            black_box(belief.marginal(dimension).expect("exists"));
-        }
-        black_box(belief.slice(4, 5, best).expect("exists"));
-        black_box(belief.best_of_visited(1000, 1).expect("factors"));
-        black_box(belief.agreement());
-    });
+    bencher.bench_local(|| page(&belief));
 }

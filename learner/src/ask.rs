@@ -59,6 +59,18 @@ impl Learner {
         action: ActionIndex,
         settings: &LearnerSettings,
     ) -> Result<Vec<Question>> {
+        self.questions(space, log, action, settings, (settings.partner, settings.buffer))
+    }
+
+    /// The comparisons with a kind of partners, whatever the settings say of these: no belief depends on that.
+    fn questions(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        action: ActionIndex,
+        settings: &LearnerSettings,
+        (partner, buffer): (Partner, usize),
+    ) -> Result<Vec<Question>> {
         space.check(action)?;
         settings.validate()?;
         log.validate(space, settings.categories())?;
@@ -75,9 +87,9 @@ impl Learner {
                 questions.push(Question { action, against, reason });
             }
         };
-        match settings.partner {
+        match partner {
             Partner::Previous => {
-                earlier.iter().rev().take(settings.buffer).for_each(|&a| add(a, QuestionReason::Previous));
+                earlier.iter().rev().take(buffer).for_each(|&a| add(a, QuestionReason::Previous));
             }
             Partner::Every => earlier.iter().rev().for_each(|&a| add(a, QuestionReason::Previous)),
             Partner::Incumbent if earlier.is_empty() => {}
@@ -105,33 +117,46 @@ const ANSWERS_PER_REPEAT: usize = 8;
 /// # Errors
 /// When a setting is out of range or the log does not fit the space.
 pub fn what_to_ask(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) -> Result<Option<Question>> {
-    let mut learner = Learner::default();
-    let Some(&last) = log.visited.last() else { return Ok(None) };
-    let pair = |a: ActionIndex, b: ActionIndex| (a.min(b), a.max(b));
-    let answered: Vec<(ActionIndex, ActionIndex)> = log
-        .feedback
-        .iter()
-        .filter_map(|feedback| match *feedback {
-            Feedback::Preference { winner, loser } => Some(pair(winner, loser)),
-            Feedback::Tie { a, b } => Some(pair(a, b)),
-            Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
-        })
-        .collect();
-    let mut questions = learner.comparisons_to_ask(space, log, last, settings)?;
-    for partner in [Partner::Previous, Partner::Incumbent] {
-        let settings = LearnerSettings { partner, buffer: 1, ..settings.clone() };
-        questions.extend(learner.comparisons_to_ask(space, log, last, &settings)?);
+    Learner::default().what_to_ask(space, log, settings)
+}
+
+impl Learner {
+    /// As [`what_to_ask`].
+    ///
+    /// # Errors
+    /// As [`what_to_ask`].
+    pub fn what_to_ask(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        settings: &LearnerSettings,
+    ) -> Result<Option<Question>> {
+        let Some(&last) = log.visited.last() else { return Ok(None) };
+        let pair = |a: ActionIndex, b: ActionIndex| (a.min(b), a.max(b));
+        let answered: Vec<(ActionIndex, ActionIndex)> = log
+            .feedback
+            .iter()
+            .filter_map(|feedback| match *feedback {
+                Feedback::Preference { winner, loser } => Some(pair(winner, loser)),
+                Feedback::Tie { a, b } => Some(pair(a, b)),
+                Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
+            })
+            .collect();
+        let mut questions = self.comparisons_to_ask(space, log, last, settings)?;
+        for partner in [Partner::Previous, Partner::Incumbent] {
+            questions.extend(self.questions(space, log, last, settings, (partner, 1))?);
+        }
+        if let Some(open) = questions.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
+            return Ok(Some(open));
+        }
+        let times = |asked: &(ActionIndex, ActionIndex)| answered.iter().filter(|a| *a == asked).count();
+        let again = answered.iter().enumerate().filter(|&(at, asked)| answered[..at].contains(asked)).count();
+        if answered.len() < ANSWERS_PER_REPEAT * (again + 1) {
+            return Ok(None);
+        }
+        let once = answered.iter().find(|asked| times(asked) == 1);
+        Ok(once.map(|&(action, against)| Question { action, against, reason: QuestionReason::Consistency }))
     }
-    if let Some(open) = questions.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
-        return Ok(Some(open));
-    }
-    let times = |asked: &(ActionIndex, ActionIndex)| answered.iter().filter(|a| *a == asked).count();
-    let again = answered.iter().enumerate().filter(|&(at, asked)| answered[..at].contains(asked)).count();
-    if answered.len() < ANSWERS_PER_REPEAT * (again + 1) {
-        return Ok(None);
-    }
-    let once = answered.iter().find(|asked| times(asked) == 1);
-    Ok(once.map(|&(action, against)| Question { action, against, reason: QuestionReason::Consistency }))
 }
 
 #[cfg(test)]
@@ -147,9 +172,11 @@ mod tests {
         let mut log = FeedbackLog { visited: vec![ActionIndex(3)], feedback: vec![] };
         assert_eq!(what_to_ask(&space, &log, &settings).unwrap(), None);
         let mut reasons = Vec::new();
+        let mut learner = Learner::default();
         for action in [9, 5, 12, 7, 20].map(ActionIndex) {
             log.visited.push(action);
             while let Some(question) = what_to_ask(&space, &log, &settings).unwrap() {
+                assert_eq!(learner.what_to_ask(&space, &log, &settings).unwrap(), Some(question), "the cache");
                 reasons.push(question.reason);
                 assert!(reasons.len() < 30, "asks for ever");
                 let (a, b) = (question.action, question.against);

@@ -66,7 +66,7 @@ impl Chain {
         self.answers = answers.to_vec();
         let mut before = self.base.take().filter(|(base, _)| *base < end);
         while end < answers.len() || state.is_none() {
-            let mut model = state.as_ref().map_or_else(Model::default, |s| s.model.clone());
+            let mut model = state.as_ref().map_or_else(Model::default, |s| s.model.roomy());
             let mut next = end;
             while let Some(answer) = answers.get(next) {
                 let new =

@@ -120,6 +120,43 @@ impl Kernel {
         s
     }
 
+    /// [`Self::symmetric`] of every combination of levels of some of the dimensions with one, the last dimension
+    /// running fastest.
+    pub(crate) fn combinations(&self, from: usize, b: &[usize]) -> Vec<Symmetric> {
+        let pure = self.is_product();
+        let mut all = vec![Symmetric { product: 1.0, first: 0.0, second: 0.0 }];
+        for (d, &j) in b.iter().enumerate() {
+            // The tables are symmetric.
+            let (factors, broad) = (self.factors[from + d].row(j), self.broad[from + d].row(j));
+            let mut longer = Vec::with_capacity(all.len() * factors.len());
+            for s in &all {
+                for (factor, k) in factors.iter().zip(broad) {
+                    let (first, second) = if pure { (0.0, 0.0) } else { (s.first + k, s.second + s.first * k) };
+                    longer.push(Symmetric { product: s.product * factor, first, second });
+                }
+            }
+            all = longer;
+        }
+        all
+    }
+
+    /// The first term of [`Self::split`] of [`Self::combinations`].
+    pub(crate) fn products(&self, from: usize, b: &[usize], left: bool, into: &mut Vec<f64>) {
+        into.clear();
+        into.push(if left { self.product } else { 1.0 });
+        // The last dimension first, from behind: the combinations of the dimensions done so far stay together.
+        for (d, &j) in b.iter().enumerate().rev() {
+            let done = into.len();
+            let factors = self.factors[from + d].row(j);
+            for factor in &factors[1..] {
+                into.extend_from_within(..done);
+                let start = into.len() - done;
+                into[start..].iter_mut().for_each(|value| *value *= factor);
+            }
+            into[..done].iter_mut().for_each(|value| *value *= factors[0]);
+        }
+    }
+
     /// Covariance from the symmetric functions of two complementary parts of the dimensions.
     pub(crate) fn join(&self, y: Symmetric, z: Symmetric) -> f64 {
         let product = self.product * y.product * z.product;

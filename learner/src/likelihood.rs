@@ -36,6 +36,16 @@ impl Interval {
         })
     }
 
+    /// Probability of the answer. Digits are lost where it is far below 1e-16: fit for averages, not for logarithms.
+    pub(crate) fn probability(&self, link: Link, d: f64) -> f64 {
+        let below = |bound: f64| match link {
+            _ if bound.is_infinite() => f64::from(u8::from(bound > 0.0)),
+            Link::Logistic => sigmoids((bound - d) / self.noise).0,
+            Link::Probit => math::normal_cdf((bound - d) / self.noise),
+        };
+        (below(self.high) - below(self.low)).max(0.0)
+    }
+
     /// Slope and curvature alone; the value is not a number where it would cost more.
     pub(crate) fn derivatives(&self, link: Link, d: f64) -> LogLikelihood {
         let (low, high) = ((self.low - d) / self.noise, (self.high - d) / self.noise);
@@ -186,6 +196,11 @@ mod tests {
                     .map(|b| Interval { low: b[0], high: b[1], noise: 0.1 }.log_likelihood(link, d).value.exp())
                     .sum();
                 assert!((total - 1.0).abs() < 1e-12, "{link:?} {d} {total}");
+                for b in bounds.windows(2) {
+                    let interval = Interval { low: b[0], high: b[1], noise: 0.1 };
+                    let gap = interval.probability(link, d) - interval.log_likelihood(link, d).value.exp();
+                    assert!(gap.abs() < 1e-13, "{link:?} {d} {b:?} {gap}");
+                }
             }
         }
     }

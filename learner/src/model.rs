@@ -36,6 +36,17 @@ pub(crate) struct Model {
 }
 
 impl Model {
+    /// A copy with room for one more point.
+    pub(crate) fn roomy(&self) -> Self {
+        Self {
+            points: self.points.clone(),
+            levels: self.levels.clone(),
+            prior: self.prior.roomy(),
+            sites: self.sites.clone(),
+            slots: self.slots.clone(),
+        }
+    }
+
     /// Position of an action among the points.
     pub(crate) fn slot(&self, action: ActionIndex) -> Option<usize> {
         self.slots.get(&action).copied()

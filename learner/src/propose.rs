@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
+use crate::acquisition::avoidance::Avoidance;
 use crate::acquisition::information::InformationGain;
 use crate::acquisition::{eubo, line, thompson};
 use crate::error::{LearnerError, Result};
@@ -92,20 +93,37 @@ pub fn propose_batch(
     settings: &LearnerSettings,
     seed: u64,
 ) -> Result<Vec<Proposal>> {
-    let belief = Learner::default().posterior(space, log, settings)?;
-    let mut pending = pending.to_vec();
-    let mut proposals = Vec::new();
-    for _ in 0..settings.samples_per_iteration {
-        match propose_from(&belief, &pending, seed) {
-            Ok(proposal) => {
-                pending.push(proposal.action);
-                proposals.push(proposal);
+    Learner::default().propose_batch(space, log, pending, settings, seed)
+}
+
+impl Learner {
+    /// As [`propose_batch`].
+    ///
+    /// # Errors
+    /// As [`propose_batch`].
+    pub fn propose_batch(
+        &mut self,
+        space: &SearchSpace,
+        log: &FeedbackLog,
+        pending: &[ActionIndex],
+        settings: &LearnerSettings,
+        seed: u64,
+    ) -> Result<Vec<Proposal>> {
+        let belief = self.posterior(space, log, settings)?;
+        let mut pending = pending.to_vec();
+        let mut proposals = Vec::new();
+        for _ in 0..settings.samples_per_iteration {
+            match propose_from(&belief, &pending, seed) {
+                Ok(proposal) => {
+                    pending.push(proposal.action);
+                    proposals.push(proposal);
+                }
+                Err(LearnerError::Exhausted { .. }) if !proposals.is_empty() => break,
+                Err(error) => return Err(error),
             }
-            Err(LearnerError::Exhausted { .. }) if !proposals.is_empty() => break,
-            Err(error) => return Err(error),
         }
+        Ok(proposals)
     }
-    Ok(proposals)
 }
 
 fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Result<Proposal> {
@@ -131,7 +149,12 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
             (best_candidate(belief, best, &taken, &mut random), ProposalReason::ExpectedBestUtility)
         }
         Method::Thompson if !enumerable => {
-            let candidates = candidates(belief, best, &taken, THOMPSON_CANDIDATES, &mut random);
+            let mut candidates = candidates(belief, best, &taken, THOMPSON_CANDIDATES, &mut random);
+            if let Some(avoidance) = Avoidance::of(belief)
+                && candidates.iter().any(|&action| avoidance.allows(action))
+            {
+                candidates.retain(|&action| avoidance.allows(action));
+            }
             let draw = belief.sampler(&candidates)?.draw(&mut random);
             (highest(&candidates, &draw), ProposalReason::JointThompson)
         }
@@ -187,12 +210,17 @@ fn best_candidate(
 ) -> ActionIndex {
     let space = belief.space();
     let candidates = candidates(belief, best, taken, EUBO_CANDIDATES, random);
+    let avoidance = Avoidance::of(belief);
     let incumbent = belief.utility.view(best, space.levels(best));
     let values: Vec<f64> = candidates
         .iter()
         .map(|&action| {
             let (mean, variance) =
                 belief.utility.difference(&belief.utility.view(action, space.levels(action)), &incumbent);
+            if avoidance.as_ref().is_some_and(|avoidance| !avoidance.allows(action)) {
+                // Below every gain.
+                return -1.0;
+            }
             let chance = match &belief.feasibility {
                 Some(_) => belief.probability_of_converging(action).unwrap_or(1.0),
                 None => 1.0,
@@ -203,15 +231,6 @@ fn best_candidate(
     highest(&candidates, &values)
 }
 
-/// Whether an action reaches the lowest threshold when its mean is raised by the avoidance setting.
-fn reaches(belief: &Posterior, mean: f64, sd: f64) -> bool {
-    let settings = belief.settings();
-    match (settings.avoidance, settings.ordinal_thresholds.first()) {
-        (Some(factor), Some(&threshold)) => mean + factor * sd > threshold,
-        _ => true,
-    }
-}
-
 /// The untried action with the highest joint draw, of those outside the region of avoidance if there are any.
 fn thompson(belief: &Posterior, taken: &HashSet<ActionIndex>, random: &mut Random) -> Result<Option<ActionIndex>> {
     let space = belief.space();
@@ -220,10 +239,9 @@ fn thompson(belief: &Posterior, taken: &HashSet<ActionIndex>, random: &mut Rando
     let mut ranked: Vec<(f64, ActionIndex)> =
         draw.into_iter().zip((0..).map(ActionIndex)).filter(|(_, action)| !taken.contains(action)).collect();
     ranked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let allowed = ranked.iter().find(|(_, action)| {
-        belief.settings().avoidance.is_none()
-            || belief.predict(*action).is_ok_and(|p| reaches(belief, p.mean, p.standard_deviation))
-    });
+    let avoidance = Avoidance::of(belief);
+    let allowed =
+        ranked.iter().find(|(_, action)| avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(*action)));
     Ok(allowed.or(ranked.first()).map(|&(_, action)| action))
 }
 
@@ -239,6 +257,7 @@ fn informative(
 ) -> ActionIndex {
     let space = belief.space();
     let gain = InformationGain::new(belief.settings(), random);
+    let avoidance = Avoidance::of(belief);
     let partner = match belief.settings().partner {
         Partner::Previous => belief.visited().last().copied().unwrap_or(best),
         Partner::Incumbent | Partner::Every => best,
@@ -253,7 +272,7 @@ fn informative(
         let variance = utility.variance(&view);
         let covariance = utility.covariance(&view, &other);
         let rank = (
-            reaches(belief, view.mean, variance.sqrt()),
+            avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(action)),
             gain.of([view.mean, other.mean], [variance, other_variance], covariance),
         );
         if top.is_none_or(|(highest, _)| rank > highest) {
@@ -313,6 +332,7 @@ fn line_cospar(
     }
     let suggested: Vec<ActionIndex> =
         belief.utility.model().points.iter().copied().filter(|a| !taken.contains(a)).collect();
+    let avoidance = Avoidance::of(belief);
     for attempt in 0..MAX_LINES {
         let mut candidates = suggested.clone();
         for action in line::through(space, best, random) {
@@ -320,8 +340,8 @@ fn line_cospar(
                 candidates.push(action);
             }
         }
-        if belief.settings().avoidance.is_some() && attempt < MAX_LINES / 2 {
-            candidates.retain(|&a| belief.predict(a).is_ok_and(|p| reaches(belief, p.mean, p.standard_deviation)));
+        if let Some(avoidance) = avoidance.as_ref().filter(|_| attempt < MAX_LINES / 2) {
+            candidates.retain(|&action| avoidance.allows(action));
         }
         if candidates.is_empty() {
             continue;
@@ -342,8 +362,15 @@ fn line_with_repeats(
 ) -> Result<(ActionIndex, ProposalReason)> {
     let space = belief.space();
     let model = belief.utility.model();
-    let line: Vec<ActionIndex> =
-        line::through(space, best, random).into_iter().filter(|&a| model.slot(a).is_none()).collect();
+    let avoidance = Avoidance::of(belief);
+    let allowed = |action: ActionIndex| avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(action));
+    let line: Vec<ActionIndex> = line::through(space, best, random)
+        .into_iter()
+        .filter(|&action| model.slot(action).is_none() && allowed(action))
+        .collect();
+    // The best action so far can always be tried again: somebody may have to stand on firm ground.
+    let barred: HashSet<ActionIndex> =
+        model.points.iter().copied().filter(|&action| action != best && !allowed(action)).collect();
     let levels: Vec<Vec<usize>> = line.iter().map(|&a| space.levels(a)).collect();
     let buffered: Vec<ActionIndex> = belief.visited().iter().rev().take(belief.settings().buffer).copied().collect();
     let mut chosen = None;
@@ -352,7 +379,7 @@ fn line_with_repeats(
         let all = model.points.iter().zip(&points).chain(line.iter().zip(&others));
         let start = (None, f64::NEG_INFINITY);
         chosen = all
-            .filter(|(action, _)| !pending.contains(action))
+            .filter(|(action, _)| !pending.contains(action) && !barred.contains(action))
             .fold(start, |top, (&a, &f)| if f > top.1 { (Some(a), f) } else { top })
             .0;
         if chosen.is_none_or(|chosen| !buffered.contains(&chosen)) {
@@ -369,6 +396,7 @@ fn line_with_repeats(
 mod tests {
     use super::*;
     use crate::feedback::Feedback;
+    use crate::settings::Labels;
     use crate::space::Dimension;
 
     fn grid() -> SearchSpace {
@@ -419,6 +447,44 @@ mod tests {
     ) -> Vec<ActionIndex> {
         let questions = crate::ask::comparisons_to_ask(space, log, action, settings).unwrap();
         questions.into_iter().map(|q| q.against).collect()
+    }
+
+    #[test]
+    fn the_region_of_avoidance_binds_every_method_but_random_while_anything_is_left() {
+        let space = grid();
+        // Nothing with the highest level of the second dimension converges, everything else does.
+        let converges = |action: ActionIndex| space.levels(action)[1] < 3;
+        for method in [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain] {
+            for (labels, repeats) in [
+                (Labels::InUtility, false),
+                (Labels::Separate, false),
+                (Labels::InUtility, true),
+                (Labels::Separate, true),
+            ] {
+                let settings =
+                    LearnerSettings { labels, repeats, avoidance: Some(-0.3), ..LearnerSettings::of(method) };
+                let mut log = FeedbackLog::default();
+                for action in (0..space.len()).step_by(2).map(ActionIndex) {
+                    log.feedback.push(Feedback::Label { action, category: usize::from(converges(action)) });
+                    log.visited.push(action);
+                }
+                let belief = crate::posterior::posterior(&space, &log, &settings).unwrap();
+                let avoidance = Avoidance::of(&belief).unwrap();
+                let outside = (0..space.len()).map(ActionIndex).filter(|&a| avoidance.allows(a)).count();
+                assert!((1..36).contains(&outside), "{outside} {settings:?}");
+                let mut free =
+                    (0..space.len()).map(ActionIndex).filter(|a| !log.visited.contains(a) && avoidance.allows(*a));
+                assert!(free.next().is_some());
+                for seed in 0..20 {
+                    let proposal = propose(&space, &log, &[], &settings, seed).unwrap();
+                    assert!(avoidance.allows(proposal.action), "{} {settings:?}", proposal.action);
+                }
+                // When everything that is left lies inside, something is proposed nevertheless.
+                let pending: Vec<ActionIndex> =
+                    (0..space.len()).map(ActionIndex).filter(|&a| avoidance.allows(a)).collect();
+                assert!(space.contains(propose(&space, &log, &pending, &settings, 1).unwrap().action));
+            }
+        }
     }
 
     #[test]

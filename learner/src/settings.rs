@@ -127,8 +127,8 @@ pub struct LearnerSettings {
     /// None: they stay as set.
     pub learn_every: Option<usize>,
     /// Region of avoidance: actions whose mean plus this many standard deviations does not reach the lowest
-    /// threshold are not proposed while others are left (ROIAL uses -0.45). It binds LineCoSpar without repeats, joint
-    /// Thompson draws and information gain; EUBO weighs the chance of converging instead. None: nothing is avoided.
+    /// threshold are not proposed while others are left (ROIAL uses -0.45). Mean and deviation are those of the
+    /// function that labels are about. It binds every method but `random`. None: nothing is avoided.
     pub avoidance: Option<f64>,
     /// Number `n` of actions proposed at a time.
     pub samples_per_iteration: usize,

@@ -29,6 +29,9 @@ fn all_settings() -> Vec<LearnerSettings> {
     settings.push(LearnerSettings::published(Method::Eubo));
     settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::default() });
     settings.push(LearnerSettings { learn_every: Some(5), ..LearnerSettings::published(Method::Eubo) });
+    for method in [Method::Eubo, Method::Thompson, Method::InformationGain] {
+        settings.push(LearnerSettings { avoidance: Some(-0.45), ..LearnerSettings::of(method) });
+    }
     settings.push(LearnerSettings {
         inference: Inference::ExpectationPropagation,
         link: Link::Probit,
@@ -126,6 +129,70 @@ fn one_action_one_point_and_no_answer() {
 }
 
 #[test]
+fn nothing_converges_on_the_whole_table() {
+    let space = space(&[2, 3, 3, 3, 4, 6, 3, 3]);
+    let visited: Vec<ActionIndex> = (0..300).map(|i| ActionIndex(i * 37 % space.len())).collect();
+    let feedback = visited.iter().map(|&action| Feedback::Label { action, category: 0 }).collect();
+    let log = FeedbackLog { visited, feedback };
+    for settings in [
+        LearnerSettings::default(),
+        LearnerSettings::of(Method::Eubo),
+        LearnerSettings { avoidance: Some(-0.45), ..LearnerSettings::of(Method::Eubo) },
+        LearnerSettings { avoidance: Some(-0.45), ..LearnerSettings::default() },
+    ] {
+        exercise(&space, &log, &settings);
+    }
+}
+
+#[test]
+fn the_same_action_again_and_again() {
+    // One action tried a thousand times, alone or with a second one, its labels now one way and now the other.
+    let space = space(&[3, 4, 3]);
+    let (a, b) = (ActionIndex(17), ActionIndex(18));
+    for (pair, mixed) in [(false, false), (false, true), (true, false), (true, true)] {
+        let mut log = FeedbackLog::default();
+        for i in 0..1000 {
+            log.visited.push(if pair && i % 2 == 1 { b } else { a });
+            log.feedback.push(Feedback::Label { action: a, category: usize::from(!mixed || i % 3 > 0) });
+            if pair {
+                log.feedback.push(Feedback::Preference { winner: a, loser: b });
+            }
+        }
+        for settings in all_settings() {
+            exercise(&space, &log, &settings);
+            let belief = posterior(&space, &log, &settings).unwrap();
+            // Where labels are separate and the last one says that `a` fails, that alone decides the comparison.
+            if pair && !(mixed && settings.labels == Labels::Separate) {
+                // Laplace's mode hugs the boundary, so it stays cautious whatever the number of answers.
+                let least = if settings.inference == Inference::Laplace { 0.7 } else { 0.9 };
+                let p = belief.preference_probability(a, b).unwrap();
+                assert!(p > least, "{p} {settings:?}");
+            }
+            if !mixed {
+                assert!(belief.probability_of_converging(a).unwrap() > 0.9, "{settings:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_hundred_answers_in_thirty_dimensions() {
+    let space = space(&[2; 30]);
+    let mut log = FeedbackLog::default();
+    for i in 0_u64..50 {
+        let action = ActionIndex(i.wrapping_mul(0x9E37_79B9_7F4A_7C15) % space.len());
+        log.feedback.push(Feedback::Label { action, category: usize::from(i % 4 > 0) });
+        if let Some(&last) = log.visited.last() {
+            log.feedback.push(Feedback::Preference { winner: last, loser: action });
+        }
+        log.visited.push(action);
+    }
+    for settings in all_settings().into_iter().filter(|settings| settings.learn_every.is_none()) {
+        exercise(&space, &log, &settings);
+    }
+}
+
+#[test]
 fn thirty_dimensions() {
     // 2^30 actions cannot be looked at one by one.
     let space = space(&[2; 30]);
@@ -216,6 +283,38 @@ proptest! {
     }
 
     #[test]
+    fn spaces_of_any_shape_and_no_or_few_actions(
+        settings in any_settings(),
+        shape in prop::collection::vec(1_usize..4, 1..6),
+        feedback in prop::collection::vec(any_feedback(1 << 20, 2), 0..20),
+        visited in prop::collection::vec(any::<u64>(), 0..12),
+    ) {
+        let space = space(&shape);
+        let within = |action: ActionIndex| ActionIndex(action.0 % space.len());
+        let feedback = feedback
+            .into_iter()
+            .map(|feedback| match feedback {
+                Feedback::Preference { winner, loser } => {
+                    Feedback::Preference { winner: within(winner), loser: within(loser) }
+                }
+                Feedback::Tie { a, b } => Feedback::Tie { a: within(a), b: within(b) },
+                Feedback::Suggestion { suggested, over } => {
+                    Feedback::Suggestion { suggested: within(suggested), over: within(over) }
+                }
+                Feedback::Label { action, category } => Feedback::Label { action: within(action), category },
+            })
+            .filter(|feedback| match *feedback {
+                Feedback::Preference { winner: a, loser: b }
+                | Feedback::Tie { a, b }
+                | Feedback::Suggestion { suggested: a, over: b } => a != b,
+                Feedback::Label { .. } => true,
+            })
+            .collect();
+        let visited = visited.into_iter().map(|action| within(ActionIndex(action))).collect();
+        exercise(&space, &FeedbackLog { visited, feedback }, &settings);
+    }
+
+    #[test]
     fn the_cache_never_changes_a_bit(
         settings in any_settings(),
         feedback in prop::collection::vec(any_feedback(36, 2), 1..40),
@@ -247,6 +346,14 @@ proptest! {
         prop_assert_eq!(
             propose(&space, &log, &[], &settings, 5).ok(),
             learner.propose(&space, &log, &[], &settings, 5).ok()
+        );
+        prop_assert_eq!(
+            propose_batch(&space, &log, &[ActionIndex(2)], &settings, 5).ok(),
+            learner.propose_batch(&space, &log, &[ActionIndex(2)], &settings, 5).ok()
+        );
+        prop_assert_eq!(
+            what_to_ask(&space, &log, &settings).unwrap(),
+            learner.what_to_ask(&space, &log, &settings).unwrap()
         );
     }
 }

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         &problem.reference,
     )?;
     let guess = GuessSettings::default();
-    let x = motion::guess(&programme, &posture::solve(&programme, &guess)?, &guess);
+    let x = motion::guess(&programme, &posture::solve(&programme, &guess), &guess);
     println!("{}", serde_json::json!({ "subject": problem.subject, "bounds": problem.bounds, "start": x }));
     Ok(())
 }

@@ -12,6 +12,7 @@
 
 mod answer;
 pub mod contact_limits;
+mod elimination_tree;
 pub mod entries;
 pub mod fibres;
 pub mod hip_velocity;

@@ -4,14 +4,17 @@
 //! interior point with a filter line search (Wächter & Biegler, Math. Program. 106, 2006). The path of a solve:
 //!
 //! `solve` -> `formulation` (slacks, fixed variables, scaling) -> `interior_point` { `optimality`, `barrier`,
-//! `inertia_correction`, `newton` (assembly in `kkt`, factorisation behind `kkt_solver`: `multifrontal` or `supernodal`,
-//! chosen in `linear_solver`), `line_search` with `filter`,
-//! and `feasibility` when the line search fails } -> `status::NlpResult`.
+//! `inertia_correction`, `newton` (assembly in `kkt`, factorisation behind `kkt_solver`: `multifrontal` (`front`,
+//! `null_space`, `bunch_kaufman`, `dense_kernels`) or `supernodal`, chosen in `linear_solver`), `line_search` with
+//! `filter`, and `feasibility` when the line search fails } -> `status::NlpResult`.
 
 mod barrier;
+mod bunch_kaufman;
+mod dense_kernels;
 mod feasibility;
 mod filter;
 mod formulation;
+mod front;
 mod inertia_correction;
 mod interior_point;
 mod kkt;
@@ -23,6 +26,7 @@ mod linear_solver;
 mod matrix_tests;
 mod multifrontal;
 mod newton;
+mod null_space;
 mod optimality;
 mod ordering;
 mod problem;

@@ -1,7 +1,6 @@
 //! The public face: one gait problem in, one honest outcome out.
 
 use crate::bounds::TunedBounds;
-use crate::cold_start::ColdStartError;
 use crate::device::Device;
 use crate::gait::Gait;
 use crate::gait_problem::GaitProgramme;
@@ -21,8 +20,8 @@ mod cold_guesses;
 mod run;
 
 pub use cold_guesses::{Attempt, BasinChoice, ColdGuess, ColdRoute, GuessTiming};
-use cold_guesses::{Choice, choose, try_guesses};
-use run::{Context, Run};
+use cold_guesses::{Choice, Tried, choose, try_guesses, try_warm};
+use run::Context;
 
 /// One gait problem.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -271,9 +270,6 @@ pub enum SolveError {
     /// The warm start does not belong to a problem of this shape.
     #[error("the warm start is of another problem: {0}")]
     WarmStartShape(String),
-    /// A convex sub-problem of the cold start could not be solved.
-    #[error("cold start: {0}")]
-    ColdStart(#[from] ColdStartError),
     /// The interior point refused its input.
     #[error(transparent)]
     Solver(#[from] NlpError),
@@ -304,7 +300,8 @@ impl GaitProblem {
 /// Solves one gait problem. Deterministic: same inputs, same bits.
 ///
 /// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]. A warm start
-/// that does not converge falls back to a cold start. `observer` is called once per iteration, on the calling thread.
+/// that does not converge falls back to a cold start; when that does not converge either, the outcome is where the
+/// violation is smallest. `observer` is called once per iteration, on the calling thread.
 /// A solve that ends without a gait is an `Ok` outcome with another status than `Converged`.
 ///
 /// # Errors
@@ -322,21 +319,23 @@ pub fn solve(
         check_shape(problem, &programme, warm)?;
     }
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
-    let mut tally = Tally::default();
+    let mut tried = Vec::new();
     if let Some(warm) = warm_start {
-        let mut run = Run::new(&context, options.threads, observer);
-        let result = run.warm(warm)?;
-        tally.add(&run);
-        let settled = result.status == NlpStatus::Converged || Run::interrupted(&result);
-        let choice = Choice::new(&context, result);
-        tally.attempts.push(choice.attempt("warm start", &run));
+        let warm = try_warm(&context, warm, observer)?;
+        let settled =
+            matches!(warm.choice.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit);
+        tried.push(warm);
         if settled {
-            return Ok(outcome(&context, choice, tally, StartedFrom::Warm));
+            return finish(&context, tried, StartedFrom::Warm, StartedFrom::Warm);
         }
     }
+    let (first, others) = match warm_start {
+        Some(_) => (StartedFrom::Warm, StartedFrom::ColdAfterWarm),
+        None => (StartedFrom::Cold, StartedFrom::Cold),
+    };
     let guesses = if problem.muscles { options.cold_guesses } else { 1 };
-    let tried = try_guesses(&context, &ColdGuess::CATALOGUE[..guesses], observer)?;
-    finish(&context, tried, tally, if warm_start.is_some() { StartedFrom::ColdAfterWarm } else { StartedFrom::Cold })
+    tried.extend(try_guesses(&context, &ColdGuess::CATALOGUE[..guesses], observer)?);
+    finish(&context, tried, first, others)
 }
 
 /// Solves one gait problem cold from the given guesses only: for studies of basins.
@@ -358,16 +357,18 @@ pub fn solve_from_guesses(
     let programme = problem.programme(problem.muscles)?;
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
     let tried = try_guesses(&context, guesses, observer)?;
-    finish(&context, tried, Tally::default(), StartedFrom::Cold)
+    finish(&context, tried, StartedFrom::Cold, StartedFrom::Cold)
 }
 
+/// The outcome of what was tried: `first` and `others` say what the first and the other attempts started from.
 fn finish(
     context: &Context<'_>,
-    tried: Vec<cold_guesses::Tried>,
-    mut tally: Tally,
-    started_from: StartedFrom,
+    tried: Vec<Tried>,
+    first: StartedFrom,
+    others: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
     let chosen = choose(&tried, context.options.basin_choice);
+    let mut tally = Tally::default();
     let mut answer = None;
     for (index, mut one) in tried.into_iter().enumerate() {
         one.attempt.chosen = index == chosen;
@@ -380,7 +381,7 @@ fn finish(
         }
     }
     match answer {
-        Some(answer) => Ok(outcome(context, answer, tally, started_from)),
+        Some(answer) => Ok(outcome(context, answer, tally, if chosen == 0 { first } else { others })),
         None => {
             Err(ModelError::OutOfRange { field: "guesses".to_owned(), value: 0.0, minimum: 1.0, maximum: 1e3 }.into())
         }
@@ -396,14 +397,6 @@ struct Tally {
     attempts: Vec<Attempt>,
 }
 
-impl Tally {
-    fn add(&mut self, run: &Run<'_>) {
-        self.iterations += run.iterations;
-        self.evaluation_s += run.evaluation_s;
-        self.linear_algebra_s += run.linear_algebra_s;
-    }
-}
-
 fn check_shape(problem: &GaitProblem, programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
@@ -414,8 +407,9 @@ fn check_shape(problem: &GaitProblem, programme: &GaitProgramme, warm: &WarmStar
     }
     if warm.mesh != problem.settings.mesh {
         return Err(SolveError::WarmStartShape(format!(
-            "its mesh is {:?}, the problem's is {:?}",
-            warm.mesh, problem.settings.mesh
+            "its mesh is {}, the problem's is {} (intervals of DS2,DS3,SS2,SS1)",
+            in_words(&warm.mesh),
+            in_words(&problem.settings.mesh)
         )));
     }
     let (n, m) = (programme.variables(), programme.rows());
@@ -434,6 +428,10 @@ fn check_shape(problem: &GaitProblem, programme: &GaitProgramme, warm: &WarmStar
         }
     }
     Ok(())
+}
+
+fn in_words(mesh: &Mesh) -> String {
+    format!("{},{},{},{}", mesh.ds2, mesh.ds3, mesh.ss2, mesh.ss1)
 }
 
 fn status_of(status: NlpStatus) -> SolveStatus {

@@ -67,12 +67,20 @@ pub enum Error {
     /// Too many attempts; to be tried again after so many seconds.
     #[error("too many attempts: try again in {0} s")]
     TooManyAttempts(u64),
-    /// The body is larger than is accepted.
-    #[error("{0}")]
-    TooLarge(String),
     /// The thing was changed since it was read.
     #[error("{0}")]
     Changed(String),
+    /// The body is larger than is accepted.
+    #[error("{0}")]
+    TooLarge(String),
+    /// The address exists, but not with this method.
+    #[error("{method} is not possible at {path}")]
+    MethodNotAllowed {
+        /// The method.
+        method: String,
+        /// The address.
+        path: String,
+    },
     /// The request comes from where it may not come from.
     #[error("{0}")]
     Forbidden(String),
@@ -127,7 +135,7 @@ impl From<SolveError> for Error {
         match error {
             SolveError::Model(error) => error.into(),
             SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
-            SolveError::ColdStart(_) | SolveError::Solver(_) => Self::Internal(error.to_string()),
+            SolveError::Solver(_) => Self::Internal(error.to_string()),
         }
     }
 }

@@ -106,6 +106,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
                 seconds: 0.0,
                 objective: 0.1,
                 gait_rmse_rad: rmse,
+                reason: String::new(),
                 chosen: true,
             }],
         },

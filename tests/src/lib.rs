@@ -1,8 +1,9 @@
-//! What the whole-system tests share: an analytic solver in place of the real one, and a service on a temporary
-//! record. The tests live in `tests/tests`.
+//! What the whole-system tests share: an analytic solver in place of the real one, a service on a temporary
+//! record, the command line as a process. The tests live in `tests/tests`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::missing_panics_doc)]
 
 pub mod analytic;
+pub mod cli;
 pub mod client;
 pub mod service;

@@ -3,7 +3,7 @@
 use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
-use gaitwright::http::{Access, AppState, router};
+use gaitwright::http::{Access, AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
@@ -144,7 +144,8 @@ impl Service {
 
     /// The router.
     pub fn router(&self) -> Router {
-        router(AppState::new(self.director.clone(), Arc::clone(&self.access)))
+        let hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &[]);
+        router(AppState::new(self.director.clone(), Arc::clone(&self.access), hosts))
     }
 
     /// `GET`.

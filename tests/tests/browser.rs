@@ -103,6 +103,8 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     }
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let plain = browser.open_without_scripts(&format!("{}/studies/{study}/compare", site.origin)).await;
+    // The answers stand below the pictures of both gaits.
+    plain.resize(1280, 2000).await;
     plain.click_plainly("input[value=b]").await;
     plain.click_plainly("#author").await;
     plain.type_text("K2").await;

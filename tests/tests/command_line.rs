@@ -2,11 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gaitwright_tests::cli;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Output, Stdio};
 
 fn gaitwright(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gaitwright-cli")).current_dir(folder).args(arguments).output().unwrap()
+    cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder, arguments)
 }
 
 /// The arguments are refused with exit code 2, a message that holds `expected`, nothing on stdout and no file left.
@@ -53,7 +54,22 @@ fn malformed_bounds_are_refused_by_name() {
 
 #[test]
 fn other_nonsense_is_refused() {
-    refused(&["tune", "--trials", "0"], "--trials");
+    for command in ["tune", "solve"] {
+        refused(&[command, "--subject", "-1"], "known: 1, 2");
+        refused(&[command, "--height-m", "-1.7", "--mass-kg", "65"], "height_m = -1.7 is outside the allowed range");
+    }
+    for number in ["0", "-1", "10001", "many"] {
+        refused(&["tune", "--trials", number], "'--trials <NUMBER>': allowed is a whole number from 1 to 10000");
+    }
+    refused(&["tune", "--seed", "-1"], "'--seed <NUMBER>': allowed is a whole number from 0 to 9007199254740991");
+    for number in ["0", "-2", "65"] {
+        for command in [&["tune"][..], &["serve"], &["sweep", "--actions", "a.csv", "--out", "o.csv"]] {
+            let arguments = [command, &["--workers", number]].concat();
+            refused(&arguments, "'--workers <NUMBER>': allowed is a whole number from 1 to 64");
+        }
+    }
+    refused(&["solve", "--max-iterations", "-1"], "--max-iterations");
+    refused(&["solve", "--time-limit-s", "-1"], "time_limit_s = -1 is outside the allowed range");
     refused(&["tune", "--muscles", "maybe"], "possible values: on, off");
     refused(&["solve", "--mesh", "4,4"], "four whole numbers");
     refused(&["solve", "--mesh", "0,4,6,6"], "mesh.ds2 = 0");
@@ -95,4 +111,76 @@ fn a_service_without_sign_in_listens_to_this_machine_only() {
     refused(&["serve", "--listen", "0.0.0.0:0"], "until there is an administrator with a password");
     refused(&["serve", "--listen", "here"], "listen (flag)");
     refused(&["serve", "--tls-key", "k.pem"], "tls_certificate");
+}
+
+/// Every file of the folder stays as it is, and none is added.
+#[track_caller]
+fn refused_beside(files: &[&str], arguments: &[&str], expected: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    for file in files {
+        std::fs::write(folder.path().join(file), "this is no database").unwrap();
+    }
+    std::fs::create_dir(folder.path().join("folder")).unwrap();
+    let before = cli::files(folder.path());
+    let output = gaitwright(folder.path(), arguments);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains(expected), "{text}");
+    assert_eq!(cli::files(folder.path()), before, "something was left behind");
+    for file in files {
+        assert_eq!(std::fs::read_to_string(folder.path().join(file)).unwrap(), "this is no database");
+    }
+}
+
+#[test]
+fn what_is_no_database_is_refused_by_name_and_left_alone() {
+    for command in [&["tune"][..], &["serve", "--listen", "127.0.0.1:0"], &["audit", "verify"], &["backup", "copy.db"]]
+    {
+        let with = |file| [command, &["--database", file]].concat();
+        refused_beside(&["notes.txt"], &with("notes.txt"), "notes.txt is not a gaitwright database");
+    }
+    refused_beside(&[], &["tune", "--database", "folder"], "folder is not a gaitwright database: it is a folder");
+    refused_beside(&[], &["tune", "--database", "nowhere/a.db"], "cannot open the database nowhere/a.db");
+    // The first bytes are right, the rest is not.
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = b"SQLite format 3\0".to_vec();
+    bytes.resize(8192, b'x');
+    std::fs::write(folder.path().join("a.db"), bytes).unwrap();
+    let output = gaitwright(folder.path(), &["tune", "--database", "a.db"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("a.db is not a gaitwright database"), "{text}");
+    assert_eq!(cli::files(folder.path()), ["a.db"]);
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_found_before_anything_is_solved() {
+    // Solved with muscles, this would take minutes.
+    refused_beside(&[], &["solve", "--out", "nowhere/gait.json"], "cannot write nowhere/gait.json");
+    refused_beside(&[], &["solve", "--out", "folder"], "cannot write folder: it is a folder");
+    let folder = tempfile::tempdir().unwrap();
+    let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0,0.5,50,40\n";
+    std::fs::write(folder.path().join("actions.csv"), actions).unwrap();
+    let output = gaitwright(folder.path(), &["sweep", "--actions", "actions.csv", "--out", "nowhere/out.csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("cannot write nowhere/out.csv"));
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_fault() {
+    let folder = tempfile::tempdir().unwrap();
+    let binary = env!("CARGO_BIN_EXE_gaitwright-cli");
+    let fast = ["solve", "--muscles", "off", "--mesh", "2,2,2,2", "--max-iterations", "1"];
+    for more in [&["--json"][..], &[]] {
+        let mut child = cli::command(binary, folder.path(), &[&fast, more].concat())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{text}");
+        assert!(!text.contains("panicked"), "{text}");
+    }
 }

@@ -2,17 +2,23 @@
 //!
 //! ```text
 //! cargo run --release -p gait-learner --example regret -- --problem table1|hart3|hart6 --seeds A..B --method NAME
-//!     --comparisons N [--noise S] [--lengthscale L] [--set '{"setting": value}'] --out FILE.csv
+//!     --comparisons N [--noise S] [--lengthscale L] [--batch N] [--set '{"setting": value}'] --out FILE.csv
+//! cargo run --release -p gait-learner --example regret -- --summarise FILE.csv...
 //! ```
 //!
 //! NAME is `random` (the winner stays), a method (`linecospar`, `eubo`, `thompson`, `information_gain`) with its
-//! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the
-//! quartiles. `--noise S` answers with logistic noise of scale `S` on the utility. `--set` changes settings of the
-//! method. Regret is 1 minus the utility of the recommended action.
+//! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having
+//! been answered (`k + 1` actions tried), and prints the quartiles. `--noise S` answers with logistic noise of scale
+//! `S` on the utility. `--batch N` proposes `N` actions before the first of them is answered. `--set` changes settings
+//! of the method. Regret is 1 minus the utility of the recommended action.
+//!
+//! `--summarise` reads such files: medians with bootstrap intervals and quartiles, and, of every further file against
+//! the first, how many seeds were better and worse with the p-values of the paired sign test and of Wilcoxon's.
 
 #![allow(clippy::expect_used, unreachable_pub, missing_docs)]
 
 mod problems;
+mod summary;
 
 use std::error::Error;
 use std::io::Write;
@@ -20,6 +26,7 @@ use std::time::Instant;
 
 use gait_learner::{ActionIndex, Feedback, FeedbackLog, Learner, LearnerSettings};
 use problems::{Problem, SplitMix64};
+use summary::{Curves, quantile, report};
 
 struct Options {
     problem: String,
@@ -28,6 +35,7 @@ struct Options {
     comparisons: usize,
     noise: f64,
     lengthscale: Option<f64>,
+    batch: usize,
     set: serde_json::Map<String, serde_json::Value>,
     out: Option<String>,
 }
@@ -40,6 +48,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
         comparisons: 50,
         noise: 0.0,
         lengthscale: None,
+        batch: 1,
         set: serde_json::Map::new(),
         out: None,
     };
@@ -56,6 +65,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--comparisons" => options.comparisons = value.parse()?,
             "--noise" => options.noise = value.parse()?,
             "--lengthscale" => options.lengthscale = Some(value.parse()?),
+            "--batch" => options.batch = value.parse::<usize>()?.max(1),
             "--set" => options.set = serde_json::from_str(&value)?,
             "--out" => options.out = Some(value),
             _ => return Err(format!("unknown option {name}").into()),
@@ -113,17 +123,23 @@ fn run(options: &Options, settings: Option<&LearnerSettings>, seed: u64) -> Resu
     let mut log = FeedbackLog::default();
     let mut regrets = Vec::new();
     while regrets.len() <= options.comparisons {
-        let proposal = learner.propose(&problem.space, &log, &[], settings, seed)?;
-        let action = proposal.action;
-        let questions = learner.comparisons_to_ask(&problem.space, &log, action, settings)?;
-        if labelled {
-            log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
+        // Everything in a batch is proposed before anything in it is answered.
+        let mut batch: Vec<ActionIndex> = Vec::new();
+        while batch.len() < options.batch {
+            batch.push(learner.propose(&problem.space, &log, &batch, settings, seed)?.action);
         }
-        log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
-        log.visited.push(action);
-        let best = learner.posterior(&problem.space, &log, settings)?.best().ok_or("nothing was tried")?;
-        regrets.push(1.0 - problem.of(best).0);
+        for action in batch {
+            let questions = learner.comparisons_to_ask(&problem.space, &log, action, settings)?;
+            if labelled {
+                log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
+            }
+            log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
+            log.visited.push(action);
+            let best = learner.posterior(&problem.space, &log, settings)?.best().ok_or("nothing was tried")?;
+            regrets.push(1.0 - problem.of(best).0);
+        }
     }
+    regrets.truncate(options.comparisons + 1);
     Ok(regrets)
 }
 
@@ -145,15 +161,26 @@ fn champion(problem: &Problem, person: &mut Person<'_>, comparisons: usize, seed
     regrets
 }
 
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let at = share * (sorted.len() - 1) as f64;
-    let (below, weight) = (at.floor(), at.fract());
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let i = below as usize;
-    sorted[i] + weight * (sorted[(i + 1).min(sorted.len() - 1)] - sorted[i])
+/// Prints the summary of files.
+fn summarise(files: &[String]) -> Result<(), Box<dyn Error>> {
+    let curves = files
+        .iter()
+        .map(|file| {
+            let text = std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?;
+            Ok((file.clone(), Curves::read(&text).map_err(|error| format!("{file}: {error}"))?))
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    print!("{}", report(&curves));
+    Ok(())
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some((first, files)) = arguments.split_first()
+        && first == "--summarise"
+    {
+        return summarise(files);
+    }
     let options = options()?;
     let settings = if options.method == "random" { None } else { Some(settings(&options)?) };
     let mut out = options.out.as_ref().map(std::fs::File::create).transpose()?;

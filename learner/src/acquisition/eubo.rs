@@ -7,6 +7,7 @@
 
 use std::collections::HashSet;
 
+use crate::acquisition::avoidance::Avoidance;
 use crate::belief::Belief;
 use crate::grid::Grid;
 use crate::linalg::BLOCK;
@@ -53,6 +54,30 @@ impl GainBound {
     }
 }
 
+/// Upper bounds of the normal distribution function left of 0, where it is convex, by linear interpolation.
+struct ProbabilityBound {
+    table: Vec<f64>,
+}
+
+impl ProbabilityBound {
+    fn new() -> Self {
+        let at = |i: u32| math::normal_cdf(f64::from(i) / GainBound::STEPS - GainBound::REACH);
+        Self { table: (0..=256).map(at).collect() }
+    }
+
+    fn of(&self, z: f64) -> f64 {
+        let at = ((z + GainBound::REACH) * GainBound::STEPS).max(0.0);
+        if at >= 255.0 {
+            return 1.0;
+        }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0..255")]
+        let i = at as usize;
+        let weight = at - i as f64;
+        // A little more covers the rounding of the interpolation.
+        (self.table[i] + weight * (self.table[i + 1] - self.table[i])) * (1.0 + 1e-12)
+    }
+}
+
 /// The utility of every action beside the incumbent's.
 struct Duel<'a> {
     grid: Grid<'a>,
@@ -75,7 +100,8 @@ impl<'a> Duel<'a> {
         let view = belief.view(best, space.levels(best));
         let incumbent_variance = belief.variance(&view);
         let prior = grid.prior_with(space, best);
-        let (means, mut covariances) = grid.forms(&belief.approximation().weights, &belief.covariance_weights(&view));
+        let means = grid.form(&belief.approximation().weights);
+        let mut covariances = grid.form(&belief.covariance_weights(&view));
         for (covariance, prior) in covariances.iter_mut().zip(&prior) {
             *covariance += prior;
         }
@@ -101,7 +127,7 @@ impl<'a> Duel<'a> {
         let (Ok(at), Ok(incumbent)) = (usize::try_from(action.0), usize::try_from(best.0)) else { return };
         let view = belief.view(action, space.levels(action));
         let weights = belief.covariance_weights(&view);
-        let mut column = self.grid.forms(&weights, &weights).0;
+        let mut column = self.grid.form(&weights);
         for (value, prior) in column.iter_mut().zip(self.grid.prior_with(space, action)) {
             *value += prior;
         }
@@ -154,19 +180,18 @@ struct Chance<'a> {
     means: Vec<f64>,
     threshold: f64,
     prior_sd: f64,
+    bounds: ProbabilityBound,
 }
 
 impl<'a> Chance<'a> {
     fn new(space: &SearchSpace, belief: &'a Belief, threshold: f64) -> Self {
         let grid = Grid::new(space, belief);
-        let weights = &belief.approximation().weights;
-        let means = grid.forms(weights, weights).0;
-        Self { grid, means, threshold, prior_sd: belief.kernel.variance.sqrt() }
+        let means = grid.form(&belief.approximation().weights);
+        Self { grid, means, threshold, prior_sd: belief.kernel.variance.sqrt(), bounds: ProbabilityBound::new() }
     }
 
     fn bound(&self, x: usize) -> f64 {
-        let z = (self.means[x] - self.threshold) / self.prior_sd;
-        if z >= 0.0 { 1.0 } else { math::normal_cdf(z) }
+        self.bounds.of((self.means[x] - self.threshold) / self.prior_sd)
     }
 
     fn of(&self, actions: &[usize]) -> Vec<f64> {
@@ -178,13 +203,29 @@ impl<'a> Chance<'a> {
 
 /// The action outside `taken` with the highest expected utility of the better of it and `best`, times its
 /// probability of being feasible where that is a function of its own. `among` restricts the search; the utilities of
-/// `pending` actions are supposed to become known.
+/// `pending` actions are supposed to become known. Actions in the region of avoidance only where nothing else is left.
 pub(crate) fn against(
     belief: &Posterior,
     best: ActionIndex,
     taken: &HashSet<ActionIndex>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
+) -> Option<ActionIndex> {
+    let avoidance = Avoidance::of(belief);
+    let found = maximiser(belief, best, taken, pending, among, avoidance.as_ref());
+    if found.is_none() && avoidance.is_some() {
+        return maximiser(belief, best, taken, pending, among, None);
+    }
+    found
+}
+
+fn maximiser(
+    belief: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    pending: &[ActionIndex],
+    among: Option<&[ActionIndex]>,
+    avoidance: Option<&Avoidance<'_>>,
 ) -> Option<ActionIndex> {
     let space = belief.space();
     let duel = Duel::new(space, &belief.utility, best, pending);
@@ -211,12 +252,19 @@ pub(crate) fn against(
     for action in taken {
         mark(action, false);
     }
+    if let Some(avoidance) = avoidance {
+        let means = chance.as_ref().map_or(&duel.means, |chance| &chance.means);
+        for (free, &mean) in free.iter_mut().zip(means) {
+            *free &= !avoidance.rules_out(mean);
+        }
+    }
     let mut ranked: Vec<(f64, usize)> = (0..free.len()).filter(|&x| free[x]).map(|x| (bound(x), x)).collect();
     let order = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     let mut top: Option<(f64, usize)> = None;
     let mut consider = |chunk: &[(f64, usize)]| {
         let highest = top.map_or(f64::NEG_INFINITY, |(value, _)| value);
-        let actions: Vec<usize> = chunk.iter().map(|c| c.1).collect();
+        let allowed = |x: &usize| avoidance.is_none_or(|avoidance| avoidance.allows(ActionIndex(*x as u64)));
+        let actions: Vec<usize> = chunk.iter().map(|c| c.1).filter(allowed).collect();
         let gains: Vec<(usize, f64)> = actions
             .iter()
             .zip(duel.grid.variances(&actions))

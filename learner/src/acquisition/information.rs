@@ -15,6 +15,7 @@ const DRAWS: usize = 256;
 /// Shared standard normals.
 pub(crate) struct InformationGain<'a> {
     settings: &'a LearnerSettings,
+    labels: Vec<Interval>,
     normals: Vec<[f64; 2]>,
 }
 
@@ -24,7 +25,8 @@ fn entropy(p: f64) -> f64 {
 
 impl<'a> InformationGain<'a> {
     pub(crate) fn new(settings: &'a LearnerSettings, random: &mut Random) -> Self {
-        Self { settings, normals: (0..DRAWS).map(|_| [random.normal(), random.normal()]).collect() }
+        let labels = (0..settings.categories()).map(|category| settings.label_interval(category)).collect();
+        Self { settings, labels, normals: (0..DRAWS).map(|_| [random.normal(), random.normal()]).collect() }
     }
 
     /// Information, in nats, of comparing and labelling an action, given means, variances and covariance of its
@@ -41,14 +43,14 @@ impl<'a> InformationGain<'a> {
         for [z, w] in &self.normals {
             let f = mean[0] + sd * z;
             let partner = mean[1] + slope * z + rest * w;
-            let preferred = math::exp(better.log_likelihood(settings.link, f - partner).value);
+            let preferred = better.probability(settings.link, f - partner);
+            // Given the utilities the two answers are independent: their uncertainties add up.
+            conditional += (entropy(preferred) + entropy(1.0 - preferred)) / DRAWS as f64;
             for category in 0..categories {
-                let label = settings.label_interval(category).log_likelihood(settings.link, f).value;
-                for (index, p) in [preferred, 1.0 - preferred].into_iter().enumerate() {
-                    let joint = p * math::exp(label);
-                    marginal[2 * category + index] += joint / DRAWS as f64;
-                    conditional += entropy(joint) / DRAWS as f64;
-                }
+                let label = self.labels[category].probability(settings.link, f);
+                conditional += entropy(label) / DRAWS as f64;
+                marginal[2 * category] += preferred * label / DRAWS as f64;
+                marginal[2 * category + 1] += (1.0 - preferred) * label / DRAWS as f64;
             }
         }
         marginal.into_iter().map(entropy).sum::<f64>() - conditional

@@ -1,5 +1,6 @@
 //! Ways to choose the next action.
 
+pub(crate) mod avoidance;
 pub(crate) mod eubo;
 pub(crate) mod information;
 pub(crate) mod line;

@@ -84,8 +84,7 @@ pub(crate) fn draw(space: &SearchSpace, belief: &Belief, grid: &Grid<'_>, random
         .map(|(action, target)| target - sample[at(action.0)] - nugget * random.normal())
         .collect();
     model.prior.solve(&mut residual);
-    let (update, _) = grid.forms(&residual, &residual);
-    for (value, change) in sample.iter_mut().zip(update) {
+    for (value, change) in sample.iter_mut().zip(grid.form(&residual)) {
         *value += change;
     }
     for (action, target) in model.points.iter().zip(targets) {

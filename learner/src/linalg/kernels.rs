@@ -10,6 +10,10 @@ use pulp::{Arch, Simd, WithSimd};
 /// Number of interleaved partial sums of an inner product, and of right-hand sides of a block.
 pub(super) const LANES: usize = 16;
 
+/// Rows and columns of the pieces in which products of matrices are computed: as many sums as registers hold.
+const TILE_ROWS: usize = 4;
+const TILE: usize = 8;
+
 /// Defines a function whose body is compiled once for every vector unit. Bodies use plain loops: a closure would be
 /// compiled apart, for the least of them.
 macro_rules! kernels {
@@ -67,6 +71,42 @@ fn add_scaled_inline(y: &mut [f64], a: f64, x: &[f64]) {
     }
 }
 
+/// `T_rk = sum_w A_wr B_wk`.
+#[inline(always)]
+fn tile_product(a: &[[f64; TILE_ROWS]], b: &[[f64; TILE]]) -> [[f64; TILE]; TILE_ROWS] {
+    // Four named sums: as an array of arrays they would not be kept in registers.
+    let (mut t0, mut t1, mut t2, mut t3) = ([0.0_f64; TILE], [0.0_f64; TILE], [0.0_f64; TILE], [0.0_f64; TILE]);
+    for (x, y) in a.iter().zip(b) {
+        for k in 0..TILE {
+            t0[k] = x[0].mul_add(y[k], t0[k]);
+        }
+        for k in 0..TILE {
+            t1[k] = x[1].mul_add(y[k], t1[k]);
+        }
+        for k in 0..TILE {
+            t2[k] = x[2].mul_add(y[k], t2[k]);
+        }
+        for k in 0..TILE {
+            t3[k] = x[3].mul_add(y[k], t3[k]);
+        }
+    }
+    [t0, t1, t2, t3]
+}
+
+/// Adds a row of a tile to what is left of a row of a matrix.
+#[inline(always)]
+fn add_tile_row(rest: &mut [f64], row: &[f64; TILE]) {
+    if let Some(whole) = rest.first_chunk_mut::<TILE>() {
+        for k in 0..TILE {
+            whole[k] += row[k];
+        }
+    } else {
+        for k in 0..rest.len() {
+            rest[k] += row[k];
+        }
+    }
+}
+
 kernels! {
     /// Inner product.
     pub(crate) fn dot<'a>(a: &'a [f64], b: &'a [f64]) -> f64 {
@@ -86,25 +126,67 @@ kernels! {
         }
     }
 
-    /// `y = A a` and `z = A b`.
-    pub(crate) fn multiply_two<'a>(
-        rows: &'a [f64], a: &'a [f64], b: &'a [f64], y: &'a mut [f64], z: &'a mut [f64]
+    /// `C_yz += sum_w L_wy weight_w R_wz`, all by rows, `C` with the given number of columns.
+    pub(crate) fn add_scaled_products<'a>(
+        left: &'a [f64], right: &'a [f64], weights: &'a [f64], c: &'a mut [f64], columns: usize
     ) {
-        let n = a.len();
-        for i in 0..y.len() {
-            let row = &rows[i * n..(i + 1) * n];
-            y[i] = dot_inline(row, a);
-            z[i] = dot_inline(row, b);
+        let depth = weights.len();
+        if depth == 0 || columns == 0 {
+            return;
+        }
+        let rows = c.len() / columns;
+        // Both sides in panels that lie in memory as they are read.
+        let groups = rows.div_ceil(TILE_ROWS);
+        let mut scaled = vec![[0.0_f64; TILE_ROWS]; groups * depth];
+        for w in 0..depth {
+            for y in 0..rows {
+                scaled[y / TILE_ROWS * depth + w][y % TILE_ROWS] = left[w * rows + y] * weights[w];
+            }
+        }
+        let mut panel = vec![[0.0_f64; TILE]; depth];
+        for z in (0..columns).step_by(TILE) {
+            let wide = TILE.min(columns - z);
+            for w in 0..depth {
+                panel[w][..wide].copy_from_slice(&right[w * columns + z..w * columns + z + wide]);
+            }
+            for group in 0..groups {
+                let tile = tile_product(&scaled[group * depth..(group + 1) * depth], &panel);
+                for r in 0..TILE_ROWS.min(rows - group * TILE_ROWS) {
+                    let y = group * TILE_ROWS + r;
+                    add_tile_row(&mut c[y * columns + z..(y + 1) * columns], &tile[r]);
+                }
+            }
         }
     }
 
-    /// `A += sum_k a_k x_k x_k'`, row by row, so that each row is read once.
-    pub(super) fn add_rank_ones<'a>(rows: &'a mut [f64], changes: &'a [(f64, Vec<f64>)], n: usize) {
-        for i in 0..n {
-            let row = &mut rows[i * n..(i + 1) * n];
-            for c in 0..changes.len() {
-                let x = &changes[c].1;
-                add_scaled_inline(row, changes[c].0 * x[i], x);
+    /// `A += sum_k a_k x_k x_k'`, tile by tile, so that the matrix is read and written once.
+    pub(super) fn add_rank_ones<'a>(matrix: &'a mut [f64], changes: &'a [(f64, Vec<f64>)], n: usize) {
+        let depth = changes.len();
+        if depth == 0 {
+            return;
+        }
+        let mut panels = vec![[0.0_f64; TILE]; n.div_ceil(TILE) * depth];
+        for c in 0..depth {
+            let x = &changes[c].1;
+            for z in (0..n).step_by(TILE) {
+                let wide = TILE.min(n - z);
+                panels[z / TILE * depth + c][..wide].copy_from_slice(&x[z..z + wide]);
+            }
+        }
+        let mut scaled = vec![[0.0_f64; TILE_ROWS]; depth];
+        for y in (0..n).step_by(TILE_ROWS) {
+            let high = TILE_ROWS.min(n - y);
+            for c in 0..depth {
+                let (a, x) = (changes[c].0, &changes[c].1);
+                for r in 0..high {
+                    scaled[c][r] = a * x[y + r];
+                }
+            }
+            for z in (0..n).step_by(TILE) {
+                let tile = tile_product(&scaled, &panels[z / TILE * depth..(z / TILE + 1) * depth]);
+                for r in 0..high {
+                    add_tile_row(&mut matrix[(y + r) * n + z..(y + r + 1) * n], &tile[r]);
+                }
             }
         }
     }

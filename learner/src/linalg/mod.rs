@@ -4,7 +4,7 @@
 
 mod kernels;
 
-pub(crate) use kernels::{add_scaled, block_dots, dot, multiply_two};
+pub(crate) use kernels::{add_scaled, add_scaled_products, block_dots, dot};
 
 use crate::error::{LearnerError, Result};
 
@@ -54,11 +54,14 @@ impl Square {
 
     /// The matrix with `extra` rows and columns of zeros added.
     pub(crate) fn grown(&self, extra: usize) -> Self {
-        let mut grown = Self::zeros(self.n + extra);
+        let n = self.n + extra;
+        let mut data = Vec::with_capacity(n * n);
         for i in 0..self.n {
-            grown.row_mut(i)[..self.n].copy_from_slice(self.row(i));
+            data.extend_from_slice(self.row(i));
+            data.resize((i + 1) * n, 0.0);
         }
-        grown
+        data.resize(n * n, 0.0);
+        Self { n, data }
     }
 
     /// The matrix with a number added on its diagonal.
@@ -113,6 +116,13 @@ impl Cholesky {
             factor.append(&matrix.row(i)[..=i])?;
         }
         Ok(factor)
+    }
+
+    /// A copy with room for one more row.
+    pub(crate) fn roomy(&self) -> Self {
+        let mut packed = Vec::with_capacity(self.packed.len() + self.n + 1);
+        packed.extend_from_slice(&self.packed);
+        Self { n: self.n, packed }
     }
 
     /// Appends a row of the matrix: its covariances with the earlier ones, then its variance.

@@ -1,6 +1,5 @@
 //! From a motion with torques to muscle states: forces by non-negative least squares, then tendon, fibre, activation.
 
-use super::ColdStartError;
 use crate::gait_problem::{GaitProgramme, PointVariables};
 use crate::muscle::{MUSCLE_COUNT, MUSCLES, force_length, force_velocity};
 use clarabel::algebra::CscMatrix;
@@ -16,17 +15,15 @@ const FORCE_RANGE: (f64, f64) = (1e-3, 1.2);
 const REFERENCE_STRAIN: f64 = 0.04;
 
 /// Takes a point without muscles (`x_plain` of `plain`) into the layout of `programme` and fills the muscle states.
-///
-/// # Errors
-/// [`ColdStartError`] when a force distribution is not solved.
-pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) -> Result<Vec<f64>, ColdStartError> {
+/// Where no force distribution is found, the muscles rest.
+pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) -> Vec<f64> {
     let mut x = programme.adopt_globals(plain, x_plain);
     for (d, domain) in programme.layout.domains.iter().enumerate() {
         let mut points: Vec<PointVariables> =
             (0..domain.points).map(|k| plain.layout.point_variables(x_plain, d, k)).collect();
         let mut forces = Vec::with_capacity(points.len());
         for point in &mut points {
-            let force = distribute(point)?;
+            let force = distribute(point).unwrap_or([REST_FORCE; MUSCLE_COUNT]);
             for m in 0..MUSCLE_COUNT {
                 let muscle = &MUSCLES[m];
                 let tendon = muscle.slack_length_m * (1.0 + REFERENCE_STRAIN * force[m].sqrt());
@@ -52,11 +49,11 @@ pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) 
             programme.layout.set_point_variables(&mut x, d, k, point);
         }
     }
-    Ok(x)
+    x
 }
 
 /// `min |(A F - u)/100|^2 + w |F - rest|^2` over F >= 0 in units of F_max, u the four muscle-driven torques.
-fn distribute(point: &PointVariables) -> Result<[f64; MUSCLE_COUNT], ColdStartError> {
+fn distribute(point: &PointVariables) -> Option<[f64; MUSCLE_COUNT]> {
     let mut a = [[0.0; MUSCLE_COUNT]; 4];
     for (m, muscle) in MUSCLES.iter().enumerate() {
         for attachment in muscle.attachments.iter().flatten() {
@@ -73,9 +70,7 @@ fn distribute(point: &PointVariables) -> Result<[f64; MUSCLE_COUNT], ColdStartEr
         p[m][m] += 2.0 * REST_WEIGHT;
         c[m] = -2.0 * REST_WEIGHT * REST_FORCE - 2.0 * (0..4).map(|row| a[row][m] * point.u[row] / 100.0).sum::<f64>();
     }
-    let failed = |status: String| ColdStartError::SubProblem { what: "muscle forces", status };
-    let settings =
-        DefaultSettingsBuilder::default().verbose(false).max_iter(100).build().map_err(|e| failed(e.to_string()))?;
+    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(100).build().ok()?;
     let minus_identity = CscMatrix::new(
         MUSCLE_COUNT,
         MUSCLE_COUNT,
@@ -85,11 +80,9 @@ fn distribute(point: &PointVariables) -> Result<[f64; MUSCLE_COUNT], ColdStartEr
     );
     let quadratic = CscMatrix::from(&p);
     let cones = [SupportedConeT::NonnegativeConeT(MUSCLE_COUNT)];
-    let mut solver = DefaultSolver::new(&quadratic, &c, &minus_identity, &[0.0; MUSCLE_COUNT], &cones, settings)
-        .map_err(|e| failed(e.to_string()))?;
+    let mut solver =
+        DefaultSolver::new(&quadratic, &c, &minus_identity, &[0.0; MUSCLE_COUNT], &cones, settings).ok()?;
     solver.solve();
-    if !matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved) {
-        return Err(failed(format!("{:?}", solver.solution.status)));
-    }
-    Ok(std::array::from_fn(|m| solver.solution.x[m].clamp(FORCE_RANGE.0, FORCE_RANGE.1)))
+    let solved = matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
+    solved.then(|| std::array::from_fn(|m| solver.solution.x[m].clamp(FORCE_RANGE.0, FORCE_RANGE.1)))
 }

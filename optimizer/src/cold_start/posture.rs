@@ -2,9 +2,10 @@
 //!
 //! minimise `|q[2..] - q_ref|^2 + 0.3 (px - px0)^2 + w |second differences|^2` over all points of the stride, subject
 //! to the contact positions, non-negative heights of the other foot points, and joint ranges. Solved as a short
-//! sequence of convex QPs with linearised kinematics.
+//! sequence of convex QPs with linearised kinematics. Where bounds leave no such posture, every row may give way at a
+//! price: this is a guess, and whether there is a gait is for the gait problem to say.
 
-use super::{ColdStartError, GuessSettings};
+use super::GuessSettings;
 use crate::body::PointState;
 use crate::gait::Axis;
 use crate::gait_problem::GaitProgramme;
@@ -15,6 +16,8 @@ use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverSt
 const HIP_WEIGHT: f64 = 0.3;
 /// Weight of second differences, relative to the tracking weight 1.
 const SMOOTHNESS: f64 = 30.0;
+/// Price of what a row gives way, m^2 or rad^2, once there is no posture that meets all of them.
+const ROW_PRICE: f64 = 1e4;
 /// Linearisations.
 const PASSES: usize = 8;
 /// Stop when no coordinate moves more than this, m or rad.
@@ -62,13 +65,18 @@ impl Triplets {
     }
 }
 
-/// Coordinates of every point of every domain: `result[d][k]`.
-///
-/// # Errors
-/// [`ColdStartError`] when a sub-problem is not solved.
-pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec<[f64; 9]>>, ColdStartError> {
+/// Whether the rows of a step must be met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rows {
+    /// Each of them.
+    Hard,
+    /// Each may give way at [`ROW_PRICE`]: there is always a step.
+    Soft,
+}
+
+/// Coordinates of every point of every domain: `result[d][k]`. As near to the contacts and ranges as the bounds allow.
+pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Vec<Vec<[f64; 9]>> {
     let instants = instants(programme);
-    let count = instants.len();
     let stride = guess.stride_length_m;
     let speed = stride / guess.stride_time_s;
     let right_step = 0.5 * stride;
@@ -92,8 +100,15 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec
         .collect();
     let mut q = targets.clone();
     let torso = programme.variable_range(programme.layout.domains[0].point(0) + 2);
+    let mut rows = Rows::Hard;
     for pass in 0..PASSES {
-        let step = linearised_step(programme, &instants, &targets, &q, right_step, stride, torso)?;
+        let step_with = |rows| linearised_step(programme, &instants, &targets, &q, right_step, stride, torso, rows);
+        let mut step = step_with(rows);
+        if step.is_none() && rows == Rows::Hard {
+            rows = Rows::Soft;
+            step = step_with(rows);
+        }
+        let Some(step) = step else { break };
         let mut largest = 0.0_f64;
         for (i, row) in q.iter_mut().enumerate() {
             for c in 0..9 {
@@ -112,8 +127,7 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Result<Vec<Vec
             result[d][k] = q[i];
         }
     }
-    let _ = count;
-    Ok(result)
+    result
 }
 
 /// Joint ranges of the guess, inside the ranges of the programme.
@@ -128,6 +142,8 @@ fn joint_range(coordinate: usize, torso: (f64, f64), hip_ankle: [(f64, f64); 9])
     Some((low.max(own.0), high.min(own.1)))
 }
 
+/// The step over all points; `None` when there is none with such rows.
+#[allow(clippy::too_many_arguments)] // one call
 fn linearised_step(
     programme: &GaitProgramme,
     instants: &[Instant],
@@ -136,12 +152,13 @@ fn linearised_step(
     right_step: f64,
     stride: f64,
     torso: (f64, f64),
-) -> Result<Vec<f64>, ColdStartError> {
+    rows_are: Rows,
+) -> Option<Vec<f64>> {
     let count = instants.len();
-    let n = 9 * count;
+    let coordinates = 9 * count;
     // Objective 1/2 x'Px + c'x over the step x.
     let mut p = Triplets::default();
-    let mut c = vec![0.0; n];
+    let mut c = vec![0.0; coordinates];
     for i in 0..count {
         for coordinate in 0..9 {
             let weight = match coordinate {
@@ -249,17 +266,20 @@ fn linearised_step(
     }
     let mut rhs = equality_rhs;
     rhs.extend(inequality_rhs);
-    let settings = DefaultSettingsBuilder::default()
-        .verbose(false)
-        .max_iter(100)
-        .build()
-        .map_err(|e| ColdStartError::SubProblem { what: "posture", status: e.to_string() })?;
-    let cones = [SupportedConeT::ZeroConeT(ne), SupportedConeT::NonnegativeConeT(ni)];
-    let mut solver = DefaultSolver::new(&p.matrix(n, n), &c, &rows.matrix(ne + ni, n), &rhs, &cones, settings)
-        .map_err(|e| ColdStartError::SubProblem { what: "posture", status: e.to_string() })?;
-    solver.solve();
-    match solver.solution.status {
-        SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(solver.solution.x.clone()),
-        other => Err(ColdStartError::SubProblem { what: "posture", status: format!("{other:?}") }),
+    let mut n = coordinates;
+    if rows_are == Rows::Soft {
+        // One more unknown for each row: by how much it gives way.
+        for row in 0..ne + ni {
+            rows.push(row, n, -1.0);
+            p.push(n, n, 2.0 * ROW_PRICE);
+            n += 1;
+        }
+        c.resize(n, 0.0);
     }
+    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(100).build().ok()?;
+    let cones = [SupportedConeT::ZeroConeT(ne), SupportedConeT::NonnegativeConeT(ni)];
+    let mut solver = DefaultSolver::new(&p.matrix(n, n), &c, &rows.matrix(ne + ni, n), &rhs, &cones, settings).ok()?;
+    solver.solve();
+    let solved = matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
+    solved.then(|| solver.solution.x[..coordinates].to_vec())
 }

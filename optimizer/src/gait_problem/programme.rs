@@ -1,10 +1,11 @@
 //! The programme as the solver sees it: traversal of all rows for values, Jacobian and Hessian.
 
+use super::elimination_tree::elimination_tree;
 use super::entries::{Compressed, Entries};
 use super::layout::{DomainLayout, Layout, PointVariables};
 use super::limits::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
 use super::objective::ObjectiveParts;
-use super::rows::{RowKind, RowTable};
+use super::rows::RowTable;
 use super::zero_dynamics;
 use super::{contact_limits, fibres, hip_velocity, mechanics, muscle_forces, objective, outputs, stride, transitions};
 use crate::body::dynamics::LinkHessian;
@@ -421,69 +422,7 @@ impl GaitProgramme {
         entries.clear();
         self.write_hessian(&x, 1.0, &vec![1.0; m], &mut Entries::structure(&self.layout.scale, &mut entries));
         let hessian = Compressed::new(n, n, &entries);
-        Structure { jacobian, hessian, blocks: self.elimination_tree() }
-    }
-
-    /// One block per mesh point under one block per domain (Bezier coefficients, phase limits, integration rows)
-    /// under one root (durations, hip velocities, lengths, impulses, resets). With muscles their states and force rows
-    /// are a block of their own under each point, which they meet in four angles and four torque rows only. The
-    /// velocities before an impact and the rows that determine them move to the root, because the impact couples them
-    /// with the next domain.
-    fn elimination_tree(&self) -> EliminationBlocks {
-        let per_point = if self.layout.muscles { 2 } else { 1 };
-        let points: usize = self.layout.domains.iter().map(|d| d.points * per_point).sum();
-        let root = points + CYCLE.len();
-        let mut blocks = EliminationBlocks {
-            parent: vec![Some(root); root + 1],
-            block_of_variable: vec![root; self.layout.variables],
-            block_of_row: vec![root; self.rows.names.len()],
-        };
-        blocks.parent[root] = None;
-        let mut first_block = vec![0; CYCLE.len()];
-        let mut block = 0;
-        for (d, domain) in self.layout.domains.iter().enumerate() {
-            first_block[d] = block;
-            let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();
-            for k in 0..domain.points {
-                let p = domain.point(k);
-                if self.layout.muscles {
-                    blocks.parent[block] = Some(block + 1);
-                    blocks.block_of_variable[p + domain.fibre_length()..p + domain.per_point].fill(block);
-                    block += 1;
-                }
-                blocks.parent[block] = Some(points + d);
-                blocks.block_of_variable[p..p + domain.fibre_length()].fill(block);
-                if into_impact && k == domain.last() {
-                    blocks.block_of_variable[p + super::layout::QD..p + super::layout::QDD].fill(root);
-                }
-                block += 1;
-            }
-            let own = points + d;
-            blocks.block_of_variable[domain.phase_start] = own;
-            if let Some(end) = domain.phase_end {
-                blocks.block_of_variable[end] = own;
-            }
-            let coefficients = domain.outputs.len() * crate::walking::BEZIER_COEFFICIENTS;
-            blocks.block_of_variable[domain.bezier..domain.bezier + coefficients].fill(own);
-        }
-        for (row, name) in self.rows.names.iter().enumerate() {
-            let super::rows::Place::Point { domain, point } = name.place else { continue };
-            let (d, k) = (usize::from(domain), usize::from(point));
-            let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();
-            let before_impact = into_impact && k == self.layout.domains[d].last();
-            blocks.block_of_row[row] = match name.kind {
-                RowKind::MidpointPhase
-                | RowKind::EndpointPhase
-                | RowKind::MidpointPhaseRate
-                | RowKind::EndpointPhaseRate
-                | RowKind::MidpointFibre
-                | RowKind::EndpointFibre => points + d,
-                RowKind::ContactVelocity | RowKind::OutputVelocity | RowKind::HipVelocity if before_impact => root,
-                RowKind::MuscleForce => first_block[d] + per_point * k,
-                _ => first_block[d] + per_point * k + per_point - 1,
-            };
-        }
-        blocks
+        Structure { jacobian, hessian, blocks: elimination_tree(&self.layout, &self.rows) }
     }
 }
 

@@ -41,10 +41,16 @@ impl Inertia {
 /// A symmetric indefinite factorisation, analysed once for a fixed pattern. The residual of a solution is the
 /// caller's business.
 pub(super) trait KktSolver: Send {
+    /// Whether the method is meant for a matrix with these values.
+    fn suits(&self, _values: &[f64]) -> bool {
+        true
+    }
     /// Factorises the matrix with these values (order of the analysed pattern); `None` when it broke down.
     fn factor(&mut self, values: &[f64]) -> Option<Inertia>;
     /// Overwrites `rhs` by the solution with the last factorisation.
     fn solve(&mut self, rhs: &mut [f64]);
+    /// Marks the rows (indices of the matrix) whose diagonal the last factorisation took for zero.
+    fn mark_neglected(&self, _neglected: &mut [bool]) {}
     /// Stored entries of the factor.
     fn factor_entries(&self) -> usize;
     /// The last solution's residual was bad. True when the same matrix, factorised again, will be treated by another

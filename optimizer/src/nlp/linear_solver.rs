@@ -1,6 +1,7 @@
 //! Choice of the factorisation, and the way back from a failed one.
 
-use super::formulation::Formulation;
+use super::formulation::{Formulation, RowKind};
+use super::front::PivotKind;
 use super::kkt::KktMatrix;
 use super::kkt_solver::{Inertia, KktSolver};
 use super::multifrontal::Multifrontal;
@@ -24,72 +25,92 @@ pub(super) fn choose(
 ) -> Result<Box<dyn KktSolver>, NlpError> {
     let blocks = form.program.elimination_blocks();
     let supernodal = |order| Supernodal::new(&matrix.column_starts, &matrix.row_indices, order);
+    let multifrontal = |front_of: &[usize], kinds: &[PivotKind], threads| {
+        Multifrontal::new(&matrix.column_starts, &matrix.row_indices, front_of, kinds, threads)
+    };
+    let alike = vec![PivotKind::Other; matrix.order];
     let diagonal = matrix.row_indices.len() == matrix.order;
     if diagonal || matrix.order <= DENSE_ORDER {
         let front_of = if diagonal { (0..matrix.order).collect() } else { vec![0; matrix.order] };
-        return Ok(Box::new(Multifrontal::new(&matrix.column_starts, &matrix.row_indices, &front_of, 1)?));
+        return Ok(Box::new(multifrontal(&front_of, &alike, 1)?));
     }
-    let front_of = match (settings.linear_solver, blocks) {
-        (LinearSolver::Auto | LinearSolver::Supernodal, None) => return Ok(Box::new(supernodal(None)?)),
-        (LinearSolver::Supernodal, Some(blocks)) => {
-            return Ok(Box::new(supernodal(Some(ordering::block_order(form, blocks)))?));
-        }
-        (LinearSolver::Multifrontal, None) => vec![0; matrix.order],
-        (LinearSolver::Auto | LinearSolver::Multifrontal, Some(blocks)) => ordering::block_of_index(blocks),
+    let Some(blocks) = blocks else {
+        return Ok(match settings.linear_solver {
+            LinearSolver::Multifrontal => Box::new(multifrontal(&vec![0; matrix.order], &alike, settings.threads)?),
+            LinearSolver::Auto | LinearSolver::Supernodal => Box::new(supernodal(None)?),
+        });
     };
-    let frontal = Multifrontal::new(&matrix.column_starts, &matrix.row_indices, &front_of, settings.threads)?;
-    let order = blocks.map(|blocks| ordering::block_order(form, blocks));
-    if settings.linear_solver == LinearSolver::Auto {
-        let other = supernodal(order)?;
-        return if frontal.flops() <= WORTHWHILE * other.flops() {
-            Ok(Box::new(WithFallback { first: frontal, second: other, distrusted: false, in_use: false, fallbacks: 0 }))
-        } else {
-            Ok(Box::new(other))
-        };
+    let other = supernodal(Some(ordering::block_order(form, blocks)))?;
+    if settings.linear_solver == LinearSolver::Supernodal {
+        return Ok(Box::new(other));
     }
-    Ok(Box::new(frontal))
+    let front_of = ordering::block_of_index_raised(form, blocks);
+    let plain = multifrontal(&front_of, &alike, settings.threads)?;
+    if settings.linear_solver == LinearSolver::Auto && plain.flops() > WORTHWHILE * other.flops() {
+        return Ok(Box::new(other));
+    }
+    let variables = std::iter::repeat_n(PivotKind::Variable, form.n);
+    let rows = form.rows.iter().map(|row| match row {
+        RowKind::Equality(_) => PivotKind::Equality,
+        RowKind::Inequality(_) | RowKind::Free => PivotKind::Other,
+    });
+    let two_stages = multifrontal(&front_of, &variables.chain(rows).collect::<Vec<_>>(), settings.threads)?;
+    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), Box::new(plain)];
+    if settings.linear_solver == LinearSolver::Auto {
+        methods.push(Box::new(other));
+    }
+    Ok(Box::new(Ladder { methods, first: 0, in_use: 0, fallbacks: 0 }))
 }
 
-/// The multifrontal factorisation; the supernodal one for a matrix on which it breaks down or gives a bad residual.
-struct WithFallback {
-    first: Multifrontal,
-    second: Supernodal,
-    /// The next matrix goes to the second at once.
-    distrusted: bool,
-    /// The second holds the present factor.
-    in_use: bool,
+/// Several methods, the fastest first: a matrix on which one breaks down or gives a bad residual goes to the next.
+struct Ladder {
+    methods: Vec<Box<dyn KktSolver>>,
+    /// Where the next matrix begins.
+    first: usize,
+    /// Which holds the present factor.
+    in_use: usize,
     fallbacks: usize,
 }
 
-impl KktSolver for WithFallback {
+impl KktSolver for Ladder {
     fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
-        self.in_use = false;
-        if !std::mem::take(&mut self.distrusted) {
-            let inertia = self.first.factor(values);
-            if inertia.is_some() {
-                return inertia;
+        let first = std::mem::take(&mut self.first);
+        for (k, method) in self.methods.iter_mut().enumerate().skip(first) {
+            if !method.suits(values) {
+                continue;
             }
+            self.in_use = k;
+            if let Some(inertia) = method.factor(values) {
+                return Some(inertia);
+            }
+            self.fallbacks += 1;
         }
-        self.in_use = true;
-        self.fallbacks += 1;
-        self.second.factor(values)
+        None
     }
 
     fn solve(&mut self, rhs: &mut [f64]) {
-        if self.in_use { self.second.solve(rhs) } else { self.first.solve(rhs) }
-    }
-
-    fn factor_entries(&self) -> usize {
-        if self.fallbacks > 0 {
-            self.first.factor_entries().max(self.second.factor_entries())
-        } else {
-            self.first.factor_entries()
+        if let Some(method) = self.methods.get_mut(self.in_use) {
+            method.solve(rhs);
         }
     }
 
+    fn mark_neglected(&self, neglected: &mut [bool]) {
+        if let Some(method) = self.methods.get(self.in_use) {
+            method.mark_neglected(neglected);
+        }
+    }
+
+    fn factor_entries(&self) -> usize {
+        self.methods.get(self.in_use).map_or(0, |method| method.factor_entries())
+    }
+
     fn distrust(&mut self) -> bool {
-        self.distrusted = !self.in_use;
-        self.distrusted
+        if self.in_use + 1 >= self.methods.len() {
+            return false;
+        }
+        self.first = self.in_use + 1;
+        self.fallbacks += 1;
+        true
     }
 
     fn fallbacks(&self) -> usize {

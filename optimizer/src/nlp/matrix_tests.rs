@@ -1,5 +1,6 @@
 //! Factorisations against matrices of known inertia, and the promise that no wrong answer is silent.
 
+use super::front::PivotKind;
 use super::kkt_solver::{Inertia, KktSolver};
 use super::multifrontal::Multifrontal;
 use super::supernodal::Supernodal;
@@ -60,8 +61,10 @@ impl Matrix {
             solvers.push(("supernodal, AMD", Box::new(Supernodal::new(&self.starts, &self.rows, None).unwrap())));
             solvers.push(("supernodal, own order", Box::new(Supernodal::new(&self.starts, &self.rows, own).unwrap())));
         }
-        solvers.push(("multifrontal", Box::new(Multifrontal::new(&self.starts, &self.rows, &front_of, 1).unwrap())));
-        let dense = Multifrontal::new(&self.starts, &self.rows, &vec![0; order], 1).unwrap();
+        let kinds = vec![PivotKind::Other; order];
+        let frontal = Multifrontal::new(&self.starts, &self.rows, &front_of, &kinds, 1).unwrap();
+        solvers.push(("multifrontal", Box::new(frontal)));
+        let dense = Multifrontal::new(&self.starts, &self.rows, &vec![0; order], &kinds, 1).unwrap();
         solvers.push(("one front", Box::new(dense)));
         solvers
     }
@@ -251,8 +254,9 @@ fn nlp_threads_do_not_change_a_bit() {
         front_of.push(if chain < chains { 2 * chain + (j % length) / (length / 2) } else { 2 * chains });
         starts.push(rows.len());
     }
+    let kinds = vec![PivotKind::Other; order];
     let solve_with = |threads| {
-        let mut solver = Multifrontal::new(&starts, &rows, &front_of, threads).unwrap();
+        let mut solver = Multifrontal::new(&starts, &rows, &front_of, &kinds, threads).unwrap();
         let inertia = solver.factor(&values).unwrap();
         let mut x: Vec<f64> = (0..order).map(|i| (i % 17) as f64).collect();
         solver.solve(&mut x);

@@ -1,12 +1,7 @@
-//! Static multifrontal LBL^T over a given partition of the indices into fronts.
+//! Static multifrontal factorisation over a given partition of the indices into fronts.
 //!
-//! Front f eliminates its pivots p with a border b of later indices, by dense Bunch-Kaufman (faer) on its assembled
-//! pivot block, P A_pp P^T = L B L^T:
-//!
-//! ```text
-//! W = A_bp P^T L^-T,   X = W B^-1,   update to the parent: A_bb - X W^T
-//! ```
-//!
+//! Each front ([`super::front`]) assembles its own entries and its children's Schur complements, eliminates its pivots
+//! ([`super::null_space`], then [`super::bunch_kaufman`]) and leaves the Schur complement of its border to its parent.
 //! Inertia adds over the fronts (Haynsworth). Pivots are never delayed to the parent: a front whose pivot block is
 //! singular breaks the factorisation down (`None`), one that is nearly so shows in the residual, and either way the
 //! caller regularises or changes the method.
@@ -14,51 +9,46 @@
 //! Independent subtrees are factorised by several threads. Each front is computed by one thread, from its own entries
 //! and then its children in fixed order, so the result is bit for bit that of one thread.
 
-use faer::diag::DiagMut;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::lblt::factor as lblt;
-use faer::linalg::matmul::triangular::{BlockStructure, matmul as triangular_matmul};
-use faer::linalg::triangular_solve::{solve_unit_lower_triangular_in_place, solve_unit_upper_triangular_in_place};
-use faer::{Accum, MatMut, MatRef, Par, Spec};
+use pulp::{Arch, Simd, WithSimd};
 
+use super::bunch_kaufman::{self, Pivots, inverse_pair};
+use super::dense_kernels::{LANES, all_finite, dot, padded, subtract_columns, subtract_range};
+use super::front::{ChildMap, Front, PivotKind, Place};
 use super::kkt_solver::{Inertia, KktSolver};
+use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::status::NlpError;
 
 /// Operations below which starting threads costs more than it saves.
-const WORTH_A_THREAD: f64 = 2e7;
-
-/// Structure of a front.
-#[derive(Debug)]
-struct Front {
-    /// Indices eliminated here, and those of the border, by elimination order.
-    pivots: Vec<usize>,
-    border: Vec<usize>,
-    /// (position in the matrix values, offset in the panel).
-    sources: Vec<(u32, u32)>,
-    /// Child front and the local index of each entry of its border.
-    children: Vec<(usize, Vec<u32>)>,
-    flops: f64,
-}
+const WORTH_A_THREAD: f64 = 4e6;
 
 /// Numbers of a front.
 #[derive(Debug, Default)]
 struct Factor {
-    /// (pivots + border) x pivots, column-major: L and the diagonal of B above, X below.
-    panel: Vec<f64>,
-    /// border x border, column-major, lower triangle.
-    update: Vec<f64>,
-    /// Subdiagonal of B.
-    subdiagonal: Vec<f64>,
-    forward: Vec<usize>,
-    inverse: Vec<usize>,
+    numbers: Vec<f64>,
+    null_space: NullSpace,
+    /// Subdiagonal of B and order of the slots, of stage 2.
+    off_diagonal: Vec<f64>,
+    order: Vec<usize>,
     inertia: Inertia,
     broke_down: bool,
 }
 
-/// Workspace of one thread.
-struct Workspace {
-    w: Vec<f64>,
-    memory: MemBuffer,
+impl Factor {
+    fn new(front: &Front) -> Self {
+        let pivots = front.pivot_slots();
+        let null_space = NullSpace {
+            variables: (0..front.variables.len()).collect(),
+            rows: (0..front.rows.len()).collect(),
+            rank: front.rows.len(),
+        };
+        Self {
+            numbers: vec![0.0; front.length],
+            null_space,
+            off_diagonal: vec![0.0; pivots],
+            order: (0..pivots).collect(),
+            ..Self::default()
+        }
+    }
 }
 
 /// Something a thread can do independently, or the sequential top of the forest.
@@ -74,12 +64,14 @@ struct Piece {
 /// Analysis, factor and workspace.
 pub(super) struct Multifrontal {
     order: usize,
+    architecture: Arch,
     fronts: Vec<Front>,
     factors: Vec<Factor>,
     pieces: Vec<Piece>,
+    /// Positions of the diagonals that stage 1 neglects.
+    neglected: Vec<u32>,
     workspaces: Vec<Workspace>,
-    segment: Vec<f64>,
-    border_values: Vec<f64>,
+    solution: SolveSpace,
 }
 
 impl Multifrontal {
@@ -89,45 +81,25 @@ impl Multifrontal {
         column_starts: &[usize],
         row_indices: &[usize],
         front_of: &[usize],
+        kinds: &[PivotKind],
         threads: usize,
     ) -> Result<Self, NlpError> {
         let order = column_starts.len() - 1;
         let fail = |reason: &str| NlpError::Analysis { order, reason: reason.to_owned() };
         let members = postordered(column_starts, row_indices, front_of);
-        let fronts = analyse(column_starts, row_indices, members).ok_or_else(|| fail("a front is too large"))?;
-        let factors = fronts
-            .iter()
-            .map(|f| {
-                let (p, b) = (f.pivots.len(), f.border.len());
-                Factor {
-                    panel: vec![0.0; (p + b) * p],
-                    update: vec![0.0; b * b],
-                    subdiagonal: vec![0.0; p],
-                    forward: (0..p).collect(),
-                    inverse: (0..p).collect(),
-                    ..Factor::default()
-                }
-            })
-            .collect();
+        let fronts =
+            analyse(column_starts, row_indices, &members, kinds).ok_or_else(|| fail("a front is too large"))?;
+        let factors = fronts.iter().map(Factor::new).collect();
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
         let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
-        let widest = fronts.iter().map(|f| f.pivots.len()).max().unwrap_or(0);
-        let largest_panel = fronts.iter().map(|f| f.pivots.len() * f.border.len()).max().unwrap_or(0);
-        let mut workspaces = Vec::new();
-        for _ in 0..threads {
-            let request = lblt::cholesky_in_place_scratch::<usize, f64>(widest, Par::Seq, Spec::default());
-            let memory = MemBuffer::try_new(request).map_err(|_| fail("not enough memory"))?;
-            workspaces.push(Workspace { w: vec![0.0; largest_panel], memory });
-        }
-        let pieces = schedule(&fronts, threads);
-        let widest_border = fronts.iter().map(|f| f.border.len()).max().unwrap_or(0);
         Ok(Self {
             order,
-            pieces,
+            architecture: Arch::new(),
+            pieces: schedule(&fronts, threads),
+            neglected: fronts.iter().flat_map(Front::neglected).collect(),
             factors,
-            workspaces,
-            segment: vec![0.0; widest],
-            border_values: vec![0.0; widest_border],
+            workspaces: (0..threads).map(|_| Workspace::new(&fronts)).collect(),
+            solution: SolveSpace::new(&fronts),
             fronts,
         })
     }
@@ -188,7 +160,12 @@ fn postordered(column_starts: &[usize], row_indices: &[usize], front_of: &[usize
     sequence.into_iter().map(|f| std::mem::take(&mut members[f])).filter(|m| !m.is_empty()).collect()
 }
 
-fn analyse(column_starts: &[usize], row_indices: &[usize], members: Vec<Vec<usize>>) -> Option<Vec<Front>> {
+fn analyse(
+    column_starts: &[usize],
+    row_indices: &[usize],
+    members: &[Vec<usize>],
+    kinds: &[PivotKind],
+) -> Option<Vec<Front>> {
     let order = column_starts.len() - 1;
     let count = members.len();
     let (mut front_of, mut rank) = (vec![0; order], vec![0; order]);
@@ -211,30 +188,36 @@ fn analyse(column_starts: &[usize], row_indices: &[usize], members: Vec<Vec<usiz
     }
     let mut fronts: Vec<Front> = Vec::with_capacity(count);
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); count];
-    let mut local = vec![0u32; order];
-    for (f, pivots) in members.into_iter().enumerate() {
+    let mut touched = vec![false; order];
+    let mut places = vec![Place::Slot(0); order];
+    for (f, pivots) in members.iter().enumerate() {
         let mut border: Vec<usize> = entries[f].iter().map(|e| e.2).filter(|&i| front_of[i] != f).collect();
         for &child in &children[f] {
-            border.extend(fronts[child].border.iter().copied().filter(|&i| front_of[i] != f));
+            for &i in &fronts[child].border {
+                touched[i] |= front_of[i] == f;
+                if front_of[i] != f {
+                    border.push(i);
+                }
+            }
         }
         border.sort_unstable_by_key(|&i| rank[i]);
         border.dedup();
         if let Some(&i) = border.first() {
             children[front_of[i]].push(f);
         }
-        let height = pivots.len() + border.len();
-        u32::try_from(height * height).ok()?;
-        for (k, &i) in pivots.iter().chain(&border).enumerate() {
-            local[i] = u32::try_from(k).ok()?;
+        let mut front = Front::new(pivots, border, kinds, &touched);
+        u32::try_from(front.length).ok()?;
+        for (i, place) in front.places() {
+            places[i] = place;
         }
-        let mut sources = Vec::with_capacity(entries[f].len());
         for &(q, first, last) in &entries[f] {
-            let offset = local[first] as usize * height + local[last] as usize;
-            sources.push((u32::try_from(q).ok()?, u32::try_from(offset).ok()?));
+            let offset = front.offset(places[first], places[last]);
+            front.sources.push((u32::try_from(q).ok()?, u32::try_from(offset).ok()?));
         }
-        let kids = children[f].iter().map(|&c| (c, fronts[c].border.iter().map(|&i| local[i]).collect())).collect();
-        let flops = (0..pivots.len()).map(|k| ((height - k) as f64).powi(2)).sum();
-        fronts.push(Front { pivots, border, sources, children: kids, flops });
+        for &child in &children[f] {
+            front.children.push((child, ChildMap::new(fronts[child].border.iter().map(|&i| places[i]))?));
+        }
+        fronts.push(front);
     }
     Some(fronts)
 }
@@ -280,134 +263,116 @@ fn schedule(fronts: &[Front], threads: usize) -> Vec<Piece> {
     pieces
 }
 
-/// Factorises front `own` (its children are in `before`, which begins with front number `base`).
-fn factor_front(front: &Front, values: &[f64], before: &[Factor], base: usize, own: &mut Factor, work: &mut Workspace) {
-    let (p, b) = (front.pivots.len(), front.border.len());
-    let height = p + b;
-    own.panel.fill(0.0);
-    own.update.fill(0.0);
+/// Factorises fronts [start, end) whose children all lie in the range that `before` begins with.
+struct FactorPiece<'a> {
+    fronts: &'a [Front],
+    values: &'a [f64],
+    range: std::ops::Range<usize>,
+    /// Number of the first of the factors.
+    base: usize,
+    factors: &'a mut [Factor],
+    work: &'a mut Workspace,
+}
+
+impl WithSimd for FactorPiece<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for f in self.range {
+            let (before, rest) = self.factors.split_at_mut(f - self.base);
+            if let Some(own) = rest.first_mut() {
+                factor_front(simd, self.fronts, f, self.values, before, self.base, own, self.work);
+            }
+        }
+    }
+}
+
+/// Factorises front number `f` (its children are in `before`, which begins with front number `base`).
+#[allow(clippy::too_many_arguments)] // one call
+#[inline(always)]
+fn factor_front<S: Simd>(
+    simd: S,
+    fronts: &[Front],
+    f: usize,
+    values: &[f64],
+    before: &[Factor],
+    base: usize,
+    own: &mut Factor,
+    work: &mut Workspace,
+) {
+    let front = &fronts[f];
+    own.numbers.fill(0.0);
     own.inertia = Inertia::default();
     own.broke_down = true;
     for &(q, offset) in &front.sources {
-        own.panel[offset as usize] += values[q as usize];
+        own.numbers[offset as usize] += values[q as usize];
     }
     for (child, map) in &front.children {
-        let child = &before[child - base];
-        if child.broke_down {
+        let factor = &before[child - base];
+        if factor.broke_down {
             return;
         }
-        let width = map.len();
-        for (column, &local) in map.iter().enumerate() {
-            let local = local as usize;
-            let source = &child.update[column * width + column..(column + 1) * width];
-            // Local indices ascend with the child's border, so lower stays lower.
-            let target = if local < p { &mut own.panel[local * height..] } else { &mut own.update[(local - p) * b..] };
-            let shift = if local < p { 0 } else { p };
-            for (v, &row) in source.iter().zip(&map[column..]) {
-                target[row as usize - shift] += v;
-            }
-        }
+        add_child(front, &mut own.numbers, &fronts[*child], &factor.numbers, map);
     }
-    // The kernel writes the subdiagonal of pairs only.
-    own.subdiagonal.fill(0.0);
-    lblt::cholesky_in_place(
-        MatMut::from_column_major_slice_mut(&mut own.panel, height, p).subrows_mut(0, p),
-        DiagMut::from_slice_mut(&mut own.subdiagonal),
-        &mut own.forward,
-        &mut own.inverse,
-        Par::Seq,
-        MemStack::new(&mut work.memory),
-        Spec::default(),
+    if !front.rows.is_empty() {
+        if !null_space::eliminate(simd, front, &mut own.numbers, &mut own.null_space, work) {
+            return;
+        }
+        own.inertia.positive += own.null_space.rank;
+        own.inertia.negative += own.null_space.rank;
+    }
+    let pivots = Pivots {
+        first: front.first_slot(own.null_space.rank),
+        end: front.pivot_slots(),
+        size: front.slots(),
+        stride: front.wide,
+    };
+    let reduced = &mut own.numbers[front.reduced..];
+    let done = bunch_kaufman::eliminate(
+        simd,
+        reduced,
+        pivots,
+        &mut own.off_diagonal,
+        &mut own.order,
+        &mut own.inertia,
+        &mut work.columns,
     );
-    let mut j = 0;
-    while j < p {
-        let e = own.subdiagonal[j];
-        if e != 0.0 && j + 1 < p {
-            own.inertia.count_pair(own.panel[j * height + j], e, own.panel[(j + 1) * height + j + 1]);
-            j += 2;
-        } else {
-            own.inertia.count(own.panel[j * height + j]);
-            j += 1;
-        }
-    }
-    if b > 0 {
-        let w = &mut work.w[..b * p];
-        for j in 0..p {
-            let source = own.forward[j] * height + p;
-            w[j * b..(j + 1) * b].copy_from_slice(&own.panel[source..source + b]);
-        }
-        let l = MatRef::from_column_major_slice(&own.panel, height, p).subrows(0, p);
-        solve_unit_lower_triangular_in_place(l, MatMut::from_column_major_slice_mut(w, b, p).transpose_mut(), Par::Seq);
-        divide_columns(&mut own.panel, &own.subdiagonal, p, b, w);
-        let w = MatRef::from_column_major_slice(&*w, b, p);
-        let x = MatRef::from_column_major_slice(&own.panel, height, p).subrows(p, b);
-        triangular_matmul(
-            MatMut::from_column_major_slice_mut(&mut own.update, b, b),
-            BlockStructure::TriangularLower,
-            Accum::Add,
-            x,
-            BlockStructure::Rectangular,
-            w.transpose(),
-            BlockStructure::Rectangular,
-            -1.0,
-            Par::Seq,
-        );
-    }
-    own.broke_down = !own.panel.iter().all(|v| v.is_finite());
+    own.broke_down = !(done && all_finite(reduced));
 }
 
-/// X = W B^-1, X being the lower part of the panel.
-fn divide_columns(panel: &mut [f64], subdiagonal: &[f64], p: usize, b: usize, w: &[f64]) {
-    let height = p + b;
-    let mut j = 0;
-    while j < p {
-        let e = subdiagonal[j];
-        let diagonal = panel[j * height + j];
-        if e != 0.0 && j + 1 < p {
-            let (inverse_a, inverse_e, inverse_d) = inverse_pair(diagonal, e, panel[(j + 1) * height + j + 1]);
-            for r in 0..b {
-                let (u, v) = (w[j * b + r], w[(j + 1) * b + r]);
-                panel[j * height + p + r] = inverse_a * u + inverse_e * v;
-                panel[(j + 1) * height + p + r] = inverse_e * u + inverse_d * v;
+/// Adds a child's Schur complement. Its border is in elimination order, in which a front's variables come before its
+/// slots, so places that are slots ascend.
+#[inline(always)]
+fn add_child(front: &Front, numbers: &mut [f64], child: &Front, child_numbers: &[f64], map: &ChildMap) {
+    let first = child.pivot_slots();
+    let schur = &child_numbers[child.reduced..];
+    let count = map.variables.len();
+    for column in 0..count + map.slots.len() {
+        let source = &schur[(first + column) * child.wide + first..][..count + map.slots.len()];
+        let target = if let Some(&variable) = map.variables.get(column) {
+            for (value, &other) in source.iter().zip(&map.variables).skip(column) {
+                numbers[front.offset(Place::Variable(variable), Place::Variable(other))] += value;
             }
-            j += 2;
+            &mut numbers[front.coupling + variable as usize * front.wide..][..front.wide]
         } else {
-            let inverse = 1.0 / diagonal;
-            for r in 0..b {
-                panel[j * height + p + r] = inverse * w[j * b + r];
-            }
-            j += 1;
-        }
-    }
-}
-
-/// Inverse of [a e; e d] as (first, off-diagonal, last), scaled by e against overflow.
-fn inverse_pair(a: f64, e: f64, d: f64) -> (f64, f64, f64) {
-    let (ra, rd) = (a / e, d / e);
-    let r = 1.0 / (e * (ra * rd - 1.0));
-    (rd * r, -r, ra * r)
-}
-
-/// Factorises fronts [start, end) whose children all lie in the range.
-fn factor_piece(
-    fronts: &[Front],
-    start: usize,
-    end: usize,
-    values: &[f64],
-    factors: &mut [Factor],
-    work: &mut Workspace,
-) {
-    for f in start..end {
-        let (before, rest) = factors.split_at_mut(f - start);
-        if let Some(own) = rest.first_mut() {
-            factor_front(&fronts[f], values, before, start, own, work);
+            let slot = map.slots[column - count] as usize;
+            &mut numbers[front.reduced + slot * front.wide..][..front.wide]
+        };
+        let begin = column.max(count);
+        for (value, &slot) in source[begin..].iter().zip(&map.slots[begin - count..]) {
+            target[slot as usize] += value;
         }
     }
 }
 
 impl KktSolver for Multifrontal {
+    fn suits(&self, values: &[f64]) -> bool {
+        self.neglected.iter().all(|&q| values[q as usize].abs() <= LARGEST_DIAGONAL)
+    }
+
     fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
-        let fronts = &self.fronts;
+        let (fronts, architecture) = (&self.fronts, self.architecture);
         let threads = self.workspaces.len();
         // Disjoint slices of the factors, one per piece, dealt to the threads.
         let mut hands: Vec<Vec<(Piece, &mut [Factor])>> = (0..threads).map(|_| Vec::new()).collect();
@@ -424,7 +389,8 @@ impl KktSolver for Multifrontal {
         }
         let play = |hand: Vec<(Piece, &mut [Factor])>, work: &mut Workspace| {
             for (piece, factors) in hand {
-                factor_piece(fronts, piece.start, piece.end, values, factors, work);
+                let range = piece.start..piece.end;
+                architecture.dispatch(FactorPiece { fronts, values, range, base: piece.start, factors, work });
             }
         };
         std::thread::scope(|scope| {
@@ -439,10 +405,8 @@ impl KktSolver for Multifrontal {
         });
         if let Some(work) = self.workspaces.first_mut() {
             for piece in self.pieces.iter().filter(|p| p.thread.is_none()) {
-                let (before, rest) = self.factors.split_at_mut(piece.start);
-                if let Some(own) = rest.first_mut() {
-                    factor_front(&self.fronts[piece.start], values, before, 0, own, work);
-                }
+                let (range, factors) = (piece.start..piece.end, &mut self.factors);
+                architecture.dispatch(FactorPiece { fronts, values, range, base: 0, factors, work });
             }
         }
         let mut inertia = Inertia::default();
@@ -459,82 +423,229 @@ impl KktSolver for Multifrontal {
 
     fn solve(&mut self, x: &mut [f64]) {
         debug_assert_eq!(x.len(), self.order);
+        let (fronts, factors, space) = (&self.fronts, &self.factors, &mut self.solution);
+        self.architecture.dispatch(Solve { fronts, factors, space, x });
+    }
+
+    fn mark_neglected(&self, neglected: &mut [bool]) {
         for (front, factor) in self.fronts.iter().zip(&self.factors) {
-            let (p, b) = (front.pivots.len(), front.border.len());
-            let height = p + b;
-            let segment = &mut self.segment[..p];
-            for (t, &k) in segment.iter_mut().zip(&factor.forward) {
-                *t = x[front.pivots[k]];
-            }
-            let l = MatRef::from_column_major_slice(&factor.panel, height, p).subrows(0, p);
-            solve_unit_lower_triangular_in_place(l, MatMut::from_column_major_slice_mut(segment, p, 1), Par::Seq);
-            let sums = &mut self.border_values[..b];
-            sums.fill(0.0);
-            for (j, t) in segment.iter().enumerate() {
-                let column = &factor.panel[j * height + p..(j + 1) * height];
-                for (s, v) in sums.iter_mut().zip(column) {
-                    *s += v * t;
-                }
-            }
-            for (s, &i) in sums.iter().zip(&front.border) {
-                x[i] -= s;
-            }
-            let mut j = 0;
-            while j < p {
-                let e = factor.subdiagonal[j];
-                let diagonal = factor.panel[j * height + j];
-                if e != 0.0 && j + 1 < p {
-                    let (a, c, d) = inverse_pair(diagonal, e, factor.panel[(j + 1) * height + j + 1]);
-                    let (u, v) = (segment[j], segment[j + 1]);
-                    segment[j] = a * u + c * v;
-                    segment[j + 1] = c * u + d * v;
-                    j += 2;
-                } else {
-                    segment[j] /= diagonal;
-                    j += 1;
-                }
-            }
-            for (t, &i) in segment.iter().zip(&front.pivots) {
-                x[i] = *t;
-            }
-        }
-        for (front, factor) in self.fronts.iter().zip(&self.factors).rev() {
-            let (p, b) = (front.pivots.len(), front.border.len());
-            let height = p + b;
-            let (segment, values) = (&mut self.segment[..p], &mut self.border_values[..b]);
-            for (v, &i) in values.iter_mut().zip(&front.border) {
-                *v = x[i];
-            }
-            for (j, t) in segment.iter_mut().enumerate() {
-                let column = &factor.panel[j * height + p..(j + 1) * height];
-                *t = x[front.pivots[j]] - dot(column, values);
-            }
-            let l = MatRef::from_column_major_slice(&factor.panel, height, p).subrows(0, p);
-            solve_unit_upper_triangular_in_place(
-                l.transpose(),
-                MatMut::from_column_major_slice_mut(segment, p, 1),
-                Par::Seq,
-            );
-            for (t, &k) in segment.iter().zip(&factor.forward) {
-                x[front.pivots[k]] = *t;
+            for &row in &factor.null_space.rows[..factor.null_space.rank] {
+                neglected[front.rows[row]] = true;
             }
         }
     }
 
     fn factor_entries(&self) -> usize {
-        self.factors.iter().map(|f| f.panel.len()).sum()
+        self.fronts.iter().map(Front::entries).sum()
     }
 }
 
-/// Dot product in four fixed partial sums.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a4.zip(b4) {
-        for k in 0..4 {
-            sums[k] += x[k] * y[k];
+/// Work vectors of a solve, long enough for every front.
+#[derive(Debug)]
+struct SolveSpace {
+    /// One value per slot.
+    slots: Vec<f64>,
+    /// One value per pivot slot, in the order of the pivots.
+    ordered: Vec<f64>,
+    /// One value per position of the null space.
+    first: Vec<f64>,
+    second: Vec<f64>,
+    terms: Vec<(u32, f64)>,
+}
+
+impl SolveSpace {
+    fn new(fronts: &[Front]) -> Self {
+        let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
+        let (slots, positions) = (largest(&|f| f.wide), largest(&|f| f.tall));
+        Self {
+            slots: vec![0.0; slots],
+            ordered: vec![0.0; slots],
+            first: vec![0.0; positions],
+            second: vec![0.0; positions],
+            terms: Vec::with_capacity(positions),
         }
     }
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
+}
+
+/// Overwrites x by the solution.
+struct Solve<'a> {
+    fronts: &'a [Front],
+    factors: &'a [Factor],
+    space: &'a mut SolveSpace,
+    x: &'a mut [f64],
+}
+
+impl WithSimd for Solve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for (front, factor) in self.fronts.iter().zip(self.factors) {
+            forward(simd, front, factor, self.space, self.x);
+        }
+        for (front, factor) in self.fronts.iter().zip(self.factors).rev() {
+            backward(simd, front, factor, self.space, self.x);
+        }
+    }
+}
+
+/// Forward: with right-hand sides c of the rows, g of the variables, b of the slots,
+/// v0 = S^-1 c, h = g - H v0, and b - C^T v0 - X h goes through stage 2 and on to the border.
+#[inline(always)]
+fn forward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveSpace, x: &mut [f64]) {
+    let (tall, wide) = (front.tall, front.wide);
+    let slots = &mut space.slots[..wide];
+    slots.fill(0.0);
+    let NullSpace { variables, rows, rank } = &factor.null_space;
+    let rank = *rank;
+    if rank > 0 {
+        let lu = &factor.numbers[front.jacobian..front.coupling];
+        let (v0, h) = (&mut space.first[..tall], &mut space.second[..tall]);
+        v0.fill(0.0);
+        for e in 0..rank {
+            let column = &lu[e * tall..(e + 1) * tall];
+            let end = padded(e);
+            v0[e] = (x[front.rows[rows[e]]] - dot(&column[..end], &v0[..end])) / column[e];
+        }
+        // The second solve reads only what it has written: positions above e of a cleared vector.
+        h.fill(0.0);
+        for e in (0..rank).rev() {
+            let from = (e + 1) / LANES * LANES;
+            h[e] = v0[e] - dot(&lu[e * tall + from..(e + 1) * tall], &h[from..]);
+        }
+        v0.copy_from_slice(h);
+        // Hessian products run over the variables in their own order.
+        space.terms.clear();
+        space.terms.extend(variables[..rank].iter().zip(&*v0).filter_map(|(i, v)| Some((u32::try_from(*i).ok()?, *v))));
+        h.fill(0.0);
+        subtract_columns(simd, h, &factor.numbers[..front.jacobian], tall, &space.terms);
+        let coupling = &factor.numbers[front.coupling..front.row_coupling];
+        subtract_columns(simd, slots, coupling, wide, &space.terms);
+        space.terms.clear();
+        for e in 0..rank {
+            let variable = variables[e];
+            let value = x[front.variables[variable]] + h[variable];
+            space.terms.extend(u32::try_from(e).ok().map(|e| (e, value)));
+            x[front.rows[rows[e]]] = v0[e];
+            x[front.variables[variable]] = value;
+        }
+        let row_coupling = &factor.numbers[front.row_coupling..front.row_diagonal];
+        subtract_columns(simd, slots, row_coupling, wide, &space.terms);
+    }
+    let first = front.first_slot(rank);
+    let pivots = front.pivot_slots();
+    for (slot, i) in pivot_indices(front, factor) {
+        slots[slot] += x[i];
+    }
+    let ordered = &mut space.ordered[..pivots];
+    for (value, &slot) in ordered.iter_mut().zip(&factor.order) {
+        *value = slots[slot];
+    }
+    slots[first..pivots].copy_from_slice(&ordered[first..]);
+    let reduced = &factor.numbers[front.reduced..];
+    for j in first..pivots {
+        let begin = if factor.off_diagonal[j] == 0.0 { j + 1 } else { j + 2 };
+        let value = slots[j];
+        subtract_range(simd, slots, &reduced[j * wide..(j + 1) * wide], value, begin, wide);
+    }
+    let mut j = first;
+    while j < pivots {
+        let (e, d) = (factor.off_diagonal[j], reduced[j * wide + j]);
+        if e == 0.0 {
+            slots[j] /= d;
+            j += 1;
+        } else {
+            let (a, c, b) = inverse_pair(d, e, reduced[(j + 1) * wide + j + 1]);
+            let (u, v) = (slots[j], slots[j + 1]);
+            slots[j] = a * u + c * v;
+            slots[j + 1] = c * u + b * v;
+            j += 2;
+        }
+    }
+    for (value, &i) in slots[pivots..].iter().zip(&front.border) {
+        x[i] += value;
+    }
+    // Intermediate results stay at the indices of the pivots, in the order of the slots.
+    for (slot, i) in pivot_indices(front, factor) {
+        x[i] = slots[slot];
+    }
+}
+
+/// Backward: stage 2, then v = v0 - X^T s and S^T y = h - C s - H (v - v0) with s the values of the slots.
+#[inline(always)]
+fn backward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveSpace, x: &mut [f64]) {
+    let (tall, wide) = (front.tall, front.wide);
+    let NullSpace { variables, rows, rank } = &factor.null_space;
+    let rank = *rank;
+    let first = front.first_slot(rank);
+    let pivots = front.pivot_slots();
+    let slots = &mut space.slots[..wide];
+    slots.fill(0.0);
+    for (value, &i) in slots[pivots..].iter_mut().zip(&front.border) {
+        *value = x[i];
+    }
+    let reduced = &factor.numbers[front.reduced..];
+    for (slot, i) in pivot_indices(front, factor) {
+        space.ordered[slot] = x[i];
+    }
+    for j in (first..pivots).rev() {
+        let begin = if factor.off_diagonal[j] == 0.0 { j + 1 } else { j + 2 };
+        let column = &reduced[j * wide..(j + 1) * wide];
+        // Slots before `begin` are still zero or excluded.
+        let from = begin / LANES * LANES;
+        let mut sum = dot(&column[from..], &slots[from..]);
+        for k in from..begin {
+            sum -= column[k] * slots[k];
+        }
+        slots[j] = space.ordered[j] - sum;
+    }
+    let ordered = &mut space.ordered[..pivots];
+    ordered[first..].copy_from_slice(&slots[first..pivots]);
+    for (value, &slot) in ordered.iter().zip(&factor.order).skip(first) {
+        slots[slot] = *value;
+    }
+    for (slot, i) in pivot_indices(front, factor) {
+        x[i] = slots[slot];
+    }
+    if rank == 0 {
+        return;
+    }
+    let (lambda, product) = (&mut space.first[..tall], &mut space.second[..tall]);
+    lambda.fill(0.0);
+    space.terms.clear();
+    for e in 0..rank {
+        let variable = variables[e];
+        let coupling = &factor.numbers[front.coupling + variable * wide..][..wide];
+        let row_coupling = &factor.numbers[front.row_coupling + e * wide..][..wide];
+        let change = -dot(row_coupling, slots);
+        lambda[e] = x[front.variables[variable]] - dot(coupling, slots);
+        space.terms.extend(u32::try_from(variable).ok().map(|v| (v, change)));
+        x[front.variables[variable]] = x[front.rows[rows[e]]] + change;
+    }
+    product.fill(0.0);
+    subtract_columns(simd, product, &factor.numbers[..front.jacobian], tall, &space.terms);
+    let lu = &factor.numbers[front.jacobian..front.coupling];
+    for e in 0..rank {
+        lambda[e] += product[variables[e]];
+    }
+    for e in 0..rank {
+        let value = lambda[e];
+        subtract_range(simd, lambda, &lu[e * tall..(e + 1) * tall], value, e + 1, rank);
+    }
+    for e in (0..rank).rev() {
+        lambda[e] /= lu[e * tall + e];
+        let value = lambda[e];
+        subtract_range(simd, lambda, &lu[e * tall..(e + 1) * tall], value, 0, e);
+        x[front.rows[rows[e]]] = value;
+    }
+}
+
+/// Slot and index of every pivot of stage 2.
+#[inline(always)]
+fn pivot_indices<'a>(front: &'a Front, factor: &'a Factor) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let NullSpace { variables, rows, rank } = &factor.null_space;
+    let deferred = rows[*rank..].iter().map(|&e| front.rows[e]);
+    let free = variables[*rank..].iter().map(|&v| front.variables[v]);
+    let others = front.others.iter().copied();
+    (front.first_slot(*rank)..).zip(deferred.chain(free).chain(others))
 }

@@ -87,6 +87,9 @@ pub(super) struct NewtonSystem {
     diagonal: Vec<f64>,
     delta_w: f64,
     delta_c: f64,
+    /// Indices of the matrix that the factorisation did not regularise: rows that determine variables by themselves need
+    /// no delta_c.
+    unregularised: Vec<bool>,
     rhs: Vec<f64>,
     residual: PrimalDual,
     correction: PrimalDual,
@@ -102,6 +105,7 @@ impl NewtonSystem {
             diagonal: Vec::new(),
             delta_w: 0.0,
             delta_c: 0.0,
+            unregularised: vec![false; rhs.len()],
             rhs,
             residual: PrimalDual::default(),
             correction: PrimalDual::default(),
@@ -151,6 +155,8 @@ impl NewtonSystem {
         let clock = Instant::now();
         let finite = self.matrix.assemble(form, hessian, jacobian, &self.diagonal, self.delta_c);
         let inertia = if finite { self.solver.factor(&self.matrix.values) } else { None };
+        self.unregularised.fill(false);
+        self.solver.mark_neglected(&mut self.unregularised);
         self.tally.factor_seconds += clock.elapsed().as_secs_f64();
         self.tally.factorisations += 1;
         inertia
@@ -260,7 +266,8 @@ impl NewtonSystem {
             r.y[i] = if form.rows[i] == super::formulation::RowKind::Free {
                 0.0
             } else {
-                rhs.y[i] - (r.y[i] - self.delta_c * d.y[i])
+                let delta_c = if self.unregularised[form.n + i] { 0.0 } else { self.delta_c };
+                rhs.y[i] - (r.y[i] - delta_c * d.y[i])
             };
         }
     }

@@ -4,7 +4,7 @@
 //! it is structurally matched with, so that no supernode begins with a lone row, whose diagonal may be zero.
 //! Without: approximate minimum degree, left to the factorisation.
 
-use super::formulation::Formulation;
+use super::formulation::{Formulation, RowKind};
 use super::kkt::couplings;
 use super::problem::EliminationBlocks;
 use super::status::NlpError;
@@ -52,9 +52,42 @@ pub(super) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Re
     Ok(())
 }
 
+/// Block of each index, with every equality row that no variable of its block can take moved up to the nearest block
+/// with a variable of that row: eliminated in its own block its pivot would be the regularisation alone. Only rows that
+/// no lower block couples with are looked at; the others have a pivot from below.
+pub(super) fn block_of_index_raised(form: &Formulation, blocks: &EliminationBlocks) -> Vec<usize> {
+    let mut of = block_of_index(blocks);
+    let pattern = form.program.jacobian_pattern();
+    let mut from_below = vec![false; form.m];
+    for j in 0..form.n {
+        for &i in &pattern.row_indices[pattern.column_starts[j]..pattern.column_starts[j + 1]] {
+            from_below[i] |= of[j] < of[form.n + i];
+        }
+    }
+    let candidate = |i: usize| matches!(form.rows[i], RowKind::Equality(_)) && !from_below[i];
+    let mut nearest = vec![usize::MAX; form.m];
+    for j in (0..form.n).filter(|&j| form.fixed[j].is_none()) {
+        for &i in &pattern.row_indices[pattern.column_starts[j]..pattern.column_starts[j + 1]] {
+            // Blocks that a row couples with lie on one branch, so the nearest above has the smallest number.
+            if of[j] > blocks.block_of_row[i] {
+                nearest[i] = nearest[i].min(of[j]);
+            }
+        }
+    }
+    // A matched row stays matched, so those that can be raised come last.
+    let mut rows: Vec<usize> = (0..form.m).filter(|&i| candidate(i)).collect();
+    rows.sort_by_key(|&i| nearest[i] < usize::MAX);
+    let partner = match_rows(form, &rows, |i, j| of[j] == of[form.n + i]);
+    for i in rows.into_iter().filter(|&i| partner[i].is_none() && nearest[i] < usize::MAX) {
+        of[form.n + i] = nearest[i];
+    }
+    of
+}
+
 /// Elimination order from blocks: position -> index.
 pub(super) fn block_order(form: &Formulation, blocks: &EliminationBlocks) -> Vec<usize> {
-    let partner = match_rows(form, Some(blocks));
+    let rows: Vec<usize> = (0..form.m).collect();
+    let partner = match_rows(form, &rows, |i, j| blocks.block_of_variable[j] == blocks.block_of_row[i]);
     let mut row_of_variable = vec![None; form.n];
     for (i, variable) in partner.iter().enumerate() {
         if let Some(j) = variable {
@@ -77,9 +110,9 @@ pub(super) fn block_order(form: &Formulation, blocks: &EliminationBlocks) -> Vec
     members.into_iter().flatten().collect()
 }
 
-/// Structural matching of rows with variables (inside their block when there are blocks) by augmenting paths; a row
-/// without a partner gets `None`.
-pub(super) fn match_rows(form: &Formulation, blocks: Option<&EliminationBlocks>) -> Vec<Option<usize>> {
+/// Structural matching of rows, in this order, with free variables by augmenting paths, along the entries that `allowed`
+/// (row, variable) admits; a row without a partner gets `None`.
+fn match_rows(form: &Formulation, rows: &[usize], allowed: impl Fn(usize, usize) -> bool) -> Vec<Option<usize>> {
     let pattern = form.program.jacobian_pattern();
     let mut columns_of_row: Vec<Vec<usize>> = vec![Vec::new(); form.m];
     for j in 0..form.n {
@@ -88,7 +121,7 @@ pub(super) fn match_rows(form: &Formulation, blocks: Option<&EliminationBlocks>)
         }
         for q in pattern.column_starts[j]..pattern.column_starts[j + 1] {
             let i = pattern.row_indices[q];
-            if blocks.is_none_or(|b| b.block_of_variable[j] == b.block_of_row[i]) {
+            if allowed(i, j) {
                 columns_of_row[i].push(j);
             }
         }
@@ -96,7 +129,7 @@ pub(super) fn match_rows(form: &Formulation, blocks: Option<&EliminationBlocks>)
     let mut row_of: Vec<Option<usize>> = vec![None; form.n];
     let mut partner: Vec<Option<usize>> = vec![None; form.m];
     let mut seen = vec![usize::MAX; form.n];
-    for start in 0..form.m {
+    for &start in rows {
         // depth-first search for an augmenting path, without recursion: (row, next column to try)
         let mut path: Vec<(usize, usize)> = vec![(start, 0)];
         let mut via: Vec<usize> = Vec::new();

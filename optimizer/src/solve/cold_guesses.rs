@@ -1,7 +1,8 @@
-//! Several cold guesses, because the problem has several local optima: tried side by side, one chosen.
+//! What a solve tries: a warm start, then several cold guesses, because the problem has several local optima. The
+//! guesses are tried side by side, one attempt is chosen.
 
 use super::run::{Context, Run};
-use super::{CONVERGED_VIOLATION, GaitProblem, IterationRecord, SolveError, SolveStatus, status_of};
+use super::{CONVERGED_VIOLATION, GaitProblem, IterationRecord, SolveError, SolveStatus, WarmStart, status_of};
 use crate::cold_start::GuessSettings;
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
@@ -185,6 +186,9 @@ pub struct Attempt {
     pub objective: f64,
     /// Gait RMSE where it ended, rad.
     pub gait_rmse_rad: f64,
+    /// Why it could not be carried through, in words; empty when it could.
+    #[serde(default)]
+    pub reason: String,
     /// Whether it is the answer.
     pub chosen: bool,
 }
@@ -230,17 +234,41 @@ impl Choice {
             seconds: run.seconds(),
             objective: self.objective,
             gait_rmse_rad: self.rmse,
+            reason: run.reason.clone(),
             chosen: false,
         }
     }
 }
 
-/// A finished guess.
+/// A finished attempt.
 pub(super) struct Tried {
     pub(super) choice: Choice,
     pub(super) attempt: Attempt,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra_s: f64,
+}
+
+impl Tried {
+    fn new(context: &Context<'_>, result: NlpResult, strategy: &str, run: &Run<'_>) -> Self {
+        let choice = Choice::new(context, result);
+        Self {
+            attempt: choice.attempt(strategy, run),
+            evaluation_s: run.evaluation_s,
+            linear_algebra_s: run.linear_algebra_s,
+            choice,
+        }
+    }
+}
+
+/// Tries a warm start.
+pub(super) fn try_warm(
+    context: &Context<'_>,
+    warm: &WarmStart,
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<Tried, SolveError> {
+    let mut run = Run::new(context, context.options.threads, observer);
+    let result = run.warm(warm)?;
+    Ok(Tried::new(context, result, "warm start", &run))
 }
 
 fn try_guess(
@@ -253,13 +281,7 @@ fn try_guess(
     let mut run = Run::new(context, threads, observer);
     run.guess = index;
     let result = run.cold(guess)?;
-    let choice = Choice::new(context, result);
-    Ok(Tried {
-        attempt: choice.attempt(&guess.label(), &run),
-        evaluation_s: run.evaluation_s,
-        linear_algebra_s: run.linear_algebra_s,
-        choice,
-    })
+    Ok(Tried::new(context, result, &guess.label(), &run))
 }
 
 /// What the threads tell the calling one.

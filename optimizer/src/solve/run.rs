@@ -4,7 +4,10 @@ use super::cold_guesses::{ColdGuess, ColdRoute};
 use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveOptions, WarmStart};
 use crate::cold_start;
 use crate::gait_problem::GaitProgramme;
-use crate::nlp::{self, BoundMultiplierStart, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
+use crate::nlp::{
+    self, BoundMultiplierStart, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, Residuals,
+    StartPoint, Timing,
+};
 use std::time::Instant;
 
 /// First barrier parameter of the tracking phases of a cold start. Small values keep the natural guess: at 0.1 the
@@ -42,6 +45,8 @@ pub(super) struct Run<'a> {
     pub(super) iterations: usize,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra_s: f64,
+    /// Why a phase could not begin; empty when all could.
+    pub(super) reason: String,
 }
 
 impl<'a> Run<'a> {
@@ -55,6 +60,7 @@ impl<'a> Run<'a> {
             iterations: 0,
             evaluation_s: 0.0,
             linear_algebra_s: 0.0,
+            reason: String::new(),
         }
     }
 
@@ -102,7 +108,15 @@ impl<'a> Run<'a> {
                 });
             },
             &|| self.context.cancel.is_cancelled(),
-        )?;
+        );
+        let result = match result {
+            // The fault of the start, not of the program: nothing can be done from there.
+            Err(error @ (NlpError::EvaluationFailed { .. } | NlpError::InvalidStart(_))) => {
+                self.reason = error.to_string();
+                return Ok(stuck(programme, start));
+            }
+            other => other?,
+        };
         self.iterations += result.iterations;
         self.evaluation_s += result.timing.evaluation;
         self.linear_algebra_s += result.timing.analysis + result.timing.factorisation + result.timing.backsolves;
@@ -120,7 +134,7 @@ impl<'a> Run<'a> {
         let settings = guess.settings();
         let tracked_problem = guess.tracked(problem);
         let plain = tracked_problem.programme(false)?.with_timing(&guess.timing.fractions());
-        let postures = cold_start::posture::solve(&plain, &settings)?;
+        let postures = cold_start::posture::solve(&plain, &settings);
         let first = cold_start::motion::guess(&plain, &postures, &settings);
         let tracking_settings =
             NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..NlpSettings::default() };
@@ -140,7 +154,7 @@ impl<'a> Run<'a> {
                 let settings = NlpSettings { tolerance: TRACKING_TOLERANCE, ..cost_settings(MU_COST) };
                 tracked = self.phase(Phase::PlainCost, &plain, &StartPoint::Cold(tracked.x), settings)?;
             }
-            let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x)?;
+            let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x);
             if Self::interrupted(&tracked) {
                 return Ok(blank(programme, with_muscles, tracked));
             }
@@ -181,7 +195,34 @@ impl<'a> Run<'a> {
     }
 }
 
-/// An interrupted result in the shape of `programme`: its multipliers carry no information.
+/// A solve that ended where it began.
+fn stuck(programme: &GaitProgramme, start: &StartPoint) -> NlpResult {
+    let x = match start {
+        StartPoint::Cold(x) => x.clone(),
+        StartPoint::Warm(warm) => warm.x.clone(),
+    };
+    let unknown = Residuals { violation: f64::NAN, dual_infeasibility: f64::NAN, complementarity: f64::NAN };
+    let nothing = NlpResult {
+        status: NlpStatus::Stalled,
+        x: Vec::new(),
+        row_multipliers: Vec::new(),
+        lower_multipliers: Vec::new(),
+        upper_multipliers: Vec::new(),
+        slacks: Vec::new(),
+        slack_lower_multipliers: Vec::new(),
+        slack_upper_multipliers: Vec::new(),
+        objective: f64::NAN,
+        residuals: unknown,
+        scaled_residuals: unknown,
+        mu: 0.0,
+        iterations: 0,
+        counts: Counts::default(),
+        timing: Timing::default(),
+    };
+    blank(programme, x, nothing)
+}
+
+/// A result in the shape of `programme` whose multipliers carry no information.
 #[allow(clippy::needless_pass_by_value)] // the replaced vectors are not needed any more
 fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
     let (n, m) = (programme.variables(), programme.rows());

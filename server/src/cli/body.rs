@@ -1,5 +1,6 @@
 //! Flags that say who walks and in which variant.
 
+use super::numbers::subject;
 use crate::error::Error;
 use clap::{Args, ValueEnum};
 use gait_optimizer::Subject;
@@ -8,13 +9,13 @@ use gait_optimizer::Subject;
 #[derive(Debug, Clone, Args)]
 pub(super) struct Body {
     /// Subject of the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg). Default: 1.
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["height_m", "mass_kg"])]
+    #[arg(long, value_name = "NUMBER", value_parser = subject, allow_negative_numbers = true, conflicts_with_all = ["height_m", "mass_kg"])]
     subject: Option<u32>,
     /// Body height, m.
-    #[arg(long, value_name = "METRES", requires = "mass_kg")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, requires = "mass_kg")]
     height_m: Option<f64>,
     /// Body mass, kg.
-    #[arg(long, value_name = "KILOGRAMS", requires = "height_m")]
+    #[arg(long, value_name = "KILOGRAMS", allow_negative_numbers = true, requires = "height_m")]
     mass_kg: Option<f64>,
 }
 

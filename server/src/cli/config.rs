@@ -1,5 +1,6 @@
 //! Configuration of the service: flags, then environment, then file, then defaults; each value knows where it is from.
 
+use super::numbers::workers;
 use crate::error::Error;
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -11,9 +12,14 @@ use std::str::FromStr;
 const DEFAULT_FILE: &str = "gaitwright.toml";
 
 /// What can be set: name in the file, default, meaning. Flag and environment follow from the name.
-const KNOWN: [(&str, &str, &str); 9] = [
+const KNOWN: [(&str, &str, &str); 10] = [
     ("listen", "127.0.0.1:8080", "where to listen"),
     ("database", "gaitwright.db", "the SQLite file"),
+    (
+        "host_names",
+        "",
+        "names under which browsers reach the service, besides its address and localhost; commas between",
+    ),
     ("workers", "cores", "how many solves at the same time"),
     ("sign_in", "true", "whether people and programs say who they are; false on this machine only"),
     ("idle_minutes", "60", "a session without a sign of life for so long ends"),
@@ -35,9 +41,12 @@ pub(super) struct Flags {
     /// The SQLite file, made if it does not exist; default gaitwright.db.
     #[arg(long, value_name = "FILE")]
     database: Option<String>,
+    /// A name under which browsers reach the service, besides its address and localhost; may be given several times.
+    #[arg(long, value_delimiter = ',', value_name = "NAME")]
+    host_name: Vec<String>,
     /// How many solves at the same time; default: the number of cores.
-    #[arg(long, value_name = "NUMBER")]
-    workers: Option<String>,
+    #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
+    workers: Option<usize>,
     /// Ask nobody to sign in: for one person on this machine.
     #[arg(long)]
     no_sign_in: bool,
@@ -140,6 +149,11 @@ impl Settings {
         }
     }
 
+    pub(super) fn host_names(&self) -> Vec<String> {
+        let names = self.text("host_names").split(',').map(str::trim);
+        names.filter(|name| !name.is_empty()).map(str::to_owned).collect()
+    }
+
     pub(super) fn sign_in(&self) -> Result<bool, Error> {
         self.parsed("sign_in", "true, false")
     }
@@ -173,7 +187,8 @@ impl Flags {
         match name {
             "listen" => self.listen.clone(),
             "database" => self.database.clone(),
-            "workers" => self.workers.clone(),
+            "host_names" => Some(self.host_name.join(",")).filter(|names| !names.is_empty()),
+            "workers" => self.workers.map(|workers| workers.to_string()),
             "sign_in" => self.no_sign_in.then(|| "false".to_owned()),
             "idle_minutes" => self.idle_minutes.clone(),
             "tls_certificate" => self.tls_certificate.clone(),
@@ -251,7 +266,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("g.toml");
         std::fs::write(&file, "workers = 3\nidle_minutes = 15\ndatabase = \"file.db\"\n").unwrap();
-        let flags = Flags { config: Some(file.clone()), workers: Some("5".to_owned()), ..Flags::default() };
+        let flags = Flags { config: Some(file.clone()), workers: Some(5), ..Flags::default() };
         let found = settings(&flags, &[("GAITWRIGHT_WORKERS", "4"), ("GAITWRIGHT_DATABASE", "env.db")]).unwrap();
         assert_eq!(found.workers().unwrap(), Some(5));
         assert_eq!(found.0["workers"].1, Origin::Flag);
@@ -263,9 +278,9 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused_with_its_origin() {
-        let flags = |workers: &str| Flags { workers: Some(workers.to_owned()), ..Flags::default() };
-        let refused = settings(&flags("0"), &[]).unwrap().workers().unwrap_err().to_string();
-        assert!(refused.contains("workers (flag)") && refused.contains("1 to 64"), "{refused}");
+        let settings_of = settings(&Flags::default(), &[("GAITWRIGHT_WORKERS", "0")]).unwrap();
+        let refused = settings_of.workers().unwrap_err().to_string();
+        assert!(refused.contains("GAITWRIGHT_WORKERS") && refused.contains("1 to 64"), "{refused}");
         let half = Flags { tls_key: Some("k.pem".to_owned()), ..Flags::default() };
         assert!(settings(&half, &[]).unwrap().tls().is_err());
         assert!(parse(Path::new("x.toml"), "colour = 1").unwrap_err().to_string().contains("colour is not a setting"));

@@ -3,6 +3,9 @@
 mod body;
 mod config;
 mod logging;
+mod numbers;
+mod out_file;
+mod output;
 mod problem;
 mod record;
 mod serve;
@@ -15,10 +18,23 @@ use crate::error::Error;
 use crate::http::openapi;
 use clap::{Parser, Subcommand};
 use config::{Flags, Settings};
+use output::tell;
 use std::process::ExitCode;
 
 /// Exit code when the input is at fault, as with every usage error.
 const INPUT_FAULT: u8 = 2;
+
+/// Exit code after Ctrl-C or SIGTERM, as shells expect it.
+const INTERRUPTED: u8 = 130;
+
+/// How a command came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ended {
+    /// It did what it was asked.
+    Done,
+    /// A person stopped it before that.
+    Interrupted,
+}
 
 /// A preference-learning tuning service for walking gaits of powered prostheses.
 ///
@@ -76,26 +92,31 @@ pub fn run() -> ExitCode {
         Err(error) => return report(&Error::Internal(error.to_string())),
     };
     let done = match cli.command {
-        Command::Serve(serve) => runtime.block_on(serve.run(&settings)),
+        Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
         Command::Tune(tune) => runtime.block_on(tune.run()),
-        Command::Solve(solve) => runtime.block_on(solve.run()),
-        Command::Sweep(sweep) => runtime.block_on(sweep.run()),
-        Command::Audit(audit) => runtime.block_on(audit.run()),
-        Command::Config(config) => config.run(),
-        Command::Openapi => openapi::text().map(|text| print!("{text}")).map_err(|e| Error::Internal(e.to_string())),
-        Command::Backup(backup) => runtime.block_on(backup.run()),
-        Command::Restore(restore) => runtime.block_on(restore.run()),
-        Command::Export(export) => runtime.block_on(export.run()),
-        Command::Import(import) => runtime.block_on(import.run()),
-        Command::Prune(prune) => runtime.block_on(prune.run()),
+        Command::Solve(solve) => runtime.block_on(solve.run()).map(|()| Ended::Done),
+        Command::Sweep(sweep) => runtime.block_on(sweep.run()).map(|()| Ended::Done),
+        Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
+        Command::Config(config) => config.run().map(|()| Ended::Done),
+        Command::Openapi => openapi::text().map_err(|e| Error::Internal(e.to_string())).map(|text| {
+            print!("{text}");
+            Ended::Done
+        }),
+        Command::Backup(backup) => runtime.block_on(backup.run()).map(|()| Ended::Done),
+        Command::Restore(restore) => runtime.block_on(restore.run()).map(|()| Ended::Done),
+        Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),
+        Command::Import(import) => runtime.block_on(import.run()).map(|()| Ended::Done),
+        Command::Prune(prune) => runtime.block_on(prune.run()).map(|()| Ended::Done),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Ended::Done) => ExitCode::SUCCESS,
+        Ok(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
         Err(error) => report(&error),
     }
 }
 
 fn report(error: &Error) -> ExitCode {
-    eprintln!("gaitwright: {error}");
-    if error.is_input() { ExitCode::from(INPUT_FAULT) } else { ExitCode::FAILURE }
+    tell(&format!("gaitwright: {error}"));
+    let wrong_file = matches!(error, Error::Store(error) if error.is_wrong_file());
+    if error.is_input() || wrong_file { ExitCode::from(INPUT_FAULT) } else { ExitCode::FAILURE }
 }

@@ -1,6 +1,8 @@
 //! What `solve` and `sweep` share: flags of the gait problem, warm-start files, cancellation.
 
 use super::body::{Body, Switch};
+use super::numbers::iterations;
+use super::output::tell;
 use super::serve::interrupted;
 use crate::error::Error;
 use clap::Args;
@@ -21,19 +23,19 @@ pub(super) struct ProblemFlags {
     #[arg(long, value_name = "FILE")]
     device: Option<PathBuf>,
     /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
-    #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh)]
+    #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh, allow_hyphen_values = true)]
     mesh: Option<Mesh>,
     /// Start from the gait in this file, written by `solve --out`.
     #[arg(long, value_name = "FILE")]
     warm: Option<PathBuf>,
     /// Scaled optimality tolerance.
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     tolerance: Option<f64>,
     /// Most iterations of the final phase.
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", value_parser = iterations, allow_negative_numbers = true)]
     max_iterations: Option<usize>,
     /// Most seconds for one solve.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit_s: Option<f64>,
 }
 
@@ -71,23 +73,13 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
 }
 
-/// Writes a file whole or not at all.
-pub(super) fn write(path: &Path, text: &str) -> Result<(), Error> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    let part = PathBuf::from(name);
-    std::fs::write(&part, text)
-        .and_then(|()| std::fs::rename(&part, path))
-        .map_err(|e| Error::Malformed(format!("cannot write {}: {e}", path.display())))
-}
-
 /// A token that the first Ctrl-C cancels.
 pub(super) fn cancelled_by_signal() -> CancelToken {
     let token = CancelToken::new();
     let on_signal = token.clone();
     tokio::spawn(async move {
         interrupted().await;
-        eprintln!("stopping");
+        tell("stopping");
         on_signal.cancel();
     });
     token

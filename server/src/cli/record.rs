@@ -1,5 +1,6 @@
 //! `gaitwright audit` and `gaitwright backup`, `gaitwright restore`: care of the record.
 
+use super::output::{data, tell};
 use crate::error::Error;
 use crate::store::audit::{self, Verdict};
 use crate::store::{Store, StoreError, backup};
@@ -33,10 +34,7 @@ impl Audit {
         };
         pool.close().await;
         match verdict? {
-            Verdict::Whole { rows, last } => {
-                println!("whole: {rows} rows, last hash {last}");
-                Ok(())
-            }
+            Verdict::Whole { rows, last } => data(&format!("whole: {rows} rows, last hash {last}")),
             Verdict::Broken { seq } => Err(Error::Internal(format!("the audit trail is broken at row {seq}"))),
         }
     }
@@ -58,9 +56,8 @@ impl Backup {
             return Err(Error::conflict(format!("{} exists; choose a new file", self.to.display())));
         }
         backup::of_file(&self.database, &self.to).await?;
-        println!("{}", self.to.display());
-        eprintln!("copied and checked");
-        Ok(())
+        tell("copied and checked");
+        data(&self.to.display().to_string())
     }
 }
 
@@ -84,11 +81,11 @@ impl Restore {
             let kept = self.database.with_extension(format!("before-{}", present.stamp()));
             present.close().await;
             std::fs::copy(&self.database, &kept).map_err(failed)?;
-            eprintln!("the present record is kept as {}", kept.display());
+            tell(&format!("the present record is kept as {}", kept.display()));
         }
         let part = self.database.with_extension("part");
         std::fs::copy(&self.from, &part).and_then(|_| std::fs::rename(&part, &self.database)).map_err(failed)?;
-        eprintln!("restored {}", self.database.display());
+        tell(&format!("restored {}", self.database.display()));
         Ok(())
     }
 }

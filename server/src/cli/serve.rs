@@ -3,7 +3,7 @@
 use super::config::{Flags, Settings};
 use crate::access::people;
 use crate::error::Error;
-use crate::http::{Access, AppState, router};
+use crate::http::{Access, AppState, Hosts, router};
 use crate::store::audit::Actor;
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
@@ -74,7 +74,8 @@ impl Serve {
 
         let pool = Pool::new(cores_or(workers), Arc::new(GaitSolver), Arc::new(Board::default()));
         let director = Director::new(store.clone(), pool, None);
-        let app = router(AppState::new(director.clone(), Arc::new(access)));
+        let hosts = Hosts::new(address, &settings.host_names());
+        let app = router(AppState::new(director.clone(), Arc::new(access), hosts));
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await }

@@ -1,6 +1,8 @@
 //! `gaitwright solve`: one gait.
 
-use super::problem::{ProblemFlags, cancelled_by_signal, write};
+use super::out_file::OutFile;
+use super::output::data;
+use super::problem::{ProblemFlags, cancelled_by_signal};
 use crate::error::Error;
 use clap::Args;
 use gait_optimizer::{SolveOutcome, SolveStatus, TunedBounds, solve};
@@ -12,7 +14,13 @@ pub(super) struct Solve {
     #[command(flatten)]
     flags: ProblemFlags,
     /// Bounds that differ from the loosest of Table I, as in a1=20,a5=0.013.
-    #[arg(long, value_name = "NAME=VALUE,...", default_value = "", hide_default_value = true)]
+    #[arg(
+        long,
+        value_name = "NAME=VALUE,...",
+        default_value = "",
+        hide_default_value = true,
+        allow_hyphen_values = true
+    )]
     bounds: String,
     /// Write the whole outcome (figures, gait, multipliers) as JSON.
     #[arg(long, value_name = "FILE")]
@@ -25,7 +33,9 @@ pub(super) struct Solve {
 impl Solve {
     pub(super) async fn run(self) -> Result<(), Error> {
         let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
-        let (warm, options, cancel) = (self.flags.warm_start()?, self.flags.options()?, cancelled_by_signal());
+        let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
+        let out = self.out.as_deref().map(OutFile::open).transpose()?;
+        let cancel = cancelled_by_signal();
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
         let outcome = tokio::task::spawn_blocking(move || {
@@ -41,17 +51,16 @@ impl Solve {
         .await
         .map_err(|e| Error::Internal(e.to_string()))??;
         bar.finish_and_clear();
-        if let Some(path) = &self.out {
-            let text = serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?;
-            write(path, &text)?;
-        }
+        // The figures first: whatever becomes of the file, they are not lost.
         if self.json {
-            let text = serde_json::to_string_pretty(&outcome.report).map_err(|e| Error::Internal(e.to_string()))?;
-            println!("{text}");
+            data(&serde_json::to_string_pretty(&outcome.report).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
-            print_for_people(&outcome);
+            data(&for_people(&outcome))?;
         }
-        Ok(())
+        match out {
+            Some(out) => out.write(&serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?),
+            None => Ok(()),
+        }
     }
 }
 
@@ -67,18 +76,21 @@ pub(super) fn status_word(status: SolveStatus) -> &'static str {
     }
 }
 
-fn print_for_people(outcome: &SolveOutcome) {
+fn for_people(outcome: &SolveOutcome) -> String {
     let r = &outcome.report;
-    println!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total);
-    println!("  cost of transport  {:.5}   objective {:.5}", r.cost_of_transport, r.objective);
-    println!("  Gait RMSE          {:.4} rad", r.gait_rmse_rad);
-    println!("  speed              {:.3} m/s   stride {:.3} m", r.speed_m_s, r.stride_length_m);
-    println!("  largest violation  {:.1e}", r.max_violation);
-    println!(
-        "  problem            {} variables, {} equalities, {} inequalities",
-        r.variables, r.equalities, r.inequalities
-    );
+    let mut lines = vec![
+        format!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total),
+        format!("  cost of transport  {:.5}   objective {:.5}", r.cost_of_transport, r.objective),
+        format!("  Gait RMSE          {:.4} rad", r.gait_rmse_rad),
+        format!("  speed              {:.3} m/s   stride {:.3} m", r.speed_m_s, r.stride_length_m),
+        format!("  largest violation  {:.1e}", r.max_violation),
+        format!(
+            "  problem            {} variables, {} equalities, {} inequalities",
+            r.variables, r.equalities, r.inequalities
+        ),
+    ];
     for violation in outcome.violations.iter().take(10) {
-        println!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit);
+        lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
+    lines.join("\n")
 }

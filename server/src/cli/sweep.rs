@@ -1,11 +1,16 @@
 //! `gaitwright sweep`: one gait for each row of a table of actions, in parallel, answers in the order of the rows.
 
-use super::problem::{ProblemFlags, cancelled_by_signal, read, write};
+use super::numbers::workers;
+use super::out_file::OutFile;
+use super::output::{data, tell};
+use super::problem::{ProblemFlags, cancelled_by_signal, read};
 use super::serve::cores_or;
 use super::solve::status_word;
 use crate::error::Error;
 use clap::Args;
-use gait_optimizer::{CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, TunedBounds, WarmStart, solve};
+use gait_optimizer::{
+    CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus, TunedBounds, WarmStart, solve,
+};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,7 +27,7 @@ pub(super) struct Sweep {
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// How many solves at the same time; default: the number of cores.
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
 }
 
@@ -37,16 +42,28 @@ impl Sweep {
         let actions = actions(&self.actions)?;
         let problem = self.flags.problem(TunedBounds::default())?;
         let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
-        let (cancel, workers) = (cancelled_by_signal(), cores_or(self.workers).max(1));
+        let out = OutFile::open(&self.out)?;
+        let (cancel, workers) = (cancelled_by_signal(), cores_or(self.workers));
         let rows = actions.clone();
-        let answers =
+        let mut answers =
             tokio::task::spawn_blocking(move || solve_all(&problem, &rows, warm.as_ref(), &options, workers, &cancel))
                 .await
                 .map_err(|e| Error::Internal(e.to_string()))?;
-        write(&self.out, &table(&actions, &answers)?)?;
-        let converged =
-            answers.iter().flatten().filter(|o| o.report.status == gait_optimizer::SolveStatus::Converged).count();
-        eprintln!("{converged} of {} converged; written to {}", actions.len(), self.out.display());
+        if answers.iter().all(Result::is_err)
+            && let Some(Err(error)) = answers.pop()
+        {
+            // What is wrong with every row is wrong with the command.
+            return Err(error.into());
+        }
+        let table = table(&actions, &answers)?;
+        let path = out.path().to_owned();
+        if let Err(error) = out.write(&table) {
+            // Hours of solving are not lost with the file.
+            data(table.trim_end())?;
+            return Err(error);
+        }
+        let converged = answers.iter().flatten().filter(|o| o.report.status == SolveStatus::Converged).count();
+        tell(&format!("{converged} of {} converged; written to {}", actions.len(), path.display()));
         Ok(())
     }
 }
@@ -130,8 +147,8 @@ fn table(actions: &[TunedBounds], answers: &[Answer]) -> Result<String, Error> {
                 ]);
             }
             Err(error) => {
-                eprintln!("{error}");
-                row.extend(["failed", "", "", "", "", ""].map(str::to_owned));
+                tell(&format!("{}: {error}", row.join(",")));
+                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(str::to_owned));
             }
         }
         writer.write_record(&row).map_err(internal)?;

@@ -1,17 +1,20 @@
 //! `gaitwright tune`: an unattended study from the command line.
 
+use super::Ended;
 use super::body::{Body, Switch};
+use super::numbers::{seed, trials, workers};
+use super::output::{data, tell};
 use super::serve::{cores_or, interrupted};
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::Trial;
-use crate::store::{Store, commit, studies, trials};
+use crate::store::{Store, commit, studies, trials as trial_rows};
+use crate::studies::catalogue;
 use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
 use crate::studies::standing::Standing;
 use crate::studies::summary::{self, Summary};
-use crate::studies::{catalogue, search};
 use crate::workers::{Board, GaitSolver, Pool};
 use clap::Args;
 use gait_optimizer::TunedBounds;
@@ -28,13 +31,13 @@ pub(super) struct Tune {
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
     /// How many trials.
-    #[arg(long, default_value_t = 10, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value = "10", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
     /// Every random draw derives from it.
-    #[arg(long, default_value_t = 1, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(..=plan::LARGEST_SEED))]
+    #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// How many trials at the same time; default: the number of cores. 1 is reproducible bit for bit.
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
     /// The SQLite file; made if it does not exist. An unfinished study of the same kind in it goes on.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
@@ -45,9 +48,9 @@ pub(super) struct Tune {
 }
 
 impl Tune {
-    pub(super) async fn run(self) -> Result<(), Error> {
+    pub(super) async fn run(self) -> Result<Ended, Error> {
         let subject = self.body.subject()?;
-        let workers = cores_or(self.workers).clamp(1, 64);
+        let workers = cores_or(self.workers);
         let store = Store::open(&self.database).await?;
         let study = self.study(&store, subject, workers).await?;
 
@@ -68,11 +71,17 @@ impl Tune {
         let standing = Standing::read(&mut reader, study).await?;
         drop(reader);
         store.close().await;
-        match ended {
-            Some(ended) => ended?,
-            None => eprintln!("interrupted; the same command goes on from here"),
+        let interrupted = ended.is_none();
+        if let Some(ended) = ended {
+            ended?;
         }
-        self.print(&summary::of(&standing).map_err(Error::Learner)?)
+        self.print(&summary::of(&standing).map_err(Error::Learner)?)?;
+        if interrupted {
+            let done = standing.trials.len() - standing.open();
+            tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
+            return Ok(Ended::Interrupted);
+        }
+        Ok(Ended::Done)
     }
 
     /// The unfinished study of the same kind in the database, or a new one.
@@ -80,27 +89,22 @@ impl Tune {
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         let subject = catalogue::subject_with(&mut writer, body).await?;
-        let space = search::table_i().map_err(Error::Learner)?;
-        let unfinished = studies::active(&mut writer).await?.into_iter().find(|study| {
-            let plan = &study.plan;
-            plan.subject_id == subject.id
-                && plan.muscles == self.muscles.is_on()
-                && plan.trial_budget == self.trials
-                && plan.seed == self.seed
-                && plan.search_space == space
-        });
+        let new = NewStudy {
+            muscles: self.muscles.is_on(),
+            trial_budget: self.trials,
+            parallel_trials: u32::try_from(workers).unwrap_or(1),
+            seed: self.seed,
+            ..NewStudy::of(subject.id)
+        };
+        let wanted = plan::checked(&mut writer, new.clone()).await?;
+        let unfinished =
+            studies::active(&mut writer).await?.into_iter().find(|study| study.plan.tries_the_same_as(&wanted));
         let study = if let Some(study) = unfinished {
-            let done = trials::counts(&mut writer, study.id).await?;
-            eprintln!("going on with study {}: {} of {} trials", study.id, done.total - done.open, self.trials);
+            let done = trial_rows::counts(&mut writer, study.id).await?;
+            let ended = done.total - done.open;
+            tell(&format!("going on with study {}: {ended} of {} trials", study.id, self.trials));
             study
         } else {
-            let new = NewStudy {
-                muscles: self.muscles.is_on(),
-                trial_budget: self.trials,
-                parallel_trials: u32::try_from(workers).unwrap_or(1),
-                seed: self.seed,
-                ..NewStudy::of(subject.id)
-            };
             plan::create(&mut writer, &Actor::terminal(), new).await?
         };
         commit(writer).await?;
@@ -110,21 +114,20 @@ impl Tune {
     fn print(&self, summary: &Summary) -> Result<(), Error> {
         if self.json {
             let text = serde_json::to_string_pretty(summary).map_err(|e| Error::Internal(e.to_string()))?;
-            println!("{text}");
-            return Ok(());
+            return data(&text);
         }
         match (summary.best_trial, summary.best_action, summary.best_gait_rmse_rad) {
             (Some(number), Some(action), Some(rmse)) => {
-                println!("best: trial {number} of {}", summary.trials.len());
-                println!("  action            {}", action_line(&action));
-                println!("  Gait RMSE         {rmse:.4} rad");
+                data(&format!("best: trial {number} of {}", summary.trials.len()))?;
+                data(&format!("  action            {}", action_line(&action)))?;
+                data(&format!("  Gait RMSE         {rmse:.4} rad"))?;
                 if let Some(cost) = summary.best_cost_of_transport {
-                    println!("  cost of transport {cost:.4}");
+                    data(&format!("  cost of transport {cost:.4}"))?;
                 }
             }
-            _ => println!("no trial gave a gait"),
+            _ => data("no trial gave a gait")?,
         }
-        eprintln!("look at it: gaitwright serve --database {}", self.database.display());
+        tell(&format!("look at it: gaitwright serve --database {}", self.database.display()));
         Ok(())
     }
 }
@@ -142,22 +145,29 @@ async fn follow(director: &Director, study: &Study, json: bool) -> Result<(), Er
     loop {
         let mut reader = director.store().read().await?;
         let present = studies::get(&mut reader, study.id).await?;
-        let rows = trials::of_study(&mut reader, study.id).await?;
+        let rows = trial_rows::of_study(&mut reader, study.id).await?;
         drop(reader);
         for trial in rows.iter().filter(|trial| !trial.state.is_open()) {
             if shown.insert(trial.id) {
                 let line = trial_line(trial, &rows);
-                bar.suspend(|| if json { eprintln!("{line}") } else { println!("{line}") });
+                bar.suspend(|| {
+                    if json {
+                        tell(&line);
+                        return Ok(());
+                    }
+                    data(&line)
+                })?;
             }
         }
         bar.set_position(shown.len() as u64);
         match present.state {
-            StudyState::Running | StudyState::Waiting | StudyState::Draft => {}
+            StudyState::Running => {}
             StudyState::Finished => {
                 bar.finish_and_clear();
                 return Ok(());
             }
-            StudyState::Paused | StudyState::Stopped => {
+            // Nobody answers or starts anything here.
+            StudyState::Draft | StudyState::Waiting | StudyState::Paused | StudyState::Stopped => {
                 bar.finish_and_clear();
                 return Err(Error::conflict(format!(
                     "the study is {}: {}",

@@ -1,9 +1,10 @@
 //! Extractors whose refusals are problem documents.
 
+use super::BODY_LIMIT_BYTES;
 use crate::error::Error;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::str::FromStr;
@@ -28,6 +29,15 @@ pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Re
     })?;
     reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
     Ok(value)
+}
+
+/// A body that could not be taken in.
+pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
+    if status == StatusCode::PAYLOAD_TOO_LARGE {
+        Error::TooLarge(format!("the body is larger than {BODY_LIMIT_BYTES} bytes"))
+    } else {
+        Error::Malformed(format!("the body cannot be read: {reason}"))
+    }
 }
 
 /// The identifier in the path.
@@ -72,7 +82,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Form<T> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Self::Rejection> {
         let axum::Form(value) =
-            axum::Form::<T>::from_request(request, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+            axum::Form::<T>::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
         Ok(Self(value))
     }
 }

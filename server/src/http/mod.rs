@@ -4,6 +4,7 @@ pub mod api;
 mod blind_motion;
 mod extract;
 mod gait_series;
+mod host;
 mod identify;
 mod may;
 pub mod metrics;
@@ -19,5 +20,9 @@ mod same_origin;
 mod state;
 mod static_files;
 
+pub use host::Hosts;
 pub use router::router;
 pub use state::{Access, AppState};
+
+/// Largest request body: the largest legitimate one is a reference gait.
+const BODY_LIMIT_BYTES: usize = 1 << 20;

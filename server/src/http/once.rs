@@ -1,7 +1,7 @@
 //! Requests that may be repeated: with an Idempotency-Key, the effect happens once and the answer stays the same.
 
 use super::AppState;
-use super::extract::body;
+use super::extract::{body, unreadable};
 use super::may::permitted;
 use crate::access::{Caller, Permission};
 use crate::error::Error;
@@ -120,10 +120,7 @@ async fn read<P: Permission, S: Send + Sync>(
     let caller = permitted::<P>(request.extensions())?;
     let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
     let headers = request.headers().clone();
-    let bytes = Bytes::from_request(request, state).await.map_err(|e| {
-        let reason = format!("the body cannot be read: {}", e.body_text());
-        if e.status() == StatusCode::PAYLOAD_TOO_LARGE { Error::TooLarge(reason) } else { Error::Malformed(reason) }
-    })?;
+    let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
     Ok((Once::new(caller, &headers, &method, &path, &bytes)?, headers, bytes))
 }
 

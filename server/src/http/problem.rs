@@ -74,8 +74,14 @@ impl From<&Error> for Problem {
                 detail,
             ),
             Error::TooLarge(_) => {
-                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "/problems/too-large", "The body is too large", detail)
+                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "/problems/too-large", "The request is too large", detail)
             }
+            Error::MethodNotAllowed { .. } => Self::new(
+                StatusCode::METHOD_NOT_ALLOWED,
+                "/problems/method-not-allowed",
+                "Not possible with this method",
+                detail,
+            ),
             Error::Forbidden(_) => Self::new(StatusCode::FORBIDDEN, "/problems/forbidden", "Not allowed", detail),
             Error::Conflict(_) => {
                 Self::new(StatusCode::CONFLICT, "/problems/conflict", "Not possible in the present state", detail)
@@ -99,7 +105,10 @@ impl From<&Error> for Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(self)).into_response()
+        let mut answer = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
+        // For pages, which show the same problem in words.
+        answer.extensions_mut().insert(self);
+        answer
     }
 }
 

@@ -1,6 +1,6 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, api, identify, metrics, openapi, pages, same_origin, static_files};
+use super::{AppState, BODY_LIMIT_BYTES, api, host, identify, metrics, openapi, pages, same_origin, static_files};
 use crate::error::Error;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -15,9 +15,6 @@ use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
 use tower_http::trace::TraceLayer;
 use utoipa_axum::router::OpenApiRouter;
-
-/// Largest request body: the largest legitimate one is a reference gait.
-const BODY_LIMIT_BYTES: usize = 1 << 20;
 
 /// Everything comes from this origin; no inline scripts, no inline styles, no frames.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
@@ -42,9 +39,12 @@ pub fn router(state: AppState) -> Router {
         .route("/ready", get(api::health::ready))
         .route("/static/{*path}", get(static_files::get))
         .fallback(pages::error::no_such_page)
+        .method_not_allowed_fallback(pages::error::no_such_method)
         .layer(middleware::from_fn_with_state(state.clone(), identify::identify))
         .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
+        .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
+        .layer(middleware::from_fn(pages::error::problems_as_pages))
         .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, SLOWEST_ANSWER))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
         .layer(CatchPanicLayer::new())

@@ -1,5 +1,6 @@
 //! What every handler can reach.
 
+use super::host::Hosts;
 use super::metrics::Requests;
 use crate::access::BackOff;
 use crate::store::{Reader, Store, StoreResult, Writer};
@@ -15,6 +16,8 @@ pub struct AppState {
     pub access: Arc<Access>,
     /// What was asked of the service so far.
     pub requests: Arc<Requests>,
+    /// The names that the service answers to.
+    pub hosts: Hosts,
 }
 
 /// How people and programs say who they are.
@@ -44,8 +47,8 @@ impl Access {
 
 impl AppState {
     /// A service over a director.
-    pub fn new(director: Director, access: Arc<Access>) -> Self {
-        Self { director, access, requests: Arc::default() }
+    pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
+        Self { director, access, requests: Arc::default(), hosts }
     }
 
     /// The record.

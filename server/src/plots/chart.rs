@@ -46,13 +46,14 @@ pub struct Chart {
     pub whole_x: bool,
 }
 
-/// Size of the drawing and of its margins, in its own units.
+/// Size of the drawing and of its margins, in its own units. The style sheet enlarges the text of a narrow drawing:
+/// the margins leave room for that.
 const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 300.0;
-const LEFT: f64 = 64.0;
-const RIGHT: f64 = 14.0;
-const TOP: f64 = 30.0;
-const BOTTOM: f64 = 44.0;
+const HEIGHT: f64 = 330.0;
+const LEFT: f64 = 74.0;
+const RIGHT: f64 = 24.0;
+const TOP: f64 = 42.0;
+const BOTTOM: f64 = 60.0;
 
 impl Chart {
     /// A chart without lines.
@@ -88,9 +89,14 @@ impl Chart {
         svg
     }
 
-    /// The names of the lines, for a legend in HTML: class, label.
+    /// The names of the lines that have a point to be seen, for a legend in HTML: class, label.
     pub fn legend(&self) -> Vec<(String, &str)> {
-        self.series.iter().map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.as_str())).collect()
+        let seen = |s: &&Series| s.points.iter().any(|(x, y)| x.is_finite() && y.is_finite());
+        self.series
+            .iter()
+            .filter(seen)
+            .map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.as_str()))
+            .collect()
     }
 
     fn draw(&self, svg: &mut String, x: &Axis, y: &Axis) -> std::fmt::Result {
@@ -105,12 +111,12 @@ impl Chart {
         for &tick in &y.ticks {
             let at = py(tick);
             write!(svg, "<path class=\"grid\" d=\"M{LEFT} {at:.1}H{right}\"/>")?;
-            write!(svg, "<text class=\"tick y\" x=\"{}\" y=\"{:.1}\">{}</text>", LEFT - 8.0, at + 4.0, y.text(tick))?;
+            write!(svg, "<text class=\"tick y\" x=\"{}\" y=\"{:.1}\">{}</text>", LEFT - 8.0, at + 5.0, y.text(tick))?;
         }
         for &tick in &x.ticks {
             let at = px(tick);
             write!(svg, "<path class=\"grid\" d=\"M{at:.1} {bottom}v5\"/>")?;
-            write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 19.0, x.text(tick))?;
+            write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 22.0, x.text(tick))?;
         }
         for (value, name) in &self.marks {
             let at = px(*value);
@@ -118,7 +124,13 @@ impl Chart {
             if name.is_empty() {
                 continue;
             }
-            write!(svg, "<text class=\"mark\" x=\"{:.1}\" y=\"{:.1}\">{}</text>", at + 3.0, TOP + 10.0, escape(name))?;
+            // Down along its line: neighbouring lines may be near.
+            let (x, y) = (at + 4.0, TOP + 4.0);
+            write!(
+                svg,
+                "<text class=\"mark\" transform=\"translate({x:.1} {y:.1}) rotate(90)\">{}</text>",
+                escape(name)
+            )?;
         }
         write!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>")?;
         for series in &self.series {
@@ -128,10 +140,10 @@ impl Chart {
             svg,
             "<text class=\"label\" x=\"{:.1}\" y=\"{}\">{}</text>",
             f64::midpoint(LEFT, right),
-            HEIGHT - 6.0,
+            HEIGHT - 8.0,
             escape(&self.x_label)
         )?;
-        write!(svg, "<text class=\"label start\" x=\"4\" y=\"13\">{}</text>", escape(&self.y_label))?;
+        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.y_label))?;
         write!(svg, "</svg>")
     }
 }
@@ -193,5 +205,21 @@ mod tests {
         assert!(!svg.contains("<script>") && !svg.contains("NaN"));
         assert_eq!(svg.matches("<circle").count(), 2);
         assert_eq!(chart.legend().len(), 2);
+    }
+
+    #[test]
+    fn a_legend_names_what_is_seen() {
+        let chart = Chart::new("", "", "")
+            .with("seen", 0, Stroke::Points, vec![(0.0, 1.0)])
+            .with("empty", 1, Stroke::Steps, vec![])
+            .with("nowhere", 2, Stroke::Solid, vec![(0.0, f64::NAN)]);
+        assert_eq!(chart.legend(), [("key c0 points".to_owned(), "seen")]);
+    }
+
+    #[test]
+    fn a_mark_carries_its_name() {
+        let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (9.0, 2.0)]);
+        chart.marks = vec![(3.0, "DS2_R".to_owned())];
+        assert!(chart.svg().contains(">DS2_R</text>"));
     }
 }

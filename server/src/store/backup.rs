@@ -1,7 +1,7 @@
 //! Copies of the record: consistent while the service runs, checked before they are trusted.
 
-use super::migrations;
 use super::{Store, StoreError, StoreResult};
+use super::{file_kind, migrations};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::Path;
@@ -41,6 +41,7 @@ pub async fn check(file: &Path) -> StoreResult<()> {
 /// # Errors
 /// When it cannot be opened.
 pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
+    file_kind::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
     Ok(SqlitePoolOptions::new().max_connections(1).connect_with(options).await?)
 }

@@ -17,6 +17,14 @@ pub enum StoreError {
         /// What the system reports.
         source: std::io::Error,
     },
+    /// The file is something else than a database.
+    #[error("{} is not a gaitwright database: {reason}", path.display())]
+    NotADatabase {
+        /// The file.
+        path: PathBuf,
+        /// How that was seen.
+        reason: String,
+    },
     /// Another process owns the file.
     #[error("the database {} is in use by another gaitwright process; stop it first or choose another --database", path.display())]
     InUse {
@@ -58,6 +66,13 @@ pub enum StoreError {
     /// Anything else the database reports.
     #[error("database: {0}")]
     Database(#[from] sqlx::Error),
+}
+
+impl StoreError {
+    /// Whether a file was named that cannot be what was meant, rather than a failure of the record itself.
+    pub fn is_wrong_file(&self) -> bool {
+        matches!(self, Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. })
+    }
 }
 
 /// Turns the violation of a named constraint into a specific error.

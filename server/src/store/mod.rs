@@ -11,6 +11,7 @@ pub mod devices;
 mod error;
 pub mod events;
 pub mod feedback;
+mod file_kind;
 pub mod gaits;
 mod id;
 pub mod idempotency;
@@ -66,10 +67,21 @@ impl Store {
     /// Opens or creates the file, takes ownership of it and brings its schema up to date.
     ///
     /// # Errors
-    /// [`StoreError::InUse`] when another process owns the file, [`StoreError::NewerSchema`] when a newer
-    /// version of the program wrote it, otherwise what the database reports.
+    /// [`StoreError::NotADatabase`] when the file is something else, [`StoreError::InUse`] when another process owns
+    /// it, [`StoreError::NewerSchema`] when a newer version of the program wrote it, otherwise what the database
+    /// reports.
     pub async fn open(path: &Path) -> StoreResult<Self> {
-        let owner = take_ownership(path)?;
+        file_kind::check(path)?;
+        let (owner, made) = take_ownership(path)?;
+        let opened = Self::open_owned(path, owner).await.map_err(|error| file_kind::named(path, error));
+        if made && opened.as_ref().is_err_and(StoreError::is_wrong_file) {
+            // Nothing is left beside a file that is not ours.
+            let _ = std::fs::remove_file(lock_of(path));
+        }
+        opened
+    }
+
+    async fn open_owned(path: &Path, owner: File) -> StoreResult<Self> {
         let options = SqliteConnectOptions::new()
             .filename(path)
             .create_if_missing(true)
@@ -127,17 +139,24 @@ pub async fn commit(writer: Writer) -> StoreResult<()> {
 /// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].
 pub type Connection = SqliteConnection;
 
-fn take_ownership(path: &Path) -> StoreResult<File> {
+fn lock_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".lock");
+    PathBuf::from(name)
+}
+
+/// The locked file, and whether it was made for this.
+fn take_ownership(path: &Path) -> StoreResult<(File, bool)> {
+    let lock = lock_of(path);
+    let made = !lock.exists();
     let file = OpenOptions::new()
         .create(true)
         .truncate(false)
         .write(true)
-        .open(PathBuf::from(name))
+        .open(lock)
         .map_err(|source| StoreError::Open { path: path.to_owned(), source })?;
     match file.try_lock() {
-        Ok(()) => Ok(file),
+        Ok(()) => Ok((file, made)),
         Err(TryLockError::WouldBlock) => Err(StoreError::InUse { path: path.to_owned() }),
         Err(TryLockError::Error(source)) => Err(StoreError::Open { path: path.to_owned(), source }),
     }

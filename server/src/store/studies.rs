@@ -162,6 +162,15 @@ pub struct StudyPlan {
     pub seed: u64,
 }
 
+impl StudyPlan {
+    /// Whether a study of the other plan would try the same: same person, problem, learner and draws. Name, priority
+    /// and how many trials run at the same time do not matter.
+    pub fn tries_the_same_as(&self, other: &Self) -> bool {
+        let own = |plan: &Self| Self { name: String::new(), priority: 0, parallel_trials: 1, ..plan.clone() };
+        own(self) == own(other)
+    }
+}
+
 /// A study of the record.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Study {

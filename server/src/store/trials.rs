@@ -364,6 +364,13 @@ pub struct TrialCounts {
     pub without_result: u32,
 }
 
+impl TrialCounts {
+    /// How many gave a result: how far a study is.
+    pub fn results(&self) -> u32 {
+        self.converged + self.not_converged
+    }
+}
+
 /// Counts the trials of a study.
 ///
 /// # Errors

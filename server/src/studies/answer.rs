@@ -84,15 +84,23 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
 /// Takes an answer back.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when it was taken back already or is not a comparison.
+/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already
+/// or is not a comparison.
 pub async fn retract(
     writer: &mut Writer,
     caller: &Caller,
+    study: Option<StudyId>,
     id: FeedbackId,
     author: Option<&str>,
     reason: &str,
 ) -> Result<FeedbackRow, Error> {
+    if let Some(study) = study {
+        studies::get(writer, study).await?;
+    }
     let row = feedback::get(writer, id).await?;
+    if study.is_some_and(|study| study != row.study_id) {
+        return Err(Error::NotFound { what: "in this study, preference".to_owned(), id: id.to_string() });
+    }
     if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
         return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
     }

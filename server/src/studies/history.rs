@@ -1,9 +1,13 @@
 //! The best action by iteration: what the study would have recommended after each result.
+//!
+//! An iteration is a result. Results count in the order in which they came, which is the order of the trials' numbers
+//! unless several trials run at the same time.
 
 use super::choice::best_to_show;
 use super::standing::Standing;
-use crate::store::TrialId;
-use crate::store::trials::Trial;
+use crate::store::feedback::{FeedbackRow, Said};
+use crate::store::trials::{Trial, TrialState};
+use crate::store::{Instant, TrialId};
 use gait_learner::LearnerError;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -12,7 +16,7 @@ use utoipa::ToSchema;
 /// The recommendation after some results.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Milestone {
-    /// Number of the trial after whose proposal's predecessors this held: 1, 2, ...
+    /// After how many results this held: 1, 2, ...
     pub iteration: u32,
     /// The best trial then.
     pub trial_id: TrialId,
@@ -24,35 +28,81 @@ pub struct Milestone {
     pub cost_of_transport: Option<f64>,
 }
 
-/// The best trial after each iteration. What the learner believed when it proposed trial n + 1 is the best after
-/// iteration n; after the last one, what it believes now.
+/// The trials that gave a result, in the order in which they did: the first is iteration 1.
+pub fn results(standing: &Standing) -> Vec<&Trial> {
+    labelled(standing).into_iter().map(|(_, trial)| trial).collect()
+}
+
+/// With the instant at which each was recorded.
+fn labelled(standing: &Standing) -> Vec<(Instant, &Trial)> {
+    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+    let label = |row: &FeedbackRow| match row.said {
+        Said::Label { trial, .. } => by_id.get(&trial).map(|trial| (row.created_at, *trial)),
+        _ => None,
+    };
+    standing.feedback.iter().filter_map(label).collect()
+}
+
+/// How many results were there when a trial was proposed.
+fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
+    let mut count = labelled.partition_point(|(at, _)| *at <= proposed.created_at);
+    // Within one millisecond: what was proposed later cannot have been there before.
+    while count > 0 && labelled[count - 1].1.number >= proposed.number {
+        count -= 1;
+    }
+    count
+}
+
+/// The best trial after each iteration at which it was asked for. What the learner believed when it proposed a trial is
+/// the best after the results that were there then; after the last one, what it believes now. The first gait there is
+/// is the best one until more is known.
 ///
 /// # Errors
 /// When the learner refuses the log.
 pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
-    let mut history = known(standing);
-    let last = standing.trials.iter().rev().find(|trial| trial.state.is_result()).map(|trial| trial.number);
-    if let (Some(last), Some(best)) = (last, best_to_show(standing)?)
-        && history.last().is_none_or(|milestone| milestone.iteration < last)
+    let labelled = labelled(standing);
+    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+    let milestone = |results: usize, id: TrialId| {
+        let best = by_id.get(&id)?;
+        Some(Milestone {
+            iteration: u32::try_from(results).ok()?,
+            trial_id: id,
+            number: best.number,
+            gait_rmse_rad: best.gait_rmse_rad,
+            cost_of_transport: best.cost_of_transport,
+        })
+    };
+    let mut milestones: Vec<Milestone> = Vec::new();
+    let first = labelled.iter().position(|(_, trial)| trial.state == TrialState::Converged);
+    milestones.extend(first.and_then(|index| milestone(index + 1, labelled[index].1.id)));
+    let proposed = standing.trials.iter();
+    milestones.extend(proposed.filter_map(|trial| milestone(results_before(&labelled, trial), trial.best_before?)));
+    if !labelled.is_empty()
+        && let Some(best) = best_to_show(standing)?
     {
-        history.extend(standing.trial(best).map(|best| milestone(last, best)));
+        milestones.extend(milestone(labelled.len(), best));
     }
-    Ok(history)
+    // Of several after the same results, the last one had heard the most.
+    milestones.sort_by_key(|milestone| milestone.iteration);
+    milestones.reverse();
+    milestones.dedup_by_key(|milestone| milestone.iteration);
+    milestones.reverse();
+    Ok(milestones)
 }
 
-/// What is known without asking the learner: the best when each trial was proposed.
+/// What is known of some trials without asking the learner: the best when each was proposed. Iterations are those of
+/// one trial at a time.
 pub fn known(standing: &Standing) -> Vec<Milestone> {
     let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
-    let best_before = |trial: &Trial| by_id.get(&trial.best_before?).map(|best| milestone(trial.number - 1, best));
+    let best_before = |trial: &Trial| {
+        let best = by_id.get(&trial.best_before?)?;
+        Some(Milestone {
+            iteration: trial.number - 1,
+            trial_id: best.id,
+            number: best.number,
+            gait_rmse_rad: best.gait_rmse_rad,
+            cost_of_transport: best.cost_of_transport,
+        })
+    };
     standing.trials.iter().filter_map(best_before).collect()
-}
-
-fn milestone(iteration: u32, best: &Trial) -> Milestone {
-    Milestone {
-        iteration,
-        trial_id: best.id,
-        number: best.number,
-        gait_rmse_rad: best.gait_rmse_rad,
-        cost_of_transport: best.cost_of_transport,
-    }
 }

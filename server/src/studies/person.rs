@@ -43,18 +43,27 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result
     Ok(subject)
 }
 
+/// Characters that look like themselves. Controls, joiners, direction overrides and letters without a shape make two
+/// pseudonyms look alike, or one look like another.
+fn is_visible(c: char) -> bool {
+    const SHAPELESS: [char; 4] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}'];
+    (c.is_alphanumeric() && !SHAPELESS.contains(&c)) || " -_.:/#+()".contains(c)
+}
+
 /// A pseudonym that could be a person's address, number or date of birth is refused.
 fn check_pseudonym(pseudonym: &str) -> Result<(), Error> {
     let refuse = |allowed| Err(Error::invalid("pseudonym", pseudonym, allowed));
     if pseudonym.is_empty() || pseudonym.chars().count() > 40 {
         return refuse("1 to 40 characters");
     }
-    if pseudonym.chars().any(char::is_control) {
-        return refuse("printable characters");
-    }
-    let digits = pseudonym.chars().filter(char::is_ascii_digit).count();
+    let digits = pseudonym.chars().filter(|c| c.is_numeric()).count();
     if pseudonym.contains('@') || digits > 5 {
         return refuse("a code of the site such as S01: no address, no date, no long number");
+    }
+    if !pseudonym.chars().all(is_visible) {
+        return refuse(
+            "letters, digits, spaces and - _ . : / # + ( ): nothing that cannot be seen or turns text around",
+        );
     }
     Ok(())
 }

@@ -184,7 +184,11 @@ pub(super) async fn create_from(
     Ok(study)
 }
 
-async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
+/// What a study will be made of, every default filled in.
+///
+/// # Errors
+/// As [`create`]; nothing is written.
+pub async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
     let subject = subjects::get(writer, new.subject_id).await?;
     let device_id = match new.device_id {
         Some(id) => devices::get(writer, id).await?.id,

@@ -1,8 +1,8 @@
 //! Where a study stands, as its learner sees it: the log of results and answers, by action.
 
 use super::blind;
-use crate::store::feedback::{FeedbackRow, LogVersion, Said};
-use crate::store::studies::Study;
+use crate::store::feedback::{FeedbackRow, LogVersion, Said, Source};
+use crate::store::studies::{FeedbackMode, Study};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, StoreResult, TrialId, feedback, presentations, trials};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
@@ -63,6 +63,14 @@ impl Standing {
     /// The trial that gave the result of an action.
     pub fn trial_of(&self, action: ActionIndex) -> Option<&Trial> {
         self.trials.iter().find(|trial| trial.state.is_result() && trial.action_index == action)
+    }
+
+    /// Whether people are to answer the comparisons and no answer of theirs stands.
+    pub fn waits_for_first_answer(&self) -> bool {
+        let answered = |row: &FeedbackRow| {
+            row.retraction.is_none() && !matches!(row.source, Source::Convergence | Source::GaitRmse)
+        };
+        self.study.plan.feedback_mode == FeedbackMode::Human && !self.feedback.iter().any(answered)
     }
 
     /// How many trials are queued or running.

@@ -157,6 +157,6 @@ pub(super) async fn retract(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = answer::retract(&mut writer, &once.caller, id, why.author.as_deref(), &why.reason).await?;
+    let row = answer::retract(&mut writer, &once.caller, None, id, why.author.as_deref(), &why.reason).await?;
     once.finish(&app, writer, StatusCode::OK, None, &row).await
 }

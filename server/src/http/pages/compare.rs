@@ -1,28 +1,34 @@
 //! The form for a preference between two gaits of a study.
 
 use super::error::{Page, PageError, page};
+use super::gait_charts::{self, Drawn};
 use super::study::answer_in_words;
-use crate::access::{self, Read};
+use crate::access::{self, Caller, Read};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
+use crate::http::problem::Problem;
 use crate::store::feedback::Source;
-use crate::store::idempotency::{self, Kept};
+use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
-use crate::store::{FeedbackId, StudyId, TrialId, commit, feedback, studies, trials};
+use crate::store::{
+    FeedbackId, StoreError, StudyId, TrialId, commit, feedback, gaits, reference_gaits, studies, trials,
+};
 use crate::studies::answer::{self, Answer, Verdict};
 use crate::studies::choice::MANY;
 use crate::studies::comparison::open_question;
 use crate::studies::standing::Standing;
 use askama::Template;
 use axum::extract::State;
-use axum::response::Redirect;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
+use std::str::FromStr;
 
 /// Which gaits to offer, and what was just saved.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 pub(super) struct Choice {
     a: Option<TrialId>,
     b: Option<TrialId>,
@@ -34,8 +40,14 @@ pub(super) struct Choice {
 struct ComparePage {
     study: Study,
     trials: Vec<Offered>,
+    /// The two that are shown: identifier and number.
+    a: Option<(TrialId, u32)>,
+    b: Option<(TrialId, u32)>,
+    charts: Vec<Drawn>,
     key: FeedbackId,
     saved: Option<Saved>,
+    typed: Submitted,
+    refused: Option<String>,
 }
 
 /// A gait that can be compared.
@@ -64,8 +76,13 @@ pub(super) async fn get(
     Id(id): Id<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
+    show(&app, id, choice, Submitted::default(), None).await
+}
+
+async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
+    let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
     let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
     let standing = if large {
         Standing::newest(&mut reader, study, OFFERED).await?
@@ -76,7 +93,6 @@ pub(super) async fn get(
         Some(saved) => Some(feedback::get(&mut reader, saved).await?),
         None => None,
     };
-    drop(reader);
     let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
     let mut trials: Vec<Offered> = standing
         .trials
@@ -93,6 +109,21 @@ pub(super) async fn get(
     for trial in &mut trials {
         (trial.as_a, trial.as_b) = (a == Some(trial.id), b == Some(trial.id));
     }
+    let a = trials.iter().find(|trial| trial.as_a).map(|trial| (trial.id, trial.number));
+    let b = trials.iter().find(|trial| trial.as_b).map(|trial| (trial.id, trial.number));
+    let pair = match (a, b) {
+        (Some((a, _)), Some((b, _))) if a != b => {
+            match (gaits::get(&mut reader, a).await, gaits::get(&mut reader, b).await) {
+                (Ok(a), Ok(b)) => Some((a, b)),
+                (Err(StoreError::Missing { .. }), _) | (_, Err(StoreError::Missing { .. })) => None,
+                (Err(error), _) | (_, Err(error)) => return Err(error.into()),
+            }
+        }
+        _ => None,
+    };
+    drop(reader);
+    let draw = move || pair.map(|(a, b)| gait_charts::of_pair(&a, &b, &reference)).unwrap_or_default();
+    let charts = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
     let saved = saved.and_then(|row| {
         Some(Saved {
             id: row.id,
@@ -101,20 +132,63 @@ pub(super) async fn get(
             retracted: row.retraction.is_some(),
         })
     });
-    page(&ComparePage { study: standing.study, trials, key: FeedbackId::fresh(), saved })
+    page(&ComparePage { study: standing.study, trials, a, b, charts, key: FeedbackId::fresh(), saved, typed, refused })
 }
 
-/// The form as submitted.
-#[derive(Debug, Deserialize)]
+/// The form as typed, so that a refused one comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Submitted {
-    a: TrialId,
-    b: TrialId,
-    answer: Verdict,
-    source: Source,
+    a: String,
+    b: String,
+    #[serde(default)]
+    answer: String,
+    source: String,
     author: String,
     #[serde(default)]
     note: String,
-    key: FeedbackId,
+    key: String,
+}
+
+impl Submitted {
+    fn read(&self) -> Result<(Answer, FeedbackId), Error> {
+        let verdict = match self.answer.as_str() {
+            "a" => Verdict::A,
+            "b" => Verdict::B,
+            "no_difference" => Verdict::NoDifference,
+            other => return Err(Error::invalid("answer", other, "a, b, no_difference: choose one")),
+        };
+        let source = Source::from_str(&self.source)
+            .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician, script"))?;
+        let answer = Answer {
+            trial_a: identifier("trial_a", &self.a)?,
+            trial_b: identifier("trial_b", &self.b)?,
+            answer: verdict,
+            source: Some(source),
+            author: Some(self.author.clone()),
+            note: self.note.clone(),
+        };
+        Ok((answer, identifier("key", &self.key)?))
+    }
+
+    /// What tells this answer from another one with the same key.
+    fn fingerprint(&self, study: StudyId) -> String {
+        let Self { a, b, answer, source, author, note, key } = self;
+        let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
+        fingerprint("form", &format!("/studies/{study}/compare"), said.as_bytes())
+    }
+}
+
+fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
+    text.parse().map_err(|_| Error::invalid(field, text, "an identifier of this form"))
+}
+
+/// What became of a submitted form.
+enum Given {
+    /// It is recorded, now or before.
+    Saved(String),
+    /// The same form was sent before with another answer: that one is recorded.
+    Before(String),
 }
 
 /// `POST /studies/{id}/compare`.
@@ -123,29 +197,42 @@ pub(super) async fn post(
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Submitted>,
-) -> Result<Redirect, PageError> {
-    let answer = Answer {
-        trial_a: form.a,
-        trial_b: form.b,
-        answer: form.answer,
-        source: Some(form.source),
-        author: Some(form.author),
-        note: form.note,
+) -> Result<Response, PageError> {
+    let (saved, status, why) = match give(&app, &may.caller, id, &form).await {
+        Ok(Given::Saved(saved)) => {
+            return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")).into_response());
+        }
+        Ok(Given::Before(saved)) => {
+            let why = "This form was sent before with another answer. Recorded is the one above; this second one was \
+                       not taken. To change the answer, take the first one back and save again.";
+            (saved.parse().ok(), StatusCode::CONFLICT, why.to_owned())
+        }
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
+            (None, status, error.to_string())
+        }
+        Err(other) => return Err(other.into()),
     };
+    let choice = Choice { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
+    Ok((status, show(&app, id, choice, form, Some(why)).await?).into_response())
+}
+
+async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
+    let (answer, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
-    let key = format!("form {}", form.key);
-    let saved = if let Some(before) = idempotency::find(&mut writer, &may.caller.actor, &key).await? {
-        before.body
-    } else {
-        let saved = answer::give(&mut writer, &may.caller, id, &answer).await?.to_string();
-        let kept = Kept { request: key.clone(), status: 303, location: None, body: saved.clone() };
-        idempotency::keep(&mut writer, &may.caller.actor, &key, &kept).await?;
-        saved
-    };
+    let key = format!("form {key}");
+    let request = form.fingerprint(id);
+    if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
+        let same = before.request == request;
+        return Ok(if same { Given::Saved(before.body) } else { Given::Before(before.body) });
+    }
+    let saved = answer::give(&mut writer, caller, id, &answer).await?.to_string();
+    let kept = Kept { request, status: 303, location: None, body: saved.clone() };
+    idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
     commit(writer).await?;
     app.director.changed();
-    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")))
+    Ok(Given::Saved(saved))
 }
 
 /// Taking an answer back.
@@ -164,7 +251,7 @@ pub(super) async fn retract(
     Form(form): Form<Retract>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    answer::retract(&mut writer, &may.caller, form.feedback, Some(&form.author), &form.reason).await?;
+    answer::retract(&mut writer, &may.caller, Some(id), form.feedback, Some(&form.author), &form.reason).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.feedback)))

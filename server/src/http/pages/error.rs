@@ -3,7 +3,9 @@
 use crate::error::Error;
 use crate::http::problem::Problem;
 use askama::Template;
-use axum::http::StatusCode;
+use axum::extract::Request;
+use axum::http::{Method, StatusCode, Uri, header};
+use axum::middleware::Next;
 use axum::response::{Html, IntoResponse, Redirect, Response};
 
 /// An error that is shown as a page.
@@ -30,12 +32,15 @@ impl IntoResponse for PageError {
         if matches!(self.0, Error::NotSignedIn(_)) {
             return Redirect::to("/sign-in").into_response();
         }
-        let problem = Problem::from(&self.0);
-        let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        match (ErrorPage { problem }).render() {
-            Ok(text) => (status, Html(text)).into_response(),
-            Err(_) => status.into_response(),
-        }
+        shown(Problem::from(&self.0))
+    }
+}
+
+fn shown(problem: Problem) -> Response {
+    let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    match (ErrorPage { problem }).render() {
+        Ok(text) => (status, Html(text)).into_response(),
+        Err(_) => status.into_response(),
     }
 }
 
@@ -51,7 +56,28 @@ pub fn page(template: &impl Template) -> Page {
 }
 
 /// Any address that is no route.
-pub async fn no_such_page(uri: axum::http::Uri) -> Response {
-    let error = Error::NotFound { what: "the address".to_owned(), id: uri.path().to_owned() };
-    if uri.path().starts_with("/api/") { error.into_response() } else { PageError(error).into_response() }
+pub async fn no_such_page(uri: Uri) -> Error {
+    Error::NotFound { what: "the address".to_owned(), id: uri.path().to_owned() }
+}
+
+/// Any method that an address does not know.
+pub async fn no_such_method(method: Method, uri: Uri) -> Error {
+    Error::MethodNotAllowed { method: method.to_string(), path: uri.path().to_owned() }
+}
+
+/// Shows the problem documents of addresses for people as pages, wherever they come from.
+pub async fn problems_as_pages(request: Request, next: Next) -> Response {
+    let path = request.uri().path();
+    let for_programs = path.starts_with("/api/") || path == "/health" || path.starts_with("/static/");
+    let mut answer = next.run(request).await;
+    if for_programs {
+        return answer;
+    }
+    let Some(problem) = answer.extensions_mut().remove::<Problem>() else { return answer };
+    let allow = answer.headers_mut().remove(header::ALLOW);
+    let mut shown = shown(problem);
+    if let Some(allow) = allow {
+        shown.headers_mut().insert(header::ALLOW, allow);
+    }
+    shown
 }

@@ -28,6 +28,7 @@ struct GaitPage {
     from: Option<(TrialId, u32)>,
     has_gait: bool,
     charts: Vec<Drawn>,
+    phases: [(&'static str, &'static str); 4],
     trial: Trial,
 }
 
@@ -68,6 +69,7 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<Tr
         from,
         has_gait,
         charts,
+        phases: gait_charts::PHASES,
         trial,
     })
 }

@@ -2,6 +2,7 @@
 
 use crate::http::gait_series::{MUSCLES, Point, points};
 use crate::plots::{Chart, Stroke};
+use gait_optimizer::solve::Phase;
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
 
 /// A chart ready for the page.
@@ -18,6 +19,14 @@ impl Drawn {
         Self { title: chart.title.clone(), note, svg: chart.svg(), legend }
     }
 }
+
+/// The phases of the stride, in their order, for either leg.
+pub(super) const PHASES: [(&str, &str); 4] = [
+    ("DS2", "double support: the heel of the leading foot and the toe of the trailing foot are down"),
+    ("DS3", "double support: the leading foot is flat, the toe of the trailing foot is still down"),
+    ("SS2", "single support on the flat foot, the other leg swings"),
+    ("SS1", "single support on the toe, until the other heel strikes"),
+];
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Title and index into q and into the reference of the five human coordinates.
@@ -104,8 +113,55 @@ fn domain_starts(points: &[Point<'_>], end: f64) -> Vec<(f64, String)> {
     for point in points {
         if point.domain != current {
             current = point.domain;
-            starts.push((100.0 * point.time_s / end, String::new()));
+            starts.push((100.0 * point.time_s / end, current.to_owned()));
         }
+    }
+    starts
+}
+
+/// The human joint angles of two gaits, one over the other.
+pub(super) fn of_pair(a: &Gait, b: &Gait, reference: &ReferenceGait) -> Vec<Drawn> {
+    let line = |gait: &Gait, q: usize| -> Vec<(f64, f64)> {
+        let points = points(gait);
+        let end = points.last().map_or(1.0, |point| point.time_s).max(1e-9);
+        points.iter().map(|point| (100.0 * point.time_s / end, point.q[q].to_degrees())).collect()
+    };
+    let draw = |&(title, q, column): &(&str, usize, usize)| {
+        let measured = reference.angles_rad.iter().enumerate().map(|(i, row)| (i as f64, row[column].to_degrees()));
+        let chart = Chart::new(title, CYCLE, "angle, °")
+            .with("reference", 7, Stroke::Dashed, measured.collect())
+            .with("gait A", 0, Stroke::Solid, line(a, q))
+            .with("gait B", 1, Stroke::Dashed, line(b, q));
+        Drawn::new(&chart, "")
+    };
+    ANGLES.iter().map(draw).collect()
+}
+
+/// In words.
+fn phase_in_words(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Tracking => "tracking",
+        Phase::MuscleTracking => "tracking with muscles",
+        Phase::PlainCost => "cost without muscles",
+        Phase::Cost => "cost",
+    }
+}
+
+/// Where each phase of each guess begins.
+fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
+    let several = iterations.iter().any(|r| r.guess != iterations[0].guess);
+    let mut starts = Vec::new();
+    let mut last = None;
+    for (i, r) in iterations.iter().enumerate() {
+        // A phase that begins again (a cold start after a warm one) counts its iterations from a new beginning.
+        let again = i > 0 && r.iteration < iterations[i - 1].iteration;
+        if last == Some((r.guess, r.phase)) && !again {
+            continue;
+        }
+        last = Some((r.guess, r.phase));
+        let phase = phase_in_words(r.phase);
+        let name = if several { format!("guess {}: {phase}", r.guess + 1) } else { phase.to_owned() };
+        starts.push((i as f64, name));
     }
     starts
 }
@@ -115,6 +171,9 @@ pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Drawn> {
     if iterations.is_empty() {
         return None;
     }
+    // Guesses that ran side by side are shown one after the other.
+    let mut iterations: Vec<&IterationRecord> = iterations.iter().collect();
+    iterations.sort_by_key(|r| r.guess);
     let line = |f: fn(&IterationRecord) -> f64| -> Vec<(f64, f64)> {
         iterations.iter().enumerate().map(|(i, r)| (i as f64, f(r).max(1e-16).log10())).collect()
     };
@@ -123,5 +182,6 @@ pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Drawn> {
         .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
         .with("barrier", 2, Stroke::Solid, line(|r| r.barrier));
     chart.whole_x = true;
-    Some(Drawn::new(&chart, "Scaled; decimal logarithm."))
+    chart.marks = solve_phases(&iterations);
+    Some(Drawn::new(&chart, "Scaled; decimal logarithm. Vertical lines: where a phase of the solve begins."))
 }

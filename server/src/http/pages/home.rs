@@ -5,12 +5,14 @@ use super::format::words;
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::TrialCounts;
-use crate::store::{Connection, studies, subjects, trials};
+use crate::store::{Connection, StudyId, studies, subjects, trials};
 use askama::Template;
 use axum::extract::State;
+use serde::Deserialize;
 
 /// How many studies the page shows.
 const PAGE: u32 = 100;
@@ -19,6 +21,16 @@ const PAGE: u32 = 100;
 #[template(path = "home.html")]
 struct Home {
     studies: Vec<Row>,
+    /// Whether newer studies come before these.
+    later: bool,
+    /// The last study of this page, when older ones follow.
+    next: Option<StudyId>,
+}
+
+/// Which studies to show.
+#[derive(Debug, Deserialize)]
+pub(super) struct Before {
+    before: Option<StudyId>,
 }
 
 struct Row {
@@ -31,13 +43,17 @@ struct Row {
 }
 
 /// `GET /`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(Before { before }): Params<Before>) -> Page {
     let mut reader = app.read().await?;
+    let mut found = studies::page(&mut reader, before, PAGE + 1).await?;
+    let more = found.len() > PAGE as usize;
+    found.truncate(PAGE as usize);
+    let next = found.last().filter(|_| more).map(|study| study.id);
     let mut rows = Vec::new();
-    for study in studies::page(&mut reader, None, PAGE).await? {
+    for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    page(&Home { studies: rows })
+    page(&Home { studies: rows, later: before.is_some(), next })
 }
 
 async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {

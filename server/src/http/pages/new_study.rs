@@ -20,6 +20,7 @@ use std::str::FromStr;
 
 /// The fields as typed, so that a refused form comes back as it was.
 #[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Fields {
     #[serde(default)]
     name: String,
@@ -116,22 +117,40 @@ async fn create(app: &AppState, caller: &Caller, fields: &Fields) -> Result<Stud
         };
         person::add(&mut writer, &caller.actor, &new).await?.id
     } else {
+        nothing_described(fields)?;
         number::<SubjectId>("subject", &fields.subject, "a subject of the list")?
     };
     let new = NewStudy {
         name: Some(fields.name.clone()),
-        muscles: fields.muscles == "on",
+        muscles: match fields.muscles.as_str() {
+            "on" => true,
+            "off" => false,
+            other => return Err(Error::invalid("muscles", other, "on, off")),
+        },
         feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
             .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human, mixed"))?,
         trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
-        seed: number("seed", &fields.seed, "a whole number")?,
+        seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
         ..NewStudy::of(subject)
     };
     let study = plan::create(&mut writer, &caller.actor, new).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(study.id)
+}
+
+/// A person who is described but not chosen would be left out without a word.
+fn nothing_described(fields: &Fields) -> Result<(), Error> {
+    for (field, text) in
+        [("pseudonym", &fields.pseudonym), ("height_m", &fields.height_m), ("body_mass_kg", &fields.body_mass_kg)]
+    {
+        if !text.trim().is_empty() {
+            let allowed = "nothing, as a subject of the list is chosen; or choose \"A new subject\"";
+            return Err(Error::invalid(field, text.as_str(), allowed));
+        }
+    }
+    Ok(())
 }
 
 fn number<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<T, Error> {

@@ -45,6 +45,7 @@ struct Live {
     counts: TrialCounts,
     running: Vec<RunningRow>,
     best: Option<Best>,
+    unanswered: bool,
     chart: Option<String>,
     legend: Vec<(String, String)>,
     trials: Vec<TrialRow>,
@@ -154,6 +155,8 @@ fn button(act: Act) -> Option<ActButton> {
 
 /// What is computed from the standing: CPU work.
 struct Figures {
+    /// People are to answer and nobody has: what the learner believes then is only what it began with.
+    unanswered: bool,
     best: Option<TrialId>,
     history: Vec<Milestone>,
     question: bool,
@@ -190,10 +193,13 @@ fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::Le
     if large {
         let best = standing.trials.last().and_then(|newest| newest.best_before);
         let question = standing.study.state == StudyState::Waiting;
-        return Ok(Figures { best, history: history::known(standing), question });
+        return Ok(Figures { unanswered: false, best, history: history::known(standing), question });
     }
     let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
-    Ok(Figures { best: best_trial(standing)?, history: history::of(standing)?, question })
+    if standing.waits_for_first_answer() {
+        return Ok(Figures { unanswered: true, best: None, history: Vec::new(), question });
+    }
+    Ok(Figures { unanswered: false, best: best_trial(standing)?, history: history::of(standing)?, question })
 }
 
 fn running_row(trial: &Trial, track: Option<Track>) -> RunningRow {
@@ -232,6 +238,7 @@ fn view(standing: Standing, counts: TrialCounts, figures: &Figures, running: Vec
         counts,
         running,
         best,
+        unanswered: figures.unanswered,
         chart,
         legend,
         trials,
@@ -286,16 +293,17 @@ pub(super) fn answer_in_words(row: &FeedbackRow, standing: &Standing) -> Option<
 fn chart(standing: &Standing, history: &[Milestone]) -> Option<Chart> {
     let best: Vec<(f64, f64)> =
         history.iter().filter_map(|m| Some((f64::from(m.iteration), m.gait_rmse_rad?))).collect();
-    if best.is_empty() {
+    let converged: Vec<(f64, f64)> = history::results(standing)
+        .into_iter()
+        .zip(1_u32..)
+        .filter(|(trial, _)| trial.state == TrialState::Converged)
+        .filter_map(|(trial, iteration)| Some((f64::from(iteration), trial.gait_rmse_rad?)))
+        .collect();
+    if converged.is_empty() {
         return None;
     }
-    let converged: Vec<(f64, f64)> = standing
-        .trials
-        .iter()
-        .filter(|t| t.state == TrialState::Converged)
-        .filter_map(|t| Some((f64::from(t.number), t.gait_rmse_rad?)))
-        .collect();
-    let mut chart = Chart::new("Gait RMSE of the best action by iteration", "iteration (trial)", "Gait RMSE, rad")
+    let title = "Gait RMSE of the best action by iteration";
+    let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad")
         .with("trial", 7, Stroke::Points, converged)
         .with("best action so far", 0, Stroke::Steps, best);
     chart.whole_x = true;

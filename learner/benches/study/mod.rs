@@ -1,0 +1,85 @@
+//! The study that the benches measure.
+
+use std::hint::black_box;
+
+use gait_learner::{ActionIndex, Dimension, Feedback, FeedbackLog, Posterior, SearchSpace};
+
+/// Table I's grid of 11,664 actions.
+pub fn space() -> SearchSpace {
+    let dimensions = [2, 3, 3, 3, 4, 6, 3, 3]
+        .iter()
+        .enumerate()
+        .map(|(d, &n)| Dimension {
+            name: format!("a{}", d + 1),
+            values: (0..n).map(f64::from).collect(),
+            lengthscale: 1.0,
+        })
+        .collect();
+    SearchSpace::new(dimensions).expect("valid")
+}
+
+/// A study in which the actions tried approach an optimum, as they do, each compared with the best so far.
+pub fn study(space: &SearchSpace, comparisons: usize) -> FeedbackLog {
+    let mut state = 12345_u64;
+    let mut random = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    let optimum = [1, 2, 0, 1, 2, 3, 1, 0];
+    let utility = |action: ActionIndex| -> f64 {
+        space.levels(action).iter().zip(optimum).map(|(&l, o)| -((l as f64 - f64::from(o)).powi(2))).sum()
+    };
+    let mut log = FeedbackLog::default();
+    let mut best = None;
+    while log.visited.len() <= comparisons {
+        let mut action = ActionIndex(random() % space.len());
+        for _ in 0..log.visited.len().min(40) / 10 {
+            let other = ActionIndex(random() % space.len());
+            if utility(other) > utility(action) && !log.visited.contains(&other) {
+                action = other;
+            }
+        }
+        if log.visited.contains(&action) {
+            continue;
+        }
+        let category = usize::from(utility(action) > -16.0);
+        log.feedback.push(Feedback::Label { action, category });
+        if let Some(incumbent) = best {
+            let better = utility(action) > utility(incumbent);
+            let (winner, loser) = if better { (action, incumbent) } else { (incumbent, action) };
+            log.feedback.push(Feedback::Preference { winner, loser });
+            best = Some(winner);
+        } else {
+            best = Some(action);
+        }
+        log.visited.push(action);
+    }
+    log
+}
+
+/// The log before the last action.
+pub fn earlier(log: &FeedbackLog) -> FeedbackLog {
+    FeedbackLog {
+        visited: log.visited[..log.visited.len() - 1].to_vec(),
+        feedback: log.feedback[..log.feedback.len() - 2].to_vec(),
+    }
+}
+
+/// What a page about a study shows: every dimension's marginal, a slice, the actions tried by their probability of
+/// being the best from 1,000 joint draws, how likely each is to converge and to be preferred to the best, and how far
+/// the model agrees with the answers.
+pub fn page(belief: &Posterior) {
+    let best = belief.best().expect("tried");
+    for dimension in 0..belief.space().dimensions().len() {
+        black_box(belief.marginal(dimension).expect("exists"));
+    }
+    black_box(belief.slice(4, 5, best).expect("exists"));
+    black_box(belief.best_of_visited(1000, 1).expect("factors"));
+    for &action in belief.visited() {
+        black_box(belief.probability_of_converging(action).expect("exists"));
+        black_box(belief.preference_probability(action, best).expect("exists"));
+    }
+    black_box(belief.agreement());
+}

@@ -1,0 +1,179 @@
+//! Vector kernels on column-major storage whose column stride is a multiple of [`LANES`].
+//!
+//! Every result element is computed by the same sequence of fused multiply-adds whatever the width of the machine's
+//! vectors, so results do not depend on it.
+
+use pulp::Simd;
+
+/// Column strides are multiples of this, the widest vector of f64 in use.
+pub(super) const LANES: usize = 8;
+
+/// The next multiple of [`LANES`].
+pub(super) fn padded(length: usize) -> usize {
+    length.div_ceil(LANES) * LANES
+}
+
+#[inline(always)]
+fn vectors<S: Simd>(values: &[f64]) -> &[S::f64s] {
+    S::as_simd_f64s(values).0
+}
+
+#[inline(always)]
+fn vectors_mut<S: Simd>(values: &mut [f64]) -> &mut [S::f64s] {
+    S::as_mut_simd_f64s(values).0
+}
+
+#[inline(always)]
+fn column<S: Simd>(x: &[f64], stride: usize, k: u32) -> &[S::f64s] {
+    let k = k as usize;
+    vectors::<S>(&x[k * stride..(k + 1) * stride])
+}
+
+/// y -= f a.
+#[inline(always)]
+pub(super) fn subtract<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64) {
+    let f = simd.splat_f64s(-f);
+    for (y, a) in vectors_mut::<S>(y).iter_mut().zip(vectors::<S>(a)) {
+        *y = simd.mul_add_f64s(*a, f, *y);
+    }
+}
+
+/// y[from..to] -= f a[from..to]; nothing else changes.
+#[inline(always)]
+pub(super) fn subtract_range<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64, from: usize, to: usize) {
+    let inner = padded(from).min(to);
+    let end = (to / LANES * LANES).max(inner);
+    for i in (from..inner).chain(end..to) {
+        y[i] = a[i].mul_add(-f, y[i]);
+    }
+    subtract(simd, &mut y[inner..end], &a[inner..end], f);
+}
+
+/// y -= f a + g b.
+#[inline(always)]
+pub(super) fn subtract_two<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64, b: &[f64], g: f64) {
+    let (f, g) = (simd.splat_f64s(-f), simd.splat_f64s(-g));
+    for ((y, a), b) in vectors_mut::<S>(y).iter_mut().zip(vectors::<S>(a)).zip(vectors::<S>(b)) {
+        *y = simd.mul_add_f64s(*b, g, simd.mul_add_f64s(*a, f, *y));
+    }
+}
+
+/// y -= sum of f x_k over the terms (k, f), x_k being columns of x.
+#[inline(always)]
+pub(super) fn subtract_columns<S: Simd>(simd: S, y: &mut [f64], x: &[f64], stride: usize, terms: &[(u32, f64)]) {
+    let y = vectors_mut::<S>(y);
+    let (groups, rest) = terms.as_chunks::<4>();
+    for [ta, tb, tc, td] in groups {
+        let a = column::<S>(x, stride, ta.0);
+        let b = column::<S>(x, stride, tb.0);
+        let c = column::<S>(x, stride, tc.0);
+        let d = column::<S>(x, stride, td.0);
+        let (fa, fb) = (simd.splat_f64s(-ta.1), simd.splat_f64s(-tb.1));
+        let (fc, fd) = (simd.splat_f64s(-tc.1), simd.splat_f64s(-td.1));
+        for ((((y, a), b), c), d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            let sum = simd.mul_add_f64s(*b, fb, simd.mul_add_f64s(*a, fa, *y));
+            *y = simd.mul_add_f64s(*d, fd, simd.mul_add_f64s(*c, fc, sum));
+        }
+    }
+    for &(k, f) in rest {
+        let f = simd.splat_f64s(-f);
+        for (y, a) in y.iter_mut().zip(column::<S>(x, stride, k)) {
+            *y = simd.mul_add_f64s(*a, f, *y);
+        }
+    }
+}
+
+/// Dot product of vectors of padded length, in [`LANES`] partial sums.
+#[inline(always)]
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0f64; LANES];
+    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
+        for k in 0..LANES {
+            sums[k] = a[k].mul_add(b[k], sums[k]);
+        }
+    }
+    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+}
+
+/// Whether all values, of padded length, are finite.
+#[inline(always)]
+pub(super) fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0f64; LANES];
+    for block in values.as_chunks::<LANES>().0 {
+        for k in 0..LANES {
+            // Zero unless the value is infinite or not a number.
+            sums[k] += block[k] * 0.0;
+        }
+    }
+    sums.iter().all(|s| *s == 0.0)
+}
+
+/// Lower triangle (and what shares a tile with it) of S -= X G^T + G X^T over the first `count` columns of X and G and
+/// the first `size` columns of S.
+#[inline(always)]
+pub(super) fn subtract_symmetric_product<S: Simd>(
+    simd: S,
+    s: &mut [f64],
+    x: &[f64],
+    g: &[f64],
+    stride: usize,
+    count: usize,
+    size: usize,
+) {
+    let per_block = LANES / S::F64_LANES;
+    let height = stride / S::F64_LANES;
+    let mut j = 0;
+    while j < size {
+        let first = j / LANES * per_block;
+        if size - j >= 4 {
+            let mut i = first;
+            while i + 2 <= height {
+                product_tile::<S, 2, 4>(simd, s, x, g, stride, count, i, j);
+                i += 2;
+            }
+            if i < height {
+                product_tile::<S, 1, 4>(simd, s, x, g, stride, count, i, j);
+            }
+            j += 4;
+        } else {
+            for i in first..height {
+                product_tile::<S, 1, 1>(simd, s, x, g, stride, count, i, j);
+            }
+            j += 1;
+        }
+    }
+}
+
+/// V vectors by W columns of the product, from vector i and column j on.
+#[allow(clippy::too_many_arguments)] // a kernel
+#[inline(always)]
+fn product_tile<S: Simd, const V: usize, const W: usize>(
+    simd: S,
+    s: &mut [f64],
+    x: &[f64],
+    g: &[f64],
+    stride: usize,
+    count: usize,
+    i: usize,
+    j: usize,
+) {
+    let mut sum = [[simd.splat_f64s(0.0); V]; W];
+    for (x, g) in x.chunks_exact(stride).zip(g.chunks_exact(stride)).take(count) {
+        let rows = (vectors::<S>(x)[i..].first_chunk::<V>(), vectors::<S>(g)[i..].first_chunk::<V>());
+        let columns = (x[j..].first_chunk::<W>(), g[j..].first_chunk::<W>());
+        let ((Some(xi), Some(gi)), (Some(xj), Some(gj))) = (rows, columns) else { return };
+        for c in 0..W {
+            let (from_g, from_x) = (simd.splat_f64s(gj[c]), simd.splat_f64s(xj[c]));
+            for v in 0..V {
+                sum[c][v] = simd.mul_add_f64s(xi[v], from_g, sum[c][v]);
+                sum[c][v] = simd.mul_add_f64s(gi[v], from_x, sum[c][v]);
+            }
+        }
+    }
+    for c in 0..W {
+        let column = &mut s[(j + c) * stride..(j + c + 1) * stride];
+        for (out, sum) in vectors_mut::<S>(column)[i..].iter_mut().zip(&sum[c]) {
+            *out = simd.sub_f64s(*out, *sum);
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! Structure of one front of the multifrontal factorisation, found once for a fixed pattern.
+//!
+//! A front eliminates its pivots and hands the Schur complement of its border to its parent. Where it holds nearly as
+//! many equality rows as variables it works in two stages:
+//!
+//! 1. Null space: its rows determine as many of its variables, whatever the Hessian (see [`super::null_space`]).
+//! 2. The variables and rows that are left, together with everything that is no candidate for stage 1, are eliminated by
+//!    Bunch-Kaufman.
+//!
+//! All numbers of a front lie in one array; the *slots* of its reduced matrix are, in this order: spare slots for
+//! deferred rows, free variables, other pivots, border.
+
+use super::dense_kernels::padded;
+
+/// What an index of the matrix is to the factorisation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PivotKind {
+    /// A variable.
+    Variable,
+    /// An equality row: negligible diagonal.
+    Equality,
+    /// Any other row.
+    Other,
+}
+
+/// Rows that stage 1 may leave to stage 2 because no variable of the front can take them.
+pub(super) const MOST_DEFERRED: usize = 3;
+/// Fewer rows are not worth a stage of their own.
+const FEWEST_ROWS: usize = 6;
+
+/// Structure of a front.
+#[derive(Debug, Default)]
+pub(super) struct Front {
+    /// Stage 1: variables and rows. At least as many variables as rows.
+    pub variables: Vec<usize>,
+    pub rows: Vec<usize>,
+    /// Pivots of stage 2 only.
+    pub others: Vec<usize>,
+    /// Later indices it couples with, by elimination order.
+    pub border: Vec<usize>,
+    /// (position in the matrix values, offset in the numbers of the front).
+    pub sources: Vec<(u32, u32)>,
+    /// Child front and the places of its border.
+    pub children: Vec<(usize, ChildMap)>,
+    /// Multiplications and additions of a factorisation.
+    pub flops: f64,
+
+    /// Column stride of what is as long as the variables: Hessian, Jacobian.
+    pub tall: usize,
+    /// Column stride of what is as long as the slots: couplings, reduced matrix.
+    pub wide: usize,
+    /// Offsets: transposed Jacobian (becomes L and U), coupling of the variables with the slots, coupling of the rows
+    /// with the slots (becomes X), diagonal of the rows, reduced matrix. The Hessian is at 0.
+    pub jacobian: usize,
+    pub coupling: usize,
+    pub row_coupling: usize,
+    pub row_diagonal: usize,
+    pub reduced: usize,
+    /// Length of the numbers.
+    pub length: usize,
+}
+
+/// Place of an index in a front.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    Variable(u32),
+    Row(u32),
+    Slot(u32),
+}
+
+/// Where the border of a child lies in its parent: first variables, then slots in ascending order.
+#[derive(Debug, Default)]
+pub(super) struct ChildMap {
+    pub variables: Vec<u32>,
+    pub slots: Vec<u32>,
+}
+
+impl ChildMap {
+    /// `None` for places in another order.
+    pub(super) fn new(places: impl Iterator<Item = Place>) -> Option<Self> {
+        let mut map = Self::default();
+        for place in places {
+            match place {
+                Place::Variable(variable) if map.slots.is_empty() => map.variables.push(variable),
+                Place::Slot(slot) if map.slots.last().is_none_or(|last| *last < slot) => map.slots.push(slot),
+                _ => return None,
+            }
+        }
+        Some(map)
+    }
+}
+
+impl Front {
+    /// Front with these pivots and border. `touched`: pivots that a child contributes to; such rows have a diagonal, so
+    /// they are no candidates for stage 1.
+    pub(super) fn new(pivots: &[usize], border: Vec<usize>, kinds: &[PivotKind], touched: &[bool]) -> Self {
+        let is_row = |i: &usize| kinds[*i] == PivotKind::Equality && !touched[*i];
+        let variables: Vec<usize> = pivots.iter().copied().filter(|i| kinds[*i] == PivotKind::Variable).collect();
+        let rows: Vec<usize> = pivots.iter().copied().filter(is_row).collect();
+        let mut front = Self { border, ..Self::default() };
+        if rows.len() >= FEWEST_ROWS && rows.len() <= variables.len() {
+            front.others = pivots.iter().copied().filter(|i| kinds[*i] != PivotKind::Variable && !is_row(i)).collect();
+            (front.variables, front.rows) = (variables, rows);
+        } else {
+            front.others = pivots.to_vec();
+        }
+        let (variables, rows) = (front.variables.len(), front.rows.len());
+        let size = front.slots();
+        front.tall = padded(variables);
+        front.wide = padded(size);
+        front.jacobian = front.tall * variables;
+        front.coupling = front.jacobian + front.tall * rows;
+        front.row_coupling = front.coupling + front.wide * variables;
+        front.row_diagonal = front.row_coupling + front.wide * rows;
+        front.reduced = front.row_diagonal + padded(rows);
+        front.length = front.reduced + front.wide * size;
+        let square = |k: usize| (k * k) as f64;
+        front.flops = square(rows) * (variables + 2 * size) as f64
+            + rows as f64 * square(size)
+            + (0..front.pivot_slots() - front.spare()).map(|k| square(size - k) / 2.0).sum::<f64>();
+        front
+    }
+
+    /// Spare slots, at the beginning.
+    pub(super) fn spare(&self) -> usize {
+        if self.rows.is_empty() { 0 } else { 2 * MOST_DEFERRED }
+    }
+
+    /// Slots of stage 2's pivots, spare ones included.
+    pub(super) fn pivot_slots(&self) -> usize {
+        self.first_other() + self.others.len()
+    }
+
+    /// Slot of the first of the others.
+    pub(super) fn first_other(&self) -> usize {
+        self.spare() + self.variables.len() - self.rows.len()
+    }
+
+    /// All slots.
+    pub(super) fn slots(&self) -> usize {
+        self.pivot_slots() + self.border.len()
+    }
+
+    /// Index and place of everything in the front.
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, Place)> + '_ {
+        let first = self.first_other();
+        let number = |k: usize| u32::try_from(k).unwrap_or(u32::MAX);
+        let variables = self.variables.iter().enumerate().map(move |(k, i)| (*i, Place::Variable(number(k))));
+        let rows = self.rows.iter().enumerate().map(move |(k, i)| (*i, Place::Row(number(k))));
+        let slots = self.others.iter().chain(&self.border).enumerate();
+        variables.chain(rows).chain(slots.map(move |(k, i)| (*i, Place::Slot(number(first + k)))))
+    }
+
+    /// Offset of the entry that couples two places.
+    #[inline]
+    pub(super) fn offset(&self, a: Place, b: Place) -> usize {
+        use Place::{Row, Slot, Variable};
+        match (a, b) {
+            (Variable(i), Variable(j)) => i.min(j) as usize * self.tall + i.max(j) as usize,
+            (Variable(i), Row(e)) | (Row(e), Variable(i)) => self.jacobian + e as usize * self.tall + i as usize,
+            (Variable(i), Slot(s)) | (Slot(s), Variable(i)) => self.coupling + i as usize * self.wide + s as usize,
+            // Rows do not couple with each other but on the diagonal.
+            (Row(e), Row(_)) => self.row_diagonal + e as usize,
+            (Row(e), Slot(s)) | (Slot(s), Row(e)) => self.row_coupling + e as usize * self.wide + s as usize,
+            (Slot(i), Slot(j)) => self.reduced + i.min(j) as usize * self.wide + i.max(j) as usize,
+        }
+    }
+
+    /// Positions in the matrix values of the diagonals of the rows of stage 1.
+    pub(super) fn neglected(&self) -> impl Iterator<Item = u32> + '_ {
+        let diagonal = self.row_diagonal..self.row_diagonal + self.rows.len();
+        self.sources.iter().filter(move |s| diagonal.contains(&(s.1 as usize))).map(|s| s.0)
+    }
+
+    /// Numbers that the factorisation keeps.
+    pub(super) fn entries(&self) -> usize {
+        self.length
+    }
+}

@@ -1,0 +1,250 @@
+//! Stage 1 of a front: elimination of equality rows together with as many variables.
+//!
+//! Rows J v + C_e^T s = ... with s the slots of the front. LU with partial pivoting of J^T chooses variables v whose square
+//! part S of J is well conditioned; the others join the slots. With S^T = L U, X = C_e^T S^-T and the coupling C of
+//! the chosen variables with the slots, the Schur complement on the slots is
+//!
+//! ```text
+//! A - X G^T - G X^T,   G = C - H X / 2
+//! ```
+//!
+//! and [H S^T; S 0] has as many positive as negative eigenvalues whatever H. The diagonal of the rows is left out: it
+//! is the regularisation, many orders below S, and iterative refinement makes up for it.
+
+use pulp::Simd;
+
+use super::dense_kernels::{LANES, subtract, subtract_columns, subtract_symmetric_product};
+use super::front::{Front, MOST_DEFERRED};
+
+/// A pivot below this share of its row's largest entry defers the row.
+const SMALLEST_PIVOT: f64 = 1e-8;
+/// A diagonal above this is not negligible.
+pub(super) const LARGEST_DIAGONAL: f64 = 1e-6;
+
+/// Which variable and row each position of the LU factors belongs to.
+#[derive(Debug, Default)]
+pub(super) struct NullSpace {
+    /// Position -> variable of the front: the chosen ones, then the free ones.
+    pub variables: Vec<usize>,
+    /// Position -> row of the front: the eliminated ones, then the deferred ones.
+    pub rows: Vec<usize>,
+    /// Rows eliminated.
+    pub rank: usize,
+}
+
+/// Work arrays of a front.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    /// Columns as long as the slots.
+    pub columns: Vec<f64>,
+    /// Copy of the transposed Jacobian.
+    jacobian: Vec<f64>,
+    pivot: Vec<f64>,
+    terms: Vec<(u32, f64)>,
+}
+
+impl Workspace {
+    /// Enough for each of the fronts.
+    pub(super) fn new(fronts: &[Front]) -> Self {
+        let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
+        Self {
+            columns: vec![0.0; largest(&|f| f.wide * f.rows.len().max(2))],
+            jacobian: vec![0.0; largest(&|f| f.tall * f.rows.len())],
+            pivot: vec![0.0; largest(&|f| f.tall)],
+            terms: Vec::with_capacity(largest(&|f| f.variables.len())),
+        }
+    }
+}
+
+impl Front {
+    /// First slot in use when `rank` rows were eliminated.
+    pub(super) fn first_slot(&self, rank: usize) -> usize {
+        self.spare() - 2 * (self.rows.len() - rank)
+    }
+
+    /// Slot of the first free variable.
+    pub(super) fn first_free(&self, rank: usize) -> usize {
+        self.first_other() - (self.variables.len() - rank)
+    }
+}
+
+/// Eliminates the rows; false when too many must be deferred.
+#[inline(always)]
+pub(super) fn eliminate<S: Simd>(
+    simd: S,
+    front: &Front,
+    numbers: &mut [f64],
+    null_space: &mut NullSpace,
+    work: &mut Workspace,
+) -> bool {
+    let (tall, wide) = (front.tall, front.wide);
+    let variables = front.variables.len();
+    let (hessian, rest) = numbers.split_at_mut(front.jacobian);
+    let (lu, rest) = rest.split_at_mut(front.coupling - front.jacobian);
+    let (coupling, rest) = rest.split_at_mut(front.row_coupling - front.coupling);
+    let (x, rest) = rest.split_at_mut(front.row_diagonal - front.row_coupling);
+    let (diagonal, reduced) = rest.split_at_mut(front.reduced - front.row_diagonal);
+    work.jacobian[..lu.len()].copy_from_slice(lu);
+    if !factor(simd, front, lu, x, null_space, &mut work.pivot) {
+        return false;
+    }
+    let rank = null_space.rank;
+    for c in 0..variables {
+        for r in c + 1..variables {
+            hessian[r * tall + c] = hessian[c * tall + r];
+        }
+    }
+    solve_for_slots(simd, front, lu, x, rank, &mut work.terms);
+
+    // Free variables and deferred rows take their slots.
+    let first_free = front.first_free(rank);
+    let first_deferred = front.first_slot(rank);
+    for (slot, &row) in (first_deferred..).zip(&null_space.rows[rank..]) {
+        for v in 0..variables {
+            coupling[v * wide + slot] = work.jacobian[row * tall + v];
+        }
+        let position = slot - first_deferred + rank;
+        let source = &mut x[position * wide..(position + 1) * wide];
+        let target = &mut reduced[slot * wide..(slot + 1) * wide];
+        for (t, s) in target.iter_mut().zip(&*source).skip(front.first_other()) {
+            *t += s;
+        }
+        target[slot] = diagonal[row];
+        for (free, &variable) in (first_free..).zip(&null_space.variables[rank..]) {
+            target[free] = work.jacobian[row * tall + variable];
+        }
+        source.fill(0.0);
+    }
+    for (slot, &free) in (first_free..).zip(&null_space.variables[rank..]) {
+        for v in 0..variables {
+            coupling[v * wide + slot] = hessian[free * tall + v];
+        }
+    }
+    for (slot, &free) in (first_free..).zip(&null_space.variables[rank..]) {
+        let source = &coupling[free * wide..(free + 1) * wide];
+        for (t, s) in reduced[slot * wide..(slot + 1) * wide].iter_mut().zip(source).skip(slot) {
+            *t += s;
+        }
+    }
+
+    let g = &mut work.columns[..wide * rank];
+    for (position, &variable) in null_space.variables[..rank].iter().enumerate() {
+        let column = &mut g[position * wide..(position + 1) * wide];
+        column.copy_from_slice(&coupling[variable * wide..(variable + 1) * wide]);
+        work.terms.clear();
+        for (k, &other) in (0u32..).zip(&null_space.variables[..rank]) {
+            let h = hessian[variable * tall + other];
+            if h != 0.0 {
+                work.terms.push((k, 0.5 * h));
+            }
+        }
+        subtract_columns(simd, column, x, wide, &work.terms);
+    }
+    subtract_symmetric_product(simd, reduced, x, g, wide, rank, front.slots());
+    true
+}
+
+/// J^T = P L U, column by column; columns without an acceptable pivot go to the end.
+#[inline(always)]
+fn factor<S: Simd>(
+    simd: S,
+    front: &Front,
+    lu: &mut [f64],
+    x: &mut [f64],
+    null_space: &mut NullSpace,
+    pivot: &mut [f64],
+) -> bool {
+    let (tall, wide, variables) = (front.tall, front.wide, front.variables.len());
+    let mut count = front.rows.len();
+    null_space.variables.clear();
+    null_space.variables.extend(0..variables);
+    null_space.rows.clear();
+    null_space.rows.extend(0..count);
+    let mut t = 0;
+    while t < count {
+        let column = &lu[t * tall..t * tall + variables];
+        let (mut largest, mut at) = (0.0, t);
+        for (i, v) in column.iter().enumerate().skip(t) {
+            if v.abs() > largest {
+                (largest, at) = (v.abs(), i);
+            }
+        }
+        let eliminated = column[..t].iter().fold(largest, |a: f64, v| a.max(v.abs()));
+        if !(largest > SMALLEST_PIVOT * eliminated) {
+            count -= 1;
+            if null_space.rows.len() - count > MOST_DEFERRED {
+                return false;
+            }
+            for i in 0..tall {
+                lu.swap(t * tall + i, count * tall + i);
+            }
+            for i in 0..wide {
+                x.swap(t * wide + i, count * wide + i);
+            }
+            null_space.rows.swap(t, count);
+            continue;
+        }
+        if at != t {
+            for c in 0..null_space.rows.len() {
+                lu.swap(c * tall + t, c * tall + at);
+            }
+            null_space.variables.swap(t, at);
+        }
+        let (left, right) = lu.split_at_mut((t + 1) * tall);
+        let own = &mut left[t * tall..];
+        let inverse = 1.0 / own[t];
+        for v in &mut own[t + 1..variables] {
+            *v *= inverse;
+        }
+        // Whole vectors are updated: nothing above the diagonal may leak in.
+        let from = t / LANES * LANES;
+        let pivot = &mut pivot[from..tall];
+        pivot.copy_from_slice(&own[from..tall]);
+        pivot[..=t - from].fill(0.0);
+        for column in right.chunks_exact_mut(tall) {
+            let u = column[t];
+            if u != 0.0 {
+                subtract(simd, &mut column[from..], pivot, u);
+            }
+        }
+        t += 1;
+    }
+    null_space.rank = count;
+    true
+}
+
+/// X = C_e^T S^-T, the free variables' part included.
+#[inline(always)]
+fn solve_for_slots<S: Simd>(
+    simd: S,
+    front: &Front,
+    lu: &[f64],
+    x: &mut [f64],
+    rank: usize,
+    terms: &mut Vec<(u32, f64)>,
+) {
+    let (tall, wide) = (front.tall, front.wide);
+    for t in 0..rank {
+        let u = &lu[t * tall..(t + 1) * tall];
+        let (done, rest) = x.split_at_mut(t * wide);
+        let column = &mut rest[..wide];
+        terms.clear();
+        terms.extend((0u32..).zip(&u[..t]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
+        subtract_columns(simd, column, done, wide, terms);
+        let inverse = 1.0 / u[t];
+        for v in column {
+            *v *= inverse;
+        }
+    }
+    let (first, free) = (front.first_free(rank), front.variables.len() - rank);
+    for t in 0..rank {
+        x[t * wide + first..t * wide + first + free].copy_from_slice(&lu[t * tall + rank..t * tall + rank + free]);
+    }
+    for t in (0..rank).rev() {
+        let l = &lu[t * tall..(t + 1) * tall];
+        let (left, done) = x.split_at_mut((t + 1) * wide);
+        terms.clear();
+        terms.extend((0u32..).zip(&l[t + 1..rank]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
+        subtract_columns(simd, &mut left[t * wide..], done, wide, terms);
+    }
+}

@@ -1,0 +1,74 @@
+//! The public face on the real problem, on a coarse mesh and without muscles, so that it takes seconds.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
+
+use gait_optimizer::solve::StartedFrom;
+use gait_optimizer::{
+    CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
+    WarmStart, solve,
+};
+use std::sync::LazyLock;
+
+fn problem(bounds: &str) -> GaitProblem {
+    let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
+    problem.settings = GaitSettings { mesh: Mesh { ds2: 3, ds3: 3, ss2: 4, ss1: 4 }, ..GaitSettings::default() };
+    problem.bounds = TunedBounds::parse(bounds).unwrap();
+    problem
+}
+
+fn solved(problem: &GaitProblem, warm: Option<&WarmStart>, max_iterations: usize) -> SolveOutcome {
+    let options = SolveOptions { max_iterations, ..SolveOptions::default() };
+    solve(problem, warm, &options, &mut |_| {}, &CancelToken::new()).unwrap()
+}
+
+static COLD: LazyLock<SolveOutcome> = LazyLock::new(|| solved(&problem(""), None, 400));
+
+#[test]
+fn cold_then_warm() {
+    let report = &COLD.report;
+    assert_eq!((report.status, report.started_from), (SolveStatus::Converged, StartedFrom::Cold));
+    assert!(report.max_violation <= 1e-6 && COLD.violations.is_empty());
+    assert!(report.cost_of_transport > 0.01 && report.cost_of_transport < 0.2, "{}", report.cost_of_transport);
+    assert!(report.gait_rmse_rad > 0.1 && report.gait_rmse_rad < 3.0, "{}", report.gait_rmse_rad);
+    assert_eq!(COLD.gait.domains.len(), 8);
+
+    let warm = solved(&problem("a5=0.013"), Some(&COLD.warm_start), 400);
+    assert_eq!((warm.report.status, warm.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
+    assert!(warm.report.iterations < report.iterations, "{} {}", warm.report.iterations, report.iterations);
+    assert!(warm.report.attempts.iter().map(|a| a.chosen).eq([true]));
+}
+
+/// No posture meets these bounds, so the convex part of a cold start has no solution. The gait problem is tried all the
+/// same, and its status is the answer, with what the warm start gave.
+#[test]
+fn bounds_that_leave_no_posture_are_tried_all_the_same() {
+    for bounds in ["a6=0,a7=10,a8=10", "a7=5,a8=5"] {
+        let cold = solved(&problem(bounds), None, 15);
+        assert_eq!(cold.report.status, SolveStatus::IterationLimit);
+        assert!(cold.report.iterations >= 15 && !cold.violations.is_empty() && cold.report.max_violation > 1e-6);
+
+        let warm = solved(&problem(bounds), Some(&COLD.warm_start), 15).report;
+        assert_ne!(warm.status, SolveStatus::Converged);
+        assert!(warm.attempts.iter().map(|a| a.strategy.as_str()).eq(["warm start", "cold, direct"]));
+        assert_eq!(warm.attempts.iter().filter(|a| a.chosen).count(), 1);
+        assert!(warm.max_violation <= cold.report.max_violation, "the better of the two is kept");
+    }
+}
+
+#[test]
+fn a_start_from_which_nothing_can_be_done_is_an_attempt_with_a_reason() {
+    let mut warm = COLD.warm_start.clone();
+    warm.point.x[7] = f64::NAN;
+    let attempts = solved(&problem(""), Some(&warm), 5).report.attempts;
+    assert_eq!((attempts[0].status, attempts[0].iterations), (SolveStatus::Stalled, 0));
+    assert_eq!(attempts[0].reason, "invalid start: x[7] is NaN");
+    assert!(attempts[1].iterations > 0 && attempts[1].reason.is_empty());
+}
+
+#[test]
+fn a_warm_start_of_another_mesh_is_refused_in_words() {
+    let other = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
+    let error = solve(&other, Some(&COLD.warm_start), &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
+    let message = error.unwrap_err().to_string();
+    assert!(message.contains("its mesh is 3,3,4,4, the problem's is "), "{message}");
+}

@@ -1,0 +1,334 @@
+//! Pages and forms through the router: what they refuse, what they keep, what they say.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, TrialId};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::json;
+use std::time::Duration;
+use tempfile::TempDir;
+
+const FORM: &str = "application/x-www-form-urlencoded";
+const UNKNOWN: &str = "01890000-0000-7000-8000-000000000000";
+
+async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    (folder, service)
+}
+
+/// A finished study and two of its converged trials.
+async fn finished(service: &Service) -> (StudyId, TrialId, TrialId) {
+    let study = service.study(|new| new.trial_budget = 5).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let mut converged = trials.iter().filter(|t| t.state == TrialState::Converged).map(|t| t.id);
+    (study, converged.next().unwrap(), converged.next().unwrap())
+}
+
+#[track_caller]
+fn is_page(answer: &Answer, status: StatusCode, holds: &str) {
+    assert_eq!(answer.status, status, "{}", answer.text);
+    assert!(answer.content_type().starts_with("text/html"), "{}", answer.content_type());
+    assert!(answer.text.contains("</html>") && answer.text.contains(holds), "{holds}: {}", answer.text);
+}
+
+#[tokio::test]
+async fn errors_in_the_browser_are_pages_and_problem_documents_for_programs() {
+    let (_folder, service) = service().await;
+    let (study, _, _) = finished(&service).await;
+    for (path, status) in [
+        ("/studies/abc".to_owned(), StatusCode::NOT_FOUND),
+        ("/trials/abc".to_owned(), StatusCode::NOT_FOUND),
+        (format!("/studies/{UNKNOWN}"), StatusCode::NOT_FOUND),
+        (format!("/studies/{study}/compare?a=zz"), StatusCode::BAD_REQUEST),
+        ("/?before=zz".to_owned(), StatusCode::BAD_REQUEST),
+        (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
+        ("/nothing".to_owned(), StatusCode::NOT_FOUND),
+    ] {
+        is_page(&service.fetch(&path).await, status, "Back to the studies");
+    }
+    let wrong_method = service.post("/api/v1/health", &json!({})).await;
+    assert_eq!(wrong_method.status, StatusCode::METHOD_NOT_ALLOWED);
+    assert_eq!(wrong_method.content_type(), "application/problem+json");
+    assert_eq!(wrong_method.json()["type"], "/problems/method-not-allowed");
+    assert!(wrong_method.headers["allow"].to_str().unwrap().contains("GET"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_body_that_is_too_large_is_called_that() {
+    let (_folder, service) = service().await;
+    let text = "x".repeat((1 << 20) + 1);
+    let answer = service.post_text("/api/v1/subjects", "application/json", &text).await;
+    assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
+    assert_eq!(answer.json()["type"], "/problems/too-large");
+    is_page(&service.post_text("/studies/new", FORM, &text).await, StatusCode::PAYLOAD_TOO_LARGE, "1048576 bytes");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_name_that_suddenly_means_this_machine_is_refused() {
+    let (_folder, service) = service().await;
+    let with_host = |host: &str| {
+        let request = axum::http::Request::get("/api/v1/subjects").header("host", host);
+        request.body(axum::body::Body::empty()).unwrap()
+    };
+    for host in ["127.0.0.1:8080", "localhost:8080", "[::1]:1"] {
+        assert_eq!(service.send(with_host(host)).await.status, StatusCode::OK, "{host}");
+    }
+    for host in ["evil.example", "127.0.0.1.evil.example:8080", "10.0.0.7:8080"] {
+        let answer = service.send(with_host(host)).await;
+        assert_eq!(answer.status, StatusCode::FORBIDDEN, "{host}");
+        assert_eq!(answer.json()["type"], "/problems/forbidden");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn pseudonyms_that_deceive_are_refused() {
+    let (_folder, service) = service().await;
+    let add = async |pseudonym: &str| {
+        let body = json!({"pseudonym": pseudonym, "height_m": 1.8, "body_mass_kg": 70.5});
+        service.post("/api/v1/subjects", &body).await.status
+    };
+    for bad in [
+        "S\u{202e}10",
+        "S\u{200b}01",
+        "S\u{ad}01",
+        "S\u{feff}01",
+        "S\u{7}",
+        "\u{3164}\u{3164}",
+        "١٩٨٠٠٢٠٣",
+        "１９８００２０３",
+        "a<b",
+    ] {
+        assert_eq!(add(bad).await, StatusCode::UNPROCESSABLE_ENTITY, "{bad:?}");
+    }
+    for good in ["S01", "Zürich-7 (left)", "被験者 3", "site_2/S#4"] {
+        assert_eq!(add(good).await, StatusCode::CREATED, "{good:?}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_form_for_a_study_takes_no_field_for_granted() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let send = async |change: (&str, &str)| {
+        let id = subject.to_string();
+        let mut fields = vec![
+            ("subject", id.as_str()),
+            ("pseudonym", ""),
+            ("height_m", ""),
+            ("body_mass_kg", ""),
+            ("muscles", "off"),
+            ("feedback_mode", "automatic"),
+            ("trial_budget", "2"),
+            ("parallel_trials", "1"),
+            ("seed", "1"),
+            ("name", ""),
+        ];
+        match fields.iter_mut().find(|(name, _)| *name == change.0) {
+            Some(field) => field.1 = change.1,
+            None => fields.push(change),
+        }
+        let body: Vec<String> = fields.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        service.post_text("/studies/new", FORM, &body.join("&")).await
+    };
+    let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
+    for (field, value, says) in [
+        ("muscles", "maybe", "allowed: on, off"),
+        ("muscles", "", "allowed: on, off"),
+        ("feedback_mode", "both", "allowed: automatic, human, mixed"),
+        ("trial_budget", "-1", "allowed: 1 to 10000"),
+        ("parallel_trials", "1.5", "allowed: 1 to 64"),
+        ("seed", "-1", "allowed: 0 to 9007199254740991"),
+        ("subject", "paper-1", "a subject of the list"),
+        ("pseudonym", "S09", "A new subject"),
+        ("height_m", "1.8", "A new subject"),
+    ] {
+        is_page(&send((field, value)).await, unprocessable, &says.replace('"', "&#34;"));
+    }
+    is_page(&send(("colour", "red")).await, StatusCode::BAD_REQUEST, "colour");
+    assert_eq!(service.fetch("/api/v1/studies").await.json()["studies"], json!([]), "nothing was started");
+    assert_eq!(send(("muscles", "on")).await.status, StatusCode::SEE_OTHER);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn an_answer_is_taken_back_in_its_own_study_only() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let (other, _, _) = finished(&service).await;
+    let body = json!({"trial_a": a, "trial_b": b, "answer": "a"});
+    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await.json();
+    let id = given["id"].as_str().unwrap();
+    let form = format!("feedback={id}&author=K&reason=typo");
+    for elsewhere in [UNKNOWN.to_owned(), other.to_string()] {
+        let answer = service.post_text(&format!("/studies/{elsewhere}/retract"), FORM, &form).await;
+        is_page(&answer, StatusCode::NOT_FOUND, "does not exist");
+    }
+    let read = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
+    assert_eq!(read["retraction"], json!(null), "nothing was taken back");
+    let answer = service.post_text(&format!("/studies/{study}/retract"), FORM, &form).await;
+    assert_eq!(answer.status, StatusCode::SEE_OTHER);
+    // What was said is struck through, why it was taken back is not.
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    let struck = page.split("class=\"retracted\">").nth(1).unwrap().split("</span>").next().unwrap();
+    assert!(struck.contains("trial") && !struck.contains("typo") && page.contains("taken back: typo"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_form_that_is_sent_again_with_another_answer_says_which_one_counts() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let path = format!("/studies/{study}/compare");
+    let send = async |answer: &str, author: &str| {
+        let body = format!("a={a}&b={b}&answer={answer}&source=clinician&author={author}&note=firm&key={UNKNOWN}");
+        service.post_text(&path, FORM, &body).await
+    };
+    let before = service.feedback(study).await.len();
+    let first = send("a", "K").await;
+    assert_eq!(first.status, StatusCode::SEE_OTHER);
+    let same = send("a", "K").await;
+    assert_eq!((same.status, &same.headers["location"]), (StatusCode::SEE_OTHER, &first.headers["location"]));
+    let other = send("b", "K").await;
+    is_page(&other, StatusCode::CONFLICT, "this second one was not taken");
+    assert!(other.text.contains("Recorded") && other.text.contains(" over "), "the stored answer is shown");
+    assert!(other.text.contains("value=\"b\" checked") && other.text.contains("firm</textarea>"), "{}", other.text);
+    assert_eq!(service.feedback(study).await.len(), before + 1);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let path = format!("/studies/{study}/compare");
+    let page = service.fetch(&format!("{path}?a={a}&b={b}")).await;
+    for holds in [format!("href=\"/trials/{a}\""), format!("href=\"/trials/{b}\""), "gait A".into(), "gait B".into()] {
+        assert!(page.text.contains(&holds), "{holds}");
+    }
+    assert_eq!(page.text.matches("<svg").count(), 5, "the five human joint angles");
+    let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
+    let nobody = format!("a={a}&b={b}&answer=b&source=clinician&author=+&note=both+limp&key={UNKNOWN}");
+    let refused = service.post_text(&path, FORM, &nobody).await;
+    is_page(&refused, unprocessable, "1 to 80 characters");
+    for kept in ["value=\"b\" checked", "value=\"clinician\" selected", "both limp</textarea>"] {
+        assert!(refused.text.contains(kept), "{kept}");
+    }
+    let none = format!("a={a}&b={b}&source=clinician&author=K&note=&key={UNKNOWN}");
+    is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "choose one");
+    let itself = format!("a={a}&b={a}&answer=b&source=clinician&author=K&note=&key={UNKNOWN}");
+    is_page(&service.post_text(&path, FORM, &itself).await, unprocessable, "compared with itself");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn without_answers_no_action_is_called_the_best() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains("No answers yet") && !page.contains("best action so far") && !page.contains(">best<"));
+    let trials = service.trials(study).await;
+    let (new, old) = (trials[trials.len() - 1].id, trials[trials.len() - 2].id);
+    let body = json!({"trial_a": new, "trial_b": old, "answer": "a"});
+    service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await;
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(!page.contains("No answers yet") && page.contains("best action so far"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_cancelled_trial_is_no_progress() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = Analytic::slow(Duration::from_millis(20));
+    let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for_trials(study, 1).await;
+    while !service.trials(study).await.iter().any(|trial| trial.number == 2 && trial.state == TrialState::Running) {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    service.post(&format!("/api/v1/studies/{study}/stop"), &json!({})).await;
+    service.wait_for(study, &[StudyState::Stopped]).await;
+    let trials = service.trials(study).await;
+    let results = trials.iter().filter(|trial| trial.state.is_result()).count();
+    assert!(results < trials.len(), "one was cancelled");
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains(&format!("{results} of 3 trials")), "{page}");
+    assert!(page.contains(&format!("value=\"{results}\"")) && page.contains("without a result"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(2)), 3).await;
+    for budget in [3, 9] {
+        let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (budget, 3)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        let history = service.fetch(&format!("/api/v1/studies/{study}/history")).await.json();
+        let history = history.as_array().unwrap();
+        let order: Vec<_> = service
+            .feedback(study)
+            .await
+            .iter()
+            .filter_map(|row| match row.said {
+                gaitwright::store::feedback::Said::Label { trial, .. } => Some(trial),
+                _ => None,
+            })
+            .collect();
+        let trials = service.trials(study).await;
+        let state = |id: &TrialId| trials.iter().find(|trial| trial.id == *id).unwrap().state;
+        let first = order.iter().position(|id| state(id) == TrialState::Converged).unwrap();
+        let begins = history.iter().find(|milestone| milestone["gait_rmse_rad"].is_number()).unwrap();
+        assert_eq!((&begins["iteration"], &begins["trial_id"]), (&json!(first + 1), &json!(order[first])));
+        assert_eq!(history.last().unwrap()["iteration"], json!(budget));
+        let iterations: Vec<_> = history.iter().map(|milestone| milestone["iteration"].as_u64()).collect();
+        assert!(iterations.is_sorted_by(|a, b| a < b), "{iterations:?}");
+        // The best after some results is one of them.
+        for milestone in history {
+            let there = usize::try_from(milestone["iteration"].as_u64().unwrap()).unwrap();
+            let best = milestone["trial_id"].as_str().unwrap();
+            assert!(order[..there].iter().any(|id| id.to_string() == best), "{milestone}");
+        }
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_gait_page_explains_its_lines() {
+    let (_folder, service) = service().await;
+    let (study, a, _) = finished(&service).await;
+    let page = service.fetch(&format!("/trials/{a}")).await.text;
+    for name in ["DS2", "DS3", "SS2", "SS1"] {
+        assert!(page.contains(&format!("<dt>{name}</dt>")), "{name} is explained");
+        assert!(page.contains(&format!(">{name}_R</text>")) && page.contains(&format!(">{name}_L</text>")), "{name}");
+    }
+    assert!(page.contains(">cost</text>"), "the phases of the solve are marked");
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains("reference gait: ") && page.contains("Subject paper-1"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_list_of_studies_goes_on_beyond_its_first_page() {
+    let (_folder, service) = service().await;
+    for seed in 0..103 {
+        service.study(|new| (new.seed, new.start, new.name) = (seed, false, Some(format!("number {seed}.")))).await;
+    }
+    let first = service.fetch("/").await.text;
+    assert!(first.contains("number 102.") && first.contains("number 3.") && !first.contains("number 2."));
+    let next = first.split("href=\"/?before=").nth(1).unwrap().split('"').next().unwrap();
+    let second = service.fetch(&format!("/?before={next}")).await.text;
+    assert!(second.contains("number 2.") && second.contains("number 0.") && !second.contains("number 3."));
+    assert!(second.contains("Newest studies") && !second.contains("Older studies"));
+    service.stop().await;
+}

@@ -1,0 +1,205 @@
+//! The command line with the real optimizer, as a person starts it: coarse meshes and no muscles, so that it takes
+//! seconds. `GAITWRIGHT_LONG_TESTS=1` adds a gait with muscles.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::{Store, StudyId, commit, studies, subjects, trials};
+use gaitwright::studies::catalogue;
+use gaitwright::studies::plan::{self, NewStudy};
+use gaitwright_tests::cli;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::{Output, Stdio};
+use std::time::Duration;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
+const COARSE: [&str; 4] = ["--muscles", "off", "--mesh", "2,2,3,3"];
+
+fn gaitwright(folder: &Path, arguments: &[&str]) -> Output {
+    let output = cli::run(BINARY, folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+fn json_of(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stdout)))
+}
+
+/// Numbers and identifiers differ from machine to machine and from run to run; names, words and order do not.
+fn redacted(value: &Value) -> Value {
+    match value {
+        Value::Number(_) => "[number]".into(),
+        Value::String(text) if text.len() == 36 && text.matches('-').count() == 4 => "[id]".into(),
+        Value::Array(list) if list.iter().all(Value::is_number) => json!(format!("[{} numbers]", list.len())),
+        Value::Array(list) => list.iter().map(redacted).collect(),
+        Value::Object(fields) => Value::Object(fields.iter().map(|(k, v)| (k.clone(), redacted(v))).collect()),
+        other => other.clone(),
+    }
+}
+
+#[test]
+fn one_gait_cold_and_warm_and_a_table_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let cold = json_of(&gaitwright(folder, &[&["solve", "--json", "--out", "gait.json"][..], &COARSE].concat()));
+    insta::assert_json_snapshot!("solve_cold", redacted(&cold));
+    assert_eq!(cold["status"], "converged");
+    assert!(cold["max_violation"].as_f64().unwrap() <= 1e-6);
+
+    let warm = ["solve", "--json", "--warm", "gait.json", "--bounds", "a5=0.013"];
+    let warm = json_of(&gaitwright(folder, &[&warm[..], &COARSE].concat()));
+    insta::assert_json_snapshot!("solve_warm", redacted(&warm));
+    assert!(warm["iterations"].as_u64() < cold["iterations"].as_u64());
+
+    let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0.013,0.5,50,40\n20,90,0.3,1.4,0,0.5,5,5\n";
+    std::fs::write(folder.join("actions.csv"), actions).unwrap();
+    let sweep = ["sweep", "--actions", "actions.csv", "--out", "out.csv", "--warm", "gait.json", "--max-iterations"];
+    let output = gaitwright(folder, &[&sweep[..], &["60"], &COARSE].concat());
+    assert!(output.stdout.is_empty());
+    let table = std::fs::read_to_string(folder.join("out.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    insta::assert_snapshot!("sweep_header", rows[0]);
+    assert!(rows[1].starts_with("20,90,0.3,1.4,0.013,0.5,50,40,converged,"), "{}", rows[1]);
+    // No posture meets these bounds: that is an answer, and one of the six words.
+    let status = rows[2].strip_prefix("20,90,0.3,1.4,0,0.5,5,5,").unwrap().split(',').next().unwrap();
+    assert!(["infeasible", "stalled", "iteration_limit"].contains(&status), "{}", rows[2]);
+    assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "out.csv"]);
+
+    // Another mesh is refused in words, once for the whole table.
+    let output = cli::run(BINARY, folder, &[&sweep[..], &["60", "--muscles", "off"]].concat());
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("its mesh is 2,2,3,3, the problem's is "), "{text}");
+}
+
+/// A place that goes away while the solve runs: the figures are printed all the same.
+#[test]
+fn the_figures_outlive_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("place");
+    std::fs::create_dir(&place).unwrap();
+    let arguments = [&["solve", "--json", "--out", "place/gait.json", "--max-iterations", "40"][..], &COARSE].concat();
+    let child =
+        cli::command(BINARY, folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !place.join("gait.json.part").exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::fs::remove_dir_all(&place).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("cannot write place/gait.json"));
+    assert!(json_of(&output)["status"].is_string());
+}
+
+#[test]
+fn a_study_of_three_trials() {
+    let folder = tempfile::tempdir().unwrap();
+    let tune = ["tune", "--muscles", "off", "--trials", "3", "--seed", "2", "--workers", "1", "--json"];
+    let summary = json_of(&gaitwright(folder.path(), &tune));
+    assert_eq!(summary["state"], "finished");
+    let trials = summary["trials"].as_array().unwrap();
+    assert_eq!(trials.len(), 3);
+    for trial in trials {
+        assert!(["converged", "not_converged"].contains(&trial["label"].as_str().unwrap()), "{trial}");
+        insta::assert_json_snapshot!("tune_trial_fields", trial.as_object().unwrap().keys().collect::<Vec<_>>());
+    }
+    assert_eq!(trials[0]["warm_started_from"], Value::Null);
+    let best = trials.iter().find(|trial| trial["number"] == summary["best_trial"]).expect("a best trial");
+    assert_eq!((&best["action"], &best["label"]), (&summary["best_action"], &json!("converged")));
+    insta::assert_json_snapshot!("tune_fields", summary.as_object().unwrap().keys().collect::<Vec<_>>());
+}
+
+/// Waits for a condition that another process brings about.
+async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
+    for _ in 0..6000 {
+        if done().await {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    panic!("{what} did not happen");
+}
+
+/// A study that differs from what the command asks for only in one part of its plan.
+async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyId {
+    let store = Store::open(database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    catalogue::ensure(&mut writer).await.unwrap();
+    let subject = subjects::by_pseudonym(&mut writer, "paper-1").await.unwrap().unwrap();
+    let mut new = NewStudy { muscles: false, trial_budget: 2, ..NewStudy::of(subject.id) };
+    change(&mut new);
+    let study = plan::create(&mut writer, &gaitwright::store::audit::Actor::program(), new).await.unwrap();
+    commit(writer).await.unwrap();
+    store.close().await;
+    study.id
+}
+
+/// Ctrl-C ends a study with the usual code and a word on how to go on; the same command then goes on with that study
+/// and with no other.
+#[cfg(unix)]
+#[tokio::test]
+async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("gaitwright.db");
+    let of_people = study_in(&database, |new| new.feedback_mode = FeedbackMode::Human).await;
+    let coarser = study_in(&database, |new| new.gait_settings.mesh.ss2 += 1).await;
+    let shorter = study_in(&database, |new| new.solve_options.max_iterations = 7).await;
+    let tighter = study_in(&database, |new| new.base_bounds.a1 = 19.0).await;
+    let bolder = study_in(&database, |new| new.learner.preference_noise *= 2.0).await;
+
+    let arguments = ["tune", "--muscles", "off", "--trials", "2", "--workers", "1", "--json"];
+    let child =
+        cli::command(BINARY, folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let of_others = [of_people, coarser, shorter, tighter, bolder];
+    let pool = gaitwright::store::backup::open_read_only(&database).await.unwrap();
+    let mut ours = None;
+    until("a study of its own", async || {
+        let mut reader = pool.acquire().await.unwrap();
+        let all = studies::page(&mut reader, None, 10).await.unwrap();
+        ours = all.into_iter().map(|study| study.id).find(|id| !of_others.contains(id));
+        match ours {
+            Some(id) => !trials::of_study(&mut reader, id).await.unwrap().is_empty(),
+            None => false,
+        }
+    })
+    .await;
+    pool.close().await;
+    let signalled = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(signalled.success());
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("the same command goes on from there"), "{text}");
+    assert_eq!(json_of(&output)["state"], "running");
+
+    let again = gaitwright(folder.path(), &arguments);
+    assert!(String::from_utf8_lossy(&again.stderr).contains("going on with study"));
+    let summary = json_of(&again);
+    assert_eq!((&summary["study_id"], &summary["state"]), (&json!(ours.unwrap()), &json!("finished")));
+    let store = Store::open(&database).await.unwrap();
+    let mut reader = store.read().await.unwrap();
+    for other in of_others {
+        assert!(trials::of_study(&mut reader, other).await.unwrap().is_empty());
+        assert_eq!(studies::get(&mut reader, other).await.unwrap().state, StudyState::Running);
+    }
+    drop(reader);
+    store.close().await;
+}
+
+#[test]
+fn long_a_gait_with_muscles() {
+    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
+        eprintln!("skipped: GAITWRIGHT_LONG_TESTS is not set");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = ["--mesh", "3,3,4,4", "--json"];
+    let cold = json_of(&gaitwright(folder.path(), &[&["solve", "--out", "gait.json"][..], &mesh].concat()));
+    assert_eq!(cold["status"], "converged");
+    assert!(cold["attempts"].as_array().unwrap().len() >= 2, "several guesses");
+    let warm = ["solve", "--warm", "gait.json", "--bounds", "a5=0.013"];
+    let warm = json_of(&gaitwright(folder.path(), &[&warm[..], &mesh].concat()));
+    assert_eq!((&warm["status"], &warm["started_from"]), (&json!("converged"), &json!("warm")));
+}
