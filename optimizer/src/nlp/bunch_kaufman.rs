@@ -1,6 +1,9 @@
 //! Bunch-Kaufman factorisation of the leading columns of a symmetric matrix (Golub and Van Loan, section 4.4.4), with the
 //! Schur complement left in the rest: P A P^T = L B L^T, B with blocks of order one and two.
 
+// Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
+#![allow(clippy::inline_always)]
+
 use pulp::Simd;
 
 use super::dense_kernels::{LANES, subtract, subtract_two};

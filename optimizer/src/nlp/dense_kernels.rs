@@ -3,6 +3,9 @@
 //! Every result element is computed by the same sequence of fused multiply-adds whatever the width of the machine's
 //! vectors, so results do not depend on it.
 
+// Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
+#![allow(clippy::inline_always)]
+
 use pulp::Simd;
 
 /// Column strides are multiples of this, the widest vector of f64 in use.

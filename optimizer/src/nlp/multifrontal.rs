@@ -9,6 +9,9 @@
 //! Independent subtrees are factorised by several threads. Each front is computed by one thread, from its own entries
 //! and then its children in fixed order, so the result is bit for bit that of one thread.
 
+// Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
+#![allow(clippy::inline_always)]
+
 use pulp::{Arch, Simd, WithSimd};
 
 use super::bunch_kaufman::{self, Pivots, inverse_pair};

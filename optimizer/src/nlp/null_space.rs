@@ -11,6 +11,9 @@
 //! and [H S^T; S 0] has as many positive as negative eigenvalues whatever H. The diagonal of the rows is left out: it
 //! is the regularisation, many orders below S, and iterative refinement makes up for it.
 
+// Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
+#![allow(clippy::inline_always)]
+
 use pulp::Simd;
 
 use super::dense_kernels::{LANES, subtract, subtract_columns, subtract_symmetric_product};
@@ -170,7 +173,9 @@ fn factor<S: Simd>(
             }
         }
         let eliminated = column[..t].iter().fold(largest, |a: f64, v| a.max(v.abs()));
-        if !(largest > SMALLEST_PIVOT * eliminated) {
+        // Not a number is no pivot.
+        let acceptable = largest > SMALLEST_PIVOT * eliminated;
+        if !acceptable {
             count -= 1;
             if null_space.rows.len() - count > MOST_DEFERRED {
                 return false;
