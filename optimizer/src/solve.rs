@@ -139,8 +139,7 @@ pub struct SolveOptions {
     /// Threads, 1 to 16: for the cold guesses side by side, then for the linear algebra of each. The result does not
     /// depend on it.
     pub threads: usize,
-    /// How many guesses of [`ColdGuess::CATALOGUE`] a cold start tries. The variant without muscles has one basin from
-    /// all of them and tries one.
+    /// How many guesses of [`ColdGuess::CATALOGUE`] a cold start tries.
     pub cold_guesses: usize,
     /// Which of the converged guesses is the answer.
     pub basin_choice: BasinChoice,
@@ -333,7 +332,7 @@ pub fn solve(
         Some(_) => (StartedFrom::Warm, StartedFrom::ColdAfterWarm),
         None => (StartedFrom::Cold, StartedFrom::Cold),
     };
-    let guesses = if problem.muscles { options.cold_guesses } else { 1 };
+    let guesses = options.cold_guesses;
     tried.extend(try_guesses(&context, &ColdGuess::CATALOGUE[..guesses], observer)?);
     finish(&context, tried, first, others)
 }

@@ -267,3 +267,103 @@ fn nlp_threads_do_not_change_a_bit() {
         assert!(one == solve_with(threads), "{threads} threads");
     }
 }
+
+/// A KKT matrix of `points` blocks under one root: each block has nearly as many equality rows as variables, two
+/// inequality rows with a small diagonal, a fixed variable (unit pivot, no row), and couples with ten root variables.
+fn kkt_of_points(points: usize, hessian: f64) -> (Matrix, Vec<usize>, Vec<PivotKind>) {
+    let (variables, equalities, inequalities, shared) = (24, 22, 2, 10);
+    let per_point = variables + equalities + inequalities;
+    let order = points * per_point + shared;
+    let mut random = Random(23);
+    let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+    let (mut front_of, mut kinds) = (Vec::new(), Vec::new());
+    for j in 0..order {
+        let (point, own) = (j / per_point, j % per_point);
+        let mut entry = |i: usize, v: f64| {
+            rows.push(i);
+            values.push(v);
+        };
+        if point == points {
+            kinds.push(PivotKind::Variable);
+            entry(j, 3.0 + random.next());
+        } else if own < variables {
+            kinds.push(PivotKind::Variable);
+            entry(j, if own == 0 { 1.0 } else { hessian * random.next() });
+            let end = (point + 1) * per_point;
+            for i in j + 1..end {
+                let is_row = i % per_point >= variables;
+                if own > 0 && (is_row || i % 3 == 0) {
+                    entry(i, if is_row { random.next() } else { hessian * random.next() });
+                }
+            }
+        } else {
+            let equality = own < variables + equalities;
+            kinds.push(if equality { PivotKind::Equality } else { PivotKind::Other });
+            entry(j, if equality { 0.0 } else { -1e-6 });
+        }
+        for i in (points * per_point).max(j + 1)..order {
+            if own > 0 {
+                entry(i, random.next());
+            }
+        }
+        front_of.push(point);
+        starts.push(rows.len());
+    }
+    (Matrix { starts, rows, values }, front_of, kinds)
+}
+
+#[test]
+fn nlp_rows_eliminated_by_their_variables_give_the_same_answer() {
+    for hessian in [0.0, 1.0, 1e3] {
+        let (matrix, front_of, kinds) = kkt_of_points(6, hessian);
+        let alike = vec![PivotKind::Other; kinds.len()];
+        let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, 1).unwrap();
+        let mut two = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+        assert!(two.suits(&matrix.values));
+        assert_eq!(one.factor(&matrix.values).unwrap(), two.factor(&matrix.values).unwrap(), "H {hessian}");
+        let mut neglected = vec![false; kinds.len()];
+        two.mark_neglected(&mut neglected);
+        assert_eq!(neglected.iter().filter(|n| **n).count(), 6 * 22);
+        let right: Vec<f64> = (0..kinds.len()).map(|i| (i % 13) as f64 - 6.0).collect();
+        let (mut x, mut y) = (right.clone(), right);
+        one.solve(&mut x);
+        two.solve(&mut y);
+        let size = x.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+        for (x, y) in x.iter().zip(&y) {
+            assert!((x - y).abs() <= 1e-7 * size, "H {hessian}: {x} {y}");
+        }
+    }
+}
+
+#[test]
+fn nlp_a_diagonal_that_matters_is_not_neglected() {
+    let (mut matrix, front_of, kinds) = kkt_of_points(2, 1.0);
+    let row = kinds.iter().position(|k| *k == PivotKind::Equality).unwrap();
+    let solver = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+    assert!(solver.suits(&matrix.values));
+    matrix.values[matrix.starts[row]] = -0.1;
+    assert!(!solver.suits(&matrix.values));
+}
+
+#[test]
+fn nlp_rows_without_a_variable_of_their_own_are_deferred() {
+    // Two equal rows in one point: the second takes its pivot from the regularisation.
+    let (mut matrix, front_of, kinds) = kkt_of_points(2, 1.0);
+    let (first, second) = (24, 25);
+    for j in 0..24 {
+        let range = matrix.starts[j]..matrix.starts[j + 1];
+        let of_first = range.clone().find(|&q| matrix.rows[q] == first);
+        let of_second = range.clone().find(|&q| matrix.rows[q] == second);
+        if let (Some(a), Some(b)) = (of_first, of_second) {
+            matrix.values[b] = matrix.values[a];
+        }
+    }
+    matrix.values[matrix.starts[second]] = -1e-7;
+    let mut solver = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+    let alike = vec![PivotKind::Other; kinds.len()];
+    let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, 1).unwrap();
+    assert_eq!(solver.factor(&matrix.values).unwrap(), one.factor(&matrix.values).unwrap());
+    let mut neglected = vec![false; kinds.len()];
+    solver.mark_neglected(&mut neglected);
+    assert_eq!(neglected.iter().filter(|n| **n).count(), 2 * 22 - 1);
+}

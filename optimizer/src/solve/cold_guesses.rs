@@ -79,7 +79,7 @@ impl ColdGuess {
     };
 
     /// The guesses of a cold start, the first [`SolveOptions::cold_guesses`](super::SolveOptions) of which are tried.
-    /// With muscles the timing decides the basin (natural or stiff swing knee); route, knee flexion, stride and barrier
+    /// The timing decides the basin (with muscles: natural or stiff swing knee); route, knee flexion, stride and barrier
     /// hardly matter (`examples/basins.rs`).
     pub const CATALOGUE: [Self; 5] = [
         Self::NATURAL,

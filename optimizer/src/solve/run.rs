@@ -17,8 +17,6 @@ const MU_MUSCLE_TRACKING: f64 = 1e-2;
 /// Weight and tolerance of the tracking phases.
 const TRACKING_WEIGHT: f64 = 10.0;
 const TRACKING_TOLERANCE: f64 = 1e-3;
-/// First barrier parameter of a warm start.
-const MU_WARM: f64 = 1e-7;
 /// First barrier parameter of a cost phase that may not choose its own.
 const MU_COST: f64 = 1e-4;
 /// Longest run of iterations that do not try the unregularised matrix again after it had the wrong inertia.
@@ -178,7 +176,11 @@ impl<'a> Run<'a> {
         self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), cost_settings(guess.barrier))
     }
 
+    /// Begins with the barrier parameter that a cold start ends with: a larger one forgets the point, and with a smaller
+    /// or larger one the same problem would end elsewhere.
     pub(super) fn warm(&mut self, warm: &WarmStart) -> Result<NlpResult, SolveError> {
+        let defaults = NlpSettings::default();
+        let mu_warm = self.context.options.tolerance / (defaults.kappa_epsilon + 1.0);
         self.phase(
             Phase::Cost,
             self.context.programme,
@@ -186,10 +188,10 @@ impl<'a> Run<'a> {
             NlpSettings {
                 tolerance: self.context.options.tolerance,
                 mu_initial: MU_COST,
-                mu_warm: Some(MU_WARM),
+                mu_warm: Some(mu_warm),
                 warm_bound_push: 1e-7,
                 warm_bound_fraction: 1e-7,
-                ..NlpSettings::default()
+                ..defaults
             },
         )
     }
