@@ -61,6 +61,15 @@ pub enum Error {
     /// The request can be read, but a field is not acceptable.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),
+    /// Nobody signed in, or not in a way that is accepted.
+    #[error("{0}")]
+    NotSignedIn(String),
+    /// Too many attempts; to be tried again after so many seconds.
+    #[error("too many attempts: try again in {0} s")]
+    TooManyAttempts(u64),
+    /// The thing was changed since it was read.
+    #[error("{0}")]
+    Changed(String),
     /// The body is larger than is accepted.
     #[error("{0}")]
     TooLarge(String),

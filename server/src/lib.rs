@@ -1,9 +1,10 @@
 //! Gaitwright: a preference-learning tuning service for walking gaits of powered prostheses.
 //!
-//! Arrows point down: [`cli`] -> `http` -> [`studies`] -> [`workers`], [`store`].
+//! Arrows point down: [`cli`] -> `http` -> [`access`], [`studies`] -> [`workers`], [`store`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod access;
 pub mod cli;
 pub mod error;
 pub mod http;

@@ -3,7 +3,7 @@
 use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
-use gaitwright::http::{AppState, Hosts, router};
+use gaitwright::http::{Access, AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
@@ -27,6 +27,8 @@ pub struct Service {
     pub store: Store,
     /// What runs its studies.
     pub director: Director,
+    /// Who may do what: everybody everything, unless a test says otherwise.
+    pub access: Arc<Access>,
     work: JoinHandle<()>,
 }
 
@@ -60,13 +62,22 @@ impl Service {
         let mut writer = store.write().await.unwrap();
         catalogue::ensure(&mut writer).await.unwrap();
         commit(writer).await.unwrap();
+        Self::over(store, solver, workers)
+    }
+
+    /// Starts a service on a record as it is, adding nothing to it.
+    pub async fn start_as_is(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
+        Self::over(Store::open(database).await.unwrap(), solver, workers)
+    }
+
+    fn over(store: Store, solver: impl Evaluate, workers: usize) -> Self {
         let pool = Pool::new(workers, Arc::new(solver), Arc::new(Board::default()));
         let director = Director::new(store.clone(), pool, None);
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await.unwrap() }
         });
-        Self { store, director, work }
+        Self { store, director, access: Arc::new(Access::without_sign_in()), work }
     }
 
     /// Stops it and closes the record.
@@ -133,7 +144,8 @@ impl Service {
 
     /// The router.
     pub fn router(&self) -> Router {
-        router(AppState { director: self.director.clone(), hosts: Hosts::new(([127, 0, 0, 1], 0).into(), &[]) })
+        let hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &[]);
+        router(AppState::new(self.director.clone(), Arc::clone(&self.access), hosts))
     }
 
     /// `GET`.

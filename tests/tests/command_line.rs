@@ -107,8 +107,10 @@ fn a_warm_start_file_of_another_kind_is_refused() {
 
 #[test]
 fn a_service_without_sign_in_listens_to_this_machine_only() {
-    refused(&["serve", "--listen", "0.0.0.0:0"], "--allow-remote");
-    refused(&["serve", "--listen", "here"], "--listen");
+    refused(&["serve", "--no-sign-in", "--listen", "0.0.0.0:0"], "without sign-in");
+    refused(&["serve", "--listen", "0.0.0.0:0"], "until there is an administrator with a password");
+    refused(&["serve", "--listen", "here"], "listen (flag)");
+    refused(&["serve", "--tls-key", "k.pem"], "tls_certificate");
 }
 
 /// Every file of the folder stays as it is, and none is added.

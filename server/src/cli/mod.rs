@@ -1,6 +1,7 @@
 //! The command line. Data goes to stdout, progress and logs to stderr.
 
 mod body;
+mod config;
 mod logging;
 mod numbers;
 mod out_file;
@@ -9,11 +10,14 @@ mod problem;
 mod record;
 mod serve;
 mod solve;
+pub mod study;
 mod sweep;
 mod tune;
 
 use crate::error::Error;
+use crate::http::openapi;
 use clap::{Parser, Subcommand};
+use config::{Flags, Settings};
 use output::tell;
 use std::process::ExitCode;
 
@@ -54,28 +58,55 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Check the audit trail.
     Audit(record::Audit),
+    /// Show the settings of the service.
+    Config(config::Config),
+    /// Print the description of the REST interface (OpenAPI 3.1).
+    Openapi,
     /// Copy a database, also while it is served.
     Backup(record::Backup),
     /// Put a copy in place of a database.
     Restore(record::Restore),
+    /// Write a whole study into one file.
+    Export(study::Export),
+    /// Add the study of such a file to a database.
+    Import(study::Import),
+    /// Drop old trajectories; what was learned from them stays.
+    Prune(study::Prune),
 }
 
 /// Runs the program.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
-    logging::start();
+    let settings = match &cli.command {
+        Command::Serve(serve) => serve.settings(),
+        _ => Settings::read(&Flags::default()),
+    };
+    let settings = match settings {
+        Ok(settings) => settings,
+        Err(error) => return report(&error),
+    };
+    let (filter, json) = settings.log();
+    logging::start(filter, json);
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(error) => return report(&Error::Internal(error.to_string())),
     };
     let done = match cli.command {
-        Command::Serve(serve) => runtime.block_on(serve.run()).map(|()| Ended::Done),
+        Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
         Command::Tune(tune) => runtime.block_on(tune.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()).map(|()| Ended::Done),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()).map(|()| Ended::Done),
         Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
+        Command::Config(config) => config.run().map(|()| Ended::Done),
+        Command::Openapi => openapi::text().map_err(|e| Error::Internal(e.to_string())).map(|text| {
+            print!("{text}");
+            Ended::Done
+        }),
         Command::Backup(backup) => runtime.block_on(backup.run()).map(|()| Ended::Done),
         Command::Restore(restore) => runtime.block_on(restore.run()).map(|()| Ended::Done),
+        Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),
+        Command::Import(import) => runtime.block_on(import.run()).map(|()| Ended::Done),
+        Command::Prune(prune) => runtime.block_on(prune.run()).map(|()| Ended::Done),
     };
     match done {
         Ok(Ended::Done) => ExitCode::SUCCESS,

@@ -90,6 +90,6 @@ impl Restore {
     }
 }
 
-fn exists(path: &Path) -> Result<(), Error> {
+pub(super) fn exists(path: &Path) -> Result<(), Error> {
     if path.exists() { Ok(()) } else { Err(Error::Malformed(format!("there is no file {}", path.display()))) }
 }

@@ -1,74 +1,137 @@
 //! `gaitwright serve`.
 
-use super::numbers::workers;
+use super::config::{Flags, Settings};
+use crate::access::people;
 use crate::error::Error;
-use crate::http::{AppState, Hosts, router};
+use crate::http::{Access, AppState, Hosts, router};
+use crate::store::audit::Actor;
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
 use crate::studies::director::Director;
 use crate::workers::{Board, GaitSolver, Pool};
+use axum_server::Handle;
+use axum_server::tls_rustls::RustlsConfig;
 use clap::Args;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::Arc;
-use tokio::net::TcpListener;
+use std::time::Duration;
+
+/// Requests that run when the service is told to stop have so long to end.
+const DRAIN: Duration = Duration::from_secs(20);
 
 #[derive(Debug, Args)]
 pub(super) struct Serve {
-    /// Where to listen.
-    #[arg(long, env = "GAITWRIGHT_LISTEN", default_value = "127.0.0.1:8080", value_name = "ADDRESS:PORT")]
-    listen: SocketAddr,
-    /// Listen on an address that other machines reach, though there is no sign-in.
+    #[command(flatten)]
+    flags: Flags,
+    /// Print a one-time sign-in link for the first administrator, also when there is a password.
     #[arg(long)]
-    allow_remote: bool,
-    /// A name under which browsers reach the service, besides its address and localhost; may be given several times.
-    #[arg(long, env = "GAITWRIGHT_HOST_NAMES", value_delimiter = ',', value_name = "NAME")]
-    host_name: Vec<String>,
-    /// The SQLite file; made if it does not exist.
-    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
-    database: PathBuf,
-    /// How many solves at the same time; default: the number of cores.
-    #[arg(long, env = "GAITWRIGHT_WORKERS", value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
-    workers: Option<usize>,
+    sign_in_link: bool,
 }
 
 impl Serve {
-    pub(super) async fn run(self) -> Result<(), Error> {
-        if !self.listen.ip().is_loopback() && !self.allow_remote {
-            let allowed = "a loopback address such as 127.0.0.1:8080: there is no sign-in yet, whoever reaches the service \
-                           may change everything; --allow-remote listens all the same";
-            return Err(Error::invalid("listen", self.listen.to_string(), allowed));
+    pub(super) fn settings(&self) -> Result<Settings, Error> {
+        Settings::read(&self.flags)
+    }
+
+    pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
+        let (listen, sign_in, tls) = (settings.listen()?, settings.sign_in()?, settings.tls()?);
+        if !listen.ip().is_loopback() && !sign_in {
+            let allowed = "a loopback address such as 127.0.0.1:8080: without sign-in, whoever reaches the service may \
+                           change everything";
+            return Err(settings.refused("listen", allowed));
         }
-        let store = Store::open(&self.database).await?;
+        let local = listen.ip().is_loopback();
+        let nobody_administers = || {
+            let allowed = "a loopback address until there is an administrator with a password: start on 127.0.0.1, open \
+                           the sign-in link, set a password under Account";
+            settings.refused("listen", allowed)
+        };
+        let (workers, idle_seconds, database) = (settings.workers()?, settings.idle_seconds()?, settings.database());
+        if !local && !database.exists() {
+            return Err(nobody_administers());
+        }
+        let store = Store::open(&database).await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         commit(writer).await?;
+        if !local && !people::has_admin(&mut *store.read().await?).await? {
+            return Err(nobody_administers());
+        }
+        let tls = match tls {
+            Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
+            None => None,
+        };
+        let mut access = if sign_in { Access::by_sign_in(idle_seconds) } else { Access::without_sign_in() };
+        access.secure = tls.is_some();
 
-        let listener = TcpListener::bind(self.listen)
-            .await
-            .map_err(|e| Error::Malformed(format!("cannot listen on {}: {e}", self.listen)))?;
-        let address = listener.local_addr().map_err(|e| Error::Internal(e.to_string()))?;
-        let pool = Pool::new(cores_or(self.workers), Arc::new(GaitSolver), Arc::new(Board::default()));
+        let cannot_listen = |e: std::io::Error| Error::Malformed(format!("cannot listen on {listen}: {e}"));
+        let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
+        listener.set_nonblocking(true).map_err(cannot_listen)?;
+        let address = listener.local_addr().map_err(cannot_listen)?;
+        let origin = format!("{}://{address}", if access.secure { "https" } else { "http" });
+        let link = if sign_in { self.link(&store).await? } else { None };
+
+        let pool = Pool::new(cores_or(workers), Arc::new(GaitSolver), Arc::new(Board::default()));
         let director = Director::new(store.clone(), pool, None);
-        let app = router(AppState { director: director.clone(), hosts: Hosts::new(address, &self.host_name) });
+        let hosts = Hosts::new(address, &settings.host_names());
+        let app = router(AppState::new(director.clone(), Arc::new(access), hosts));
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await }
         });
-        tracing::info!(database = %self.database.display(), workers = director.workers(), "listening on http://{address}");
+        tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
+        if let Some(secret) = link {
+            eprintln!("sign in (once, within a day): {origin}/sign-in/{secret}");
+        }
 
-        // Streams end when the director stops, so that the drain below is not held up by them.
-        let stopping = director.clone();
-        let until_signal = async move {
-            interrupted().await;
-            stopping.stop();
+        // Streams end when the director stops, so that the drain is not held up by them.
+        let handle = Handle::<SocketAddr>::new();
+        tokio::spawn({
+            let (director, handle) = (director.clone(), handle.clone());
+            async move {
+                interrupted().await;
+                director.stop();
+                handle.graceful_shutdown(Some(DRAIN));
+            }
+        });
+        let service = app.into_make_service();
+        let served = match tls {
+            Some(config) => {
+                axum_server::from_tcp_rustls(listener, config)
+                    .map_err(cannot_listen)?
+                    .handle(handle)
+                    .serve(service)
+                    .await
+            }
+            None => axum_server::from_tcp(listener).map_err(cannot_listen)?.handle(handle).serve(service).await,
         };
-        let served = axum::serve(listener, app).with_graceful_shutdown(until_signal).await;
         director.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
         store.close().await;
         served.map_err(|e| Error::Internal(e.to_string()))
     }
+
+    /// A sign-in link for whoever started the service, unless somebody can sign in already.
+    async fn link(&self, store: &Store) -> Result<Option<String>, Error> {
+        if !self.sign_in_link && people::has_admin(&mut *store.read().await?).await? {
+            return Ok(None);
+        }
+        let mut writer = store.write().await?;
+        let admin = people::first(&mut writer).await?;
+        let secret = people::link(&mut writer, &Actor::terminal(), admin.id).await?;
+        commit(writer).await?;
+        Ok(Some(secret))
+    }
+}
+
+async fn certificate_of(certificate: PathBuf, key: PathBuf) -> Result<RustlsConfig, Error> {
+    // Fails only when one was installed before, and that is this one.
+    let _ = rustls::crypto::ring::default_provider().install_default();
+    let name = certificate.display().to_string();
+    RustlsConfig::from_pem_file(certificate, key)
+        .await
+        .map_err(|e| Error::Malformed(format!("cannot use the certificate {name} and its key: {e}")))
 }
 
 /// The number given, or that of the cores.

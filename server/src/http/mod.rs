@@ -1,13 +1,20 @@
 //! The HTTP face: REST under `/api/v1`, pages for people, static files.
 
 pub mod api;
+mod blind_motion;
 mod extract;
 mod gait_series;
 mod host;
+mod identify;
+mod may;
+pub mod metrics;
 mod negotiate;
 mod once;
+pub mod openapi;
 pub mod pages;
+mod pages_of;
 mod problem;
+mod revision;
 mod router;
 mod same_origin;
 mod state;
@@ -15,7 +22,7 @@ mod static_files;
 
 pub use host::Hosts;
 pub use router::router;
-pub use state::AppState;
+pub use state::{Access, AppState};
 
 /// Largest request body: the largest legitimate one is a reference gait.
 const BODY_LIMIT_BYTES: usize = 1 << 20;

@@ -2,6 +2,8 @@
 
 use super::AppState;
 use super::extract::{body, unreadable};
+use super::may::permitted;
+use crate::access::{Caller, Permission};
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::idempotency::{self, Kept, fingerprint};
@@ -12,24 +14,28 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::marker::PhantomData;
 
 static IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 static REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
-/// A request that changes something: who sends it, its key and its fingerprint.
+/// A request that changes something, by somebody who has the right `P`: who sends it, its key and its fingerprint.
 #[derive(Debug)]
-pub(crate) struct Once {
+pub(crate) struct Once<P> {
     /// Who sends it.
     pub(crate) actor: Actor,
+    /// The same, with what it may do.
+    pub(crate) caller: Caller,
     key: Option<String>,
     request: String,
+    right: PhantomData<P>,
 }
 
 /// [`Once`] with a JSON body.
 #[derive(Debug)]
-pub(crate) struct OnceWith<T>(pub(crate) Once, pub(crate) T);
+pub(crate) struct OnceWith<P, T>(pub(crate) Once<P>, pub(crate) T);
 
-impl Once {
+impl<P: Permission> Once<P> {
     /// Begins the transaction of the effect. `Err` of the inner result: the answer that was given before.
     pub(crate) async fn begin(&self, app: &AppState) -> Result<Result<Writer, Response>, Error> {
         let mut writer = app.write().await?;
@@ -43,6 +49,23 @@ impl Once {
             }
             Some(_) => Err(Error::conflict("this Idempotency-Key was used for another request: take a new one")),
         }
+    }
+
+    /// The answer that was given to this key before, if there is one.
+    pub(crate) async fn answered_before(&self, app: &AppState) -> Result<Option<Response>, Error> {
+        if self.key.is_none() {
+            return Ok(None);
+        }
+        Ok(self.begin(app).await?.err())
+    }
+
+    /// Begins the transaction of an effect whose answer holds a secret: nothing of it may be kept for repetition.
+    pub(crate) async fn begin_secret(&self, app: &AppState) -> Result<Writer, Error> {
+        if self.key.is_some() {
+            let reason = "Idempotency-Key: the answer holds a secret that is shown once; send this without a key";
+            return Err(Error::Malformed(reason.to_owned()));
+        }
+        Ok(app.write().await?)
     }
 
     /// Keeps the answer, makes the effect durable and tells the director.
@@ -64,14 +87,20 @@ impl Once {
         Ok(response(&kept))
     }
 
-    fn new(headers: &HeaderMap, method: &str, path: &str, bytes: &[u8]) -> Result<Self, Error> {
+    fn new(caller: Caller, headers: &HeaderMap, method: &str, path: &str, bytes: &[u8]) -> Result<Self, Error> {
         let key = match headers.get(&IDEMPOTENCY_KEY) {
             None => None,
             Some(value) => Some(value.to_str().ok().filter(|key| (1..=200).contains(&key.len())).ok_or_else(|| {
                 Error::Malformed("Idempotency-Key: 1 to 200 printable ASCII characters are accepted".to_owned())
             })?),
         };
-        Ok(Self { actor: Actor::anonymous(), key: key.map(str::to_owned), request: fingerprint(method, path, bytes) })
+        Ok(Self {
+            actor: caller.actor.clone(),
+            caller,
+            key: key.map(str::to_owned),
+            request: fingerprint(method, path, bytes),
+            right: PhantomData,
+        })
     }
 }
 
@@ -84,14 +113,18 @@ fn response(kept: &Kept) -> Response {
     answer
 }
 
-async fn read<S: Send + Sync>(request: Request, state: &S) -> Result<(Once, HeaderMap, Bytes), Error> {
+async fn read<P: Permission, S: Send + Sync>(
+    request: Request,
+    state: &S,
+) -> Result<(Once<P>, HeaderMap, Bytes), Error> {
+    let caller = permitted::<P>(request.extensions())?;
     let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
     let headers = request.headers().clone();
     let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
-    Ok((Once::new(&headers, &method, &path, &bytes)?, headers, bytes))
+    Ok((Once::new(caller, &headers, &method, &path, &bytes)?, headers, bytes))
 }
 
-impl<S: Send + Sync> FromRequest<S> for Once {
+impl<P: Permission, S: Send + Sync> FromRequest<S> for Once<P> {
     type Rejection = Error;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Error> {
@@ -99,7 +132,7 @@ impl<S: Send + Sync> FromRequest<S> for Once {
     }
 }
 
-impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for OnceWith<T> {
+impl<P: Permission, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for OnceWith<P, T> {
     type Rejection = Error;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Error> {

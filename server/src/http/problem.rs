@@ -2,16 +2,17 @@
 
 use crate::error::Error;
 use axum::Json;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::Value;
+use utoipa::ToSchema;
 
 /// Media type of a problem document.
 pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 
 /// A problem document.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub(super) struct Problem {
     /// What kind of problem: stable, for programs.
     #[serde(rename = "type")]
@@ -60,6 +61,18 @@ impl From<&Error> for Problem {
                     detail,
                 )
             },
+            Error::NotSignedIn(_) => {
+                Self::new(StatusCode::UNAUTHORIZED, "/problems/not-signed-in", "Sign in first", detail)
+            }
+            Error::TooManyAttempts(_) => {
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "/problems/too-many-attempts", "Too many attempts", detail)
+            }
+            Error::Changed(_) => Self::new(
+                StatusCode::PRECONDITION_FAILED,
+                "/problems/changed",
+                "It was changed since it was read",
+                detail,
+            ),
             Error::TooLarge(_) => {
                 Self::new(StatusCode::PAYLOAD_TOO_LARGE, "/problems/too-large", "The request is too large", detail)
             }
@@ -104,6 +117,17 @@ impl IntoResponse for Error {
         if !self.is_input() {
             tracing::error!(error = %self, "a request failed");
         }
-        Problem::from(&self).into_response()
+        let mut answer = Problem::from(&self).into_response();
+        let headers = answer.headers_mut();
+        match self {
+            Self::NotSignedIn(_) => {
+                headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"gaitwright\""));
+            }
+            Self::TooManyAttempts(seconds) => {
+                headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+            }
+            _ => {}
+        }
+        answer
     }
 }

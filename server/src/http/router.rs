@@ -1,40 +1,68 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, BODY_LIMIT_BYTES, api, host, pages, same_origin, static_files};
+use super::{AppState, BODY_LIMIT_BYTES, api, host, identify, metrics, openapi, pages, same_origin, static_files};
+use crate::error::Error;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
-use axum::http::{HeaderName, HeaderValue, header};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware;
+use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use std::time::Duration;
+use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
+use tower_http::timeout::TimeoutLayer;
 use tower_http::trace::TraceLayer;
+use utoipa_axum::router::OpenApiRouter;
 
 /// Everything comes from this origin; no inline scripts, no inline styles, no frames.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
                                        form-action 'self'; frame-ancestors 'none'";
 
+/// An answer that takes longer is given up; streams have begun by then.
+const SLOWEST_ANSWER: Duration = Duration::from_mins(1);
+
 /// Every route.
 pub fn router(state: AppState) -> Router {
+    let (api, _) = OpenApiRouter::new().nest("/api/v1", api::routes()).split_for_parts();
+    let secure = state.access.secure;
     let header = |name: HeaderName, value: &'static str| {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
     };
     Router::new()
         .merge(pages::routes())
         .route("/health", get(api::health::get))
-        .nest("/api/v1", api::routes())
+        .merge(api)
+        .route("/api/openapi.json", get(description))
+        .route("/metrics", get(metrics::get))
+        .route("/ready", get(api::health::ready))
         .route("/static/{*path}", get(static_files::get))
         .fallback(pages::error::no_such_page)
         .method_not_allowed_fallback(pages::error::no_such_method)
+        .layer(middleware::from_fn_with_state(state.clone(), identify::identify))
+        .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
         .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
         .layer(middleware::from_fn(pages::error::problems_as_pages))
+        .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, SLOWEST_ANSWER))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
         .layer(CatchPanicLayer::new())
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))
         .layer(header(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
         .layer(header(header::REFERRER_POLICY, "same-origin"))
         .layer(header(header::X_FRAME_OPTIONS, "DENY"))
+        .layer(header(header::CACHE_CONTROL, "no-store"))
+        .layer(header(HeaderName::from_static("cross-origin-opener-policy"), "same-origin"))
+        .layer(header(HeaderName::from_static("cross-origin-resource-policy"), "same-origin"))
+        .layer(header(HeaderName::from_static("permissions-policy"), "camera=(), geolocation=(), microphone=()"))
+        .layer(option_layer(secure.then(|| header(header::STRICT_TRANSPORT_SECURITY, "max-age=31536000"))))
         .layer(TraceLayer::new_for_http())
         .with_state(state)
+}
+
+/// `GET /api/openapi.json`.
+async fn description() -> Result<Response, Error> {
+    let text = openapi::text().map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }

@@ -1,19 +1,56 @@
 //! What every handler can reach.
 
 use super::host::Hosts;
+use super::metrics::Requests;
+use crate::access::BackOff;
 use crate::store::{Reader, Store, StoreResult, Writer};
 use crate::studies::director::Director;
+use std::sync::Arc;
 
 /// What every handler can reach.
 #[derive(Debug, Clone)]
 pub struct AppState {
     /// Runs the studies.
     pub director: Director,
+    /// How people and programs say who they are.
+    pub access: Arc<Access>,
+    /// What was asked of the service so far.
+    pub requests: Arc<Requests>,
     /// The names that the service answers to.
     pub hosts: Hosts,
 }
 
+/// How people and programs say who they are.
+#[derive(Debug)]
+pub struct Access {
+    /// Nobody needs to sign in, and whoever is there may do everything.
+    pub open: bool,
+    /// A session without a sign of life for so long has ended.
+    pub idle_seconds: f64,
+    /// Browsers reach the service through TLS.
+    pub secure: bool,
+    /// Failed attempts.
+    pub back_off: BackOff,
+}
+
+impl Access {
+    /// Everybody signs in.
+    pub fn by_sign_in(idle_seconds: f64) -> Self {
+        Self { open: false, idle_seconds, secure: false, back_off: BackOff::default() }
+    }
+
+    /// Nobody signs in: for one person on one machine.
+    pub fn without_sign_in() -> Self {
+        Self { open: true, ..Self::by_sign_in(3600.0) }
+    }
+}
+
 impl AppState {
+    /// A service over a director.
+    pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
+        Self { director, access, requests: Arc::default(), hosts }
+    }
+
     /// The record.
     pub fn store(&self) -> &Store {
         self.director.store()

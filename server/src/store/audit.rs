@@ -5,6 +5,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
 
 /// Hash before the first row.
 const ORIGIN: &str = "0000000000000000000000000000000000000000000000000000000000000000";
@@ -31,6 +32,11 @@ impl Actor {
         Self("not signed in".to_owned())
     }
 
+    /// Somebody with a name.
+    pub fn named(name: &str) -> Self {
+        Self(name.chars().take(120).collect())
+    }
+
     /// As stored.
     pub fn as_str(&self) -> &str {
         &self.0
@@ -38,7 +44,7 @@ impl Actor {
 }
 
 /// A row of the trail.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AuditRow {
     /// Order.
     pub seq: i64,

@@ -3,9 +3,10 @@
 use super::{Connection, Instant, StoreResult, StudyId, json, now};
 use serde::Serialize;
 use sqlx::Row;
+use utoipa::ToSchema;
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Event {
     /// Order over all studies.
     pub seq: i64,

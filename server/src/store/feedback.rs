@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
+use utoipa::ToSchema;
 
 /// Where an answer comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// Whether the solver converged.
@@ -47,7 +48,7 @@ impl FromStr for Source {
 }
 
 /// What was said, in terms of trials.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Said {
     /// The trial falls into this ordinal category (0: not converged, 1: converged).
@@ -74,6 +75,7 @@ pub enum Said {
     /// This action would have been better than that trial.
     Suggestion {
         /// The action, as a grid index.
+        #[schema(value_type = u64)]
         suggested: ActionIndex,
         /// The trial.
         over: TrialId,
@@ -81,7 +83,7 @@ pub enum Said {
 }
 
 /// A row of feedback.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FeedbackRow {
     /// Order in which it was heard.
     pub seq: i64,
@@ -105,7 +107,7 @@ pub struct FeedbackRow {
 }
 
 /// Who took an answer back, when and why.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Retraction {
     /// Who.
     pub author: String,
@@ -208,6 +210,42 @@ pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreR
     )
     .bind(study)
     .bind(after)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// At most `limit` comparisons of a study with a sequence number above `after`, retracted ones included, as heard.
+///
+/// # Errors
+/// What the database reports.
+pub async fn comparisons(db: &mut Connection, study: StudyId, after: i64, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
+    let rows = sqlx::query(
+        "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
+         from feedback f left join retractions r on r.feedback_seq = f.seq \
+         where f.study_id = ? and f.seq > ? and f.kind in ('preference', 'tie') order by f.seq limit ?",
+    )
+    .bind(study)
+    .bind(after)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// At most `limit` comparisons by people about trials of a study, as heard: the newest of them.
+///
+/// # Errors
+/// What the database reports.
+pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
+    let rows = sqlx::query(
+        "select * from (select f.*, r.author as retracted_by, r.reason as retracted_because, \
+         r.created_at as retracted_at from feedback f left join retractions r on r.feedback_seq = f.seq \
+         where f.study_id = ? and f.source in ('subject', 'clinician', 'script') order by f.seq desc limit ?) \
+         order by seq",
+    )
+    .bind(study)
+    .bind(limit)
     .fetch_all(db)
     .await?;
     rows.iter().map(from_row).collect()

@@ -115,6 +115,22 @@ pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<
     parse_column(db, trial, "select iterations from gaits where trial_id = ?").await
 }
 
+/// Drops the gaits of a study but that of one trial: how many.
+///
+/// # Errors
+/// What the database reports.
+pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: Option<TrialId>) -> StoreResult<u64> {
+    let done = sqlx::query(
+        "delete from gaits where trial_id in (select id from trials where study_id = ? and (? is null or id <> ?))",
+    )
+    .bind(study)
+    .bind(kept)
+    .bind(kept)
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected())
+}
+
 async fn parse_column<T: serde::de::DeserializeOwned>(
     db: &mut Connection,
     trial: TrialId,

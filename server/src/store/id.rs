@@ -6,13 +6,15 @@ use sqlx::error::BoxDynError;
 use sqlx::{Decode, Encode, Sqlite, Type};
 use std::fmt;
 use std::str::FromStr;
+use utoipa::ToSchema;
 use uuid::Uuid;
 
 macro_rules! identifier {
     ($name:ident, $what:literal) => {
         #[doc = concat!("Identifier of a ", $what, ".")]
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
         #[serde(transparent)]
+        #[schema(value_type = String, format = Uuid)]
         pub struct $name(Uuid);
 
         impl $name {
@@ -71,3 +73,6 @@ identifier!(StudyId, "study");
 identifier!(TrialId, "trial");
 identifier!(FeedbackId, "feedback row");
 identifier!(JobId, "job");
+identifier!(UserId, "user");
+identifier!(TokenId, "token");
+identifier!(PresentationId, "presentation");

@@ -4,6 +4,7 @@
 //! writes go through one connection with `BEGIN IMMEDIATE`, so that no writer ever meets `SQLITE_BUSY`.
 //! A transaction never spans CPU or network work.
 
+pub mod archive;
 pub mod audit;
 pub mod backup;
 pub mod devices;
@@ -17,14 +18,22 @@ pub mod idempotency;
 pub mod jobs;
 mod json;
 mod migrations;
+pub mod presentations;
 pub mod reference_gaits;
+pub mod schema;
+pub mod sessions;
 pub mod studies;
 pub mod subjects;
 mod time;
+pub mod tokens;
+pub mod totals;
 pub mod trials;
+pub mod users;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
-pub use id::{DeviceId, FeedbackId, JobId, ReferenceGaitId, StudyId, SubjectId, TrialId};
+pub use id::{
+    DeviceId, FeedbackId, JobId, PresentationId, ReferenceGaitId, StudyId, SubjectId, TokenId, TrialId, UserId,
+};
 pub use time::{Instant, now};
 
 use sqlx::pool::PoolConnection;

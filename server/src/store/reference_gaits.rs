@@ -5,15 +5,17 @@ use gait_optimizer::ReferenceGait as Definition;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
 
 /// A reference gait of the record. A changed definition is a new row: studies keep what they used.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ReferenceGait {
     /// Identifier.
     pub id: ReferenceGaitId,
     /// Name shown to people.
     pub name: String,
     /// The reference gait itself.
+    #[schema(value_type = Object)]
     pub definition: Definition,
     /// When the row was written.
     pub created_at: Instant,

@@ -1,15 +1,18 @@
 //! Studies: one tuning each.
 
-use super::{Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now};
+use super::{
+    Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now, schema,
+};
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
+use utoipa::ToSchema;
 
 /// Where a study stands. Which change is allowed is decided in `studies::lifecycle`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StudyState {
     /// Being set up: nothing runs.
@@ -51,7 +54,7 @@ impl FromStr for StudyState {
 }
 
 /// Who answers the comparisons.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FeedbackMode {
     /// Gait RMSE answers every comparison.
@@ -83,8 +86,38 @@ impl FromStr for FeedbackMode {
     }
 }
 
+/// Who evaluates the trials.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Evaluation {
+    /// The program: each trial is an optimisation.
+    Optimizer,
+    /// Scripts of the lab: they ask for trials and tell what these gave.
+    Script,
+}
+
+impl Evaluation {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Optimizer => "optimizer",
+            Self::Script => "script",
+        }
+    }
+}
+
+impl FromStr for Evaluation {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Optimizer, Self::Script]
+            .into_iter()
+            .find(|evaluation| evaluation.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "evaluation", reason: text.to_owned() })
+    }
+}
+
 /// What a study is made of; fixed once it has left `draft`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct StudyPlan {
     /// Name shown to people.
     pub name: String,
@@ -97,19 +130,30 @@ pub struct StudyPlan {
     /// With muscles (C1-C12) or without (C1-C4).
     pub muscles: bool,
     /// Settings of the gait problem.
+    #[schema(value_type = Object)]
     pub gait_settings: GaitSettings,
     /// Limits of one solve.
+    #[schema(value_type = Object)]
     pub solve_options: SolveOptions,
     /// Values of the bounds that are not tuned.
+    #[schema(value_type = schema::Bounds)]
     pub base_bounds: TunedBounds,
     /// What is tuned: dimensions named `a1`..`a8`.
+    #[schema(value_type = schema::SearchSpace)]
     pub search_space: SearchSpace,
     /// Settings of the learner.
+    #[schema(value_type = Object)]
     pub learner: LearnerSettings,
     /// Who answers the comparisons.
     pub feedback_mode: FeedbackMode,
+    /// Who evaluates the trials.
+    pub evaluation: Evaluation,
     /// How many trials.
     pub trial_budget: u32,
+    /// No new trial once the solves so far took so many seconds together.
+    pub solve_seconds_budget: Option<f64>,
+    /// Done when the best action stayed the same over so many results in a row.
+    pub unchanged_limit: Option<u32>,
     /// How many trials at the same time; 1 is the published, reproducible order.
     pub parallel_trials: u32,
     /// Higher runs first.
@@ -128,13 +172,15 @@ impl StudyPlan {
 }
 
 /// A study of the record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Study {
     /// Identifier.
     pub id: StudyId,
     /// What it is made of.
     #[serde(flatten)]
     pub plan: StudyPlan,
+    /// The study whose set-up it was made from.
+    pub forked_from: Option<StudyId>,
     /// Where it stands.
     pub state: StudyState,
     /// Why it stands there, in words; may be empty.
@@ -151,13 +197,19 @@ pub struct Study {
 ///
 /// # Errors
 /// A violated constraint, or what the database reports.
-pub async fn insert(db: &mut Connection, plan: &StudyPlan, state: StudyState) -> StoreResult<Study> {
+pub async fn insert(
+    db: &mut Connection,
+    plan: &StudyPlan,
+    state: StudyState,
+    forked_from: Option<StudyId>,
+) -> StoreResult<Study> {
     let at = now();
     let id = StudyId::fresh();
     sqlx::query(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
-         seed, state, created_at, updated_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(&plan.name)
@@ -176,6 +228,10 @@ pub async fn insert(db: &mut Connection, plan: &StudyPlan, state: StudyState) ->
     .bind(plan.priority)
     .bind(i64::try_from(plan.seed).unwrap_or(i64::MAX))
     .bind(state.as_str())
+    .bind(plan.evaluation.as_str())
+    .bind(plan.solve_seconds_budget)
+    .bind(plan.unchanged_limit)
+    .bind(forked_from)
     .bind(at)
     .bind(at)
     .execute(db)
@@ -183,6 +239,7 @@ pub async fn insert(db: &mut Connection, plan: &StudyPlan, state: StudyState) ->
     Ok(Study {
         id,
         plan: plan.clone(),
+        forked_from,
         state,
         state_reason: String::new(),
         revision: 1,
@@ -225,6 +282,52 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
+/// Studies that ended before an instant.
+///
+/// # Errors
+/// What the database reports.
+pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where state in ('finished', 'stopped') and updated_at < ? order by id")
+            .bind(at)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// What can be changed of a study in place.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// Name shown to people.
+    pub name: String,
+    /// Higher runs first.
+    pub priority: i32,
+    /// How many trials at the same time.
+    pub parallel_trials: u32,
+    /// How many trials.
+    pub trial_budget: u32,
+}
+
+/// Changes a study in place.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &Limits) -> StoreResult<()> {
+    sqlx::query(
+        "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
+         updated_at = ? where id = ?",
+    )
+    .bind(&limits.name)
+    .bind(limits.priority)
+    .bind(limits.parallel_trials)
+    .bind(limits.trial_budget)
+    .bind(now())
+    .bind(id)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
 /// Moves a study to another state, if it still is in the state it was read in. `false`: it was not.
 ///
 /// # Errors
@@ -259,11 +362,15 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             search_space: json::column(row, "search_space")?,
             learner: json::column(row, "learner")?,
             feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
+            evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
             trial_budget: row.try_get("trial_budget")?,
+            solve_seconds_budget: row.try_get("solve_seconds_budget")?,
+            unchanged_limit: row.try_get("unchanged_limit")?,
             parallel_trials: row.try_get("parallel_trials")?,
             priority: row.try_get("priority")?,
             seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),
         },
+        forked_from: row.try_get("forked_from")?,
         state: row.try_get::<&str, _>("state")?.parse()?,
         state_reason: row.try_get("state_reason")?,
         revision: row.try_get("revision")?,

@@ -5,9 +5,10 @@ use gait_optimizer::Subject as Body;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
 
 /// A person who walks, under a pseudonym that the site gives.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Subject {
     /// Identifier.
     pub id: SubjectId,
@@ -84,6 +85,20 @@ pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<O
 /// What the database reports.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
     let rows = sqlx::query("select * from subjects order by id desc").fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// At most `limit` subjects added before `before`, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) -> StoreResult<Vec<Subject>> {
+    let rows = sqlx::query("select * from subjects where ? is null or id < ? order by id desc limit ?")
+        .bind(before)
+        .bind(before)
+        .bind(limit)
+        .fetch_all(db)
+        .await?;
     rows.iter().map(from_row).collect()
 }
 

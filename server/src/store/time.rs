@@ -6,9 +6,11 @@ use sqlx::error::BoxDynError;
 use sqlx::{Decode, Encode, Sqlite, Type};
 use std::fmt;
 use std::str::FromStr;
+use utoipa::ToSchema;
 
 /// An instant of the record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[schema(value_type = String, format = DateTime)]
 #[serde(try_from = "String", into = "String")]
 pub struct Instant(jiff::Timestamp);
 

@@ -1,15 +1,16 @@
 //! Trials: one action of a study and what it gave.
 
-use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json, now};
+use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json, now, schema};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
+use utoipa::ToSchema;
 
 /// Where a trial stands. Which change is allowed is decided in `studies::trial_state`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TrialState {
     /// Waiting for a worker.
@@ -68,7 +69,7 @@ impl FromStr for TrialState {
 }
 
 /// A trial of the record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Trial {
     /// Identifier.
     pub id: TrialId,
@@ -77,8 +78,10 @@ pub struct Trial {
     /// 1, 2, ... within the study, in the order of proposal.
     pub number: u32,
     /// The action as a grid index of the study's search space.
+    #[schema(value_type = u64)]
     pub action_index: ActionIndex,
     /// The action as bounds.
+    #[schema(value_type = schema::Bounds)]
     pub action: TunedBounds,
     /// Why the learner chose it.
     pub reason: String,
@@ -86,9 +89,12 @@ pub struct Trial {
     pub best_before: Option<TrialId>,
     /// The trial whose gait its solve starts from; `None`: cold start.
     pub warm_started_from: Option<TrialId>,
+    /// Who asked for it and evaluates it; `None`: the program does.
+    pub asked_by: Option<String>,
     /// Where it stands.
     pub state: TrialState,
     /// How the solve ended.
+    #[schema(value_type = Option<String>)]
     pub status: Option<SolveStatus>,
     /// Gait RMSE, rad.
     pub gait_rmse_rad: Option<f64>,
@@ -103,8 +109,10 @@ pub struct Trial {
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
     /// All figures of the solve.
+    #[schema(value_type = Option<Object>)]
     pub report: Option<SolveReport>,
     /// The most violated rows, worst first.
+    #[schema(value_type = Vec<schema::Violation>)]
     pub violations: Vec<Violation>,
     /// What to tell people about how it ended; may be empty.
     pub message: String,
@@ -143,6 +151,19 @@ pub struct TrialEnd {
     /// The most violated rows.
     pub violations: Vec<Violation>,
     /// What to tell people; may be empty.
+    pub message: String,
+}
+
+/// What a script told of a trial.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Converged or not converged.
+    pub state: TrialState,
+    /// Gait RMSE, rad.
+    pub gait_rmse_rad: Option<f64>,
+    /// Cost of transport.
+    pub cost_of_transport: Option<f64>,
+    /// Why there is no gait; may be empty.
     pub message: String,
 }
 
@@ -198,6 +219,24 @@ pub async fn page(db: &mut Connection, study: StudyId, after: u32, limit: u32) -
         .bind(limit)
         .fetch_all(db)
         .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// At most `limit` trials of a study with numbers below `before`, by number: the newest of them.
+///
+/// # Errors
+/// What the database reports.
+pub async fn newest(db: &mut Connection, study: StudyId, before: Option<u32>, limit: u32) -> StoreResult<Vec<Trial>> {
+    let rows = sqlx::query(
+        "select * from (select * from trials where study_id = ? and (? is null or number < ?) \
+         order by number desc limit ?) order by number",
+    )
+    .bind(study)
+    .bind(before)
+    .bind(before)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
     rows.iter().map(from_row).collect()
 }
 
@@ -263,8 +302,55 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     Ok(())
 }
 
+/// Gives a trial that was just added to a script to evaluate.
+///
+/// # Errors
+/// What the database reports.
+pub async fn give_to(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
+    sqlx::query("update trials set state = 'running', started_at = ?, asked_by = ? where id = ?")
+        .bind(now())
+        .bind(worker)
+        .bind(id)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// The open trial of a study that a worker asked for.
+///
+/// # Errors
+/// What the database reports.
+pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> StoreResult<Option<TrialId>> {
+    let row = sqlx::query("select id from trials where study_id = ? and state = 'running' and asked_by = ?")
+        .bind(study)
+        .bind(worker)
+        .fetch_optional(db)
+        .await?;
+    Ok(row.map(|row| row.try_get(0)).transpose()?)
+}
+
+/// Writes what a script told of a trial.
+///
+/// # Errors
+/// A trigger's refusal when the trial already has a result, or what the database reports.
+pub async fn tell(db: &mut Connection, id: TrialId, told: &Told) -> StoreResult<()> {
+    sqlx::query(
+        "update trials set state = ?, gait_rmse_rad = ?, cost_of_transport = ?, message = ?, finished_at = ? \
+         where id = ?",
+    )
+    .bind(told.state.as_str())
+    .bind(told.gait_rmse_rad)
+    .bind(told.cost_of_transport)
+    .bind(&told.message)
+    .bind(now())
+    .bind(id)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
 /// How many trials of a study are in each state.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
 pub struct TrialCounts {
     /// All of them.
     pub total: u32,
@@ -332,6 +418,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         reason: row.try_get("reason")?,
         best_before: row.try_get("best_before")?,
         warm_started_from: row.try_get("warm_started_from")?,
+        asked_by: row.try_get("asked_by")?,
         state: row.try_get::<&str, _>("state")?.parse()?,
         status: json::optional_column(row, "status")?,
         gait_rmse_rad: row.try_get("gait_rmse_rad")?,

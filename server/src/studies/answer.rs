@@ -1,15 +1,17 @@
 //! A person's or a script's answer to a comparison: one way in for the form and the REST interface.
 
+use crate::access::Caller;
 use crate::error::Error;
-use crate::store::audit::{self, Actor};
+use crate::store::audit;
 use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{FeedbackId, StudyId, TrialId, Writer, events, feedback, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use utoipa::ToSchema;
 
 /// Which of two gaits is better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The first.
@@ -21,7 +23,7 @@ pub enum Verdict {
 }
 
 /// An answer.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
     /// The first gait.
@@ -31,29 +33,22 @@ pub struct Answer {
     /// Which is better.
     pub answer: Verdict,
     /// Who says so: `subject`, `clinician` or `script`.
-    #[serde(default = "clinician")]
-    pub source: Source,
-    /// Name or pseudonym of who says so.
-    #[serde(default = "unnamed")]
-    pub author: String,
+    /// By default what the caller is.
+    #[serde(default)]
+    pub source: Option<Source>,
+    /// Name or pseudonym of who says so; by default the name of the caller.
+    #[serde(default)]
+    pub author: Option<String>,
     /// Free text.
     #[serde(default)]
     pub note: String,
-}
-
-fn clinician() -> Source {
-    Source::Clinician
-}
-
-fn unnamed() -> String {
-    "not signed in".to_owned()
 }
 
 /// Writes an answer.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
-pub async fn give(writer: &mut Writer, actor: &Actor, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
+pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
     let study = studies::get(writer, study).await?;
     if answer.trial_a == answer.trial_b {
         let allowed = "another trial than trial_a: a gait cannot be compared with itself";
@@ -61,10 +56,11 @@ pub async fn give(writer: &mut Writer, actor: &Actor, study: StudyId, answer: &A
     }
     comparable(writer, study.id, "trial_a", answer.trial_a).await?;
     comparable(writer, study.id, "trial_b", answer.trial_b).await?;
-    if !matches!(answer.source, Source::Subject | Source::Clinician | Source::Script) {
-        return Err(Error::invalid("source", answer.source.as_str(), "subject, clinician, script"));
+    let source = answer.source.unwrap_or_else(|| caller.source());
+    if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
+        return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
     }
-    let author = answer.author.trim();
+    let author = answer.author.as_deref().unwrap_or(&caller.name).trim();
     if author.is_empty() || author.chars().count() > 80 {
         return Err(Error::invalid("author", author, "1 to 80 characters"));
     }
@@ -77,11 +73,11 @@ pub async fn give(writer: &mut Writer, actor: &Actor, study: StudyId, answer: &A
         Verdict::B => Said::Preference { winner: b, loser: a },
         Verdict::NoDifference => Said::Tie { a, b },
     };
-    let voice = Voice { source: answer.source, author, note: &answer.note };
+    let voice = Voice { source, author, note: &answer.note };
     let id = feedback::append(writer, study.id, &said, voice).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": author });
-    audit::append(writer, actor, "preference.give", &format!("preference {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
     Ok(id)
 }
 
@@ -92,10 +88,10 @@ pub async fn give(writer: &mut Writer, actor: &Actor, study: StudyId, answer: &A
 /// or is not a comparison.
 pub async fn retract(
     writer: &mut Writer,
-    actor: &Actor,
+    caller: &Caller,
     study: Option<StudyId>,
     id: FeedbackId,
-    author: &str,
+    author: Option<&str>,
     reason: &str,
 ) -> Result<FeedbackRow, Error> {
     if let Some(study) = study {
@@ -108,7 +104,7 @@ pub async fn retract(
     if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
         return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
     }
-    let author = author.trim();
+    let author = author.unwrap_or(&caller.name).trim();
     if author.is_empty() || author.chars().count() > 80 {
         return Err(Error::invalid("author", author, "1 to 80 characters"));
     }
@@ -121,7 +117,7 @@ pub async fn retract(
     }
     events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": row.study_id, "author": author, "reason": reason });
-    audit::append(writer, actor, "preference.retract", &format!("preference {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "preference.retract", &format!("preference {id}"), &detail).await?;
     Ok(feedback::get(writer, id).await?)
 }
 

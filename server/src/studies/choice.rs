@@ -73,6 +73,20 @@ pub fn best_trial(standing: &Standing) -> Result<Option<TrialId>, LearnerError> 
     Ok(belief.best().and_then(|action| standing.trial_of(action)).map(|trial| trial.id))
 }
 
+/// From so many trials on, pages show what the learner last believed instead of asking it anew.
+pub const MANY: usize = 400;
+
+/// The best trial for showing: of a large study, what was the best when the newest trial was proposed.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn best_to_show(standing: &Standing) -> Result<Option<TrialId>, LearnerError> {
+    if standing.trials.len() >= MANY {
+        return Ok(standing.trials.last().and_then(|newest| newest.best_before));
+    }
+    best_trial(standing)
+}
+
 fn reason_in_words(reason: ProposalReason) -> String {
     match reason {
         ProposalReason::FirstAction => "first action: drawn at random",

@@ -47,9 +47,10 @@ pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, 
         (_, None) => true,
     });
     let questions = comparisons_to_ask(&plan.search_space, &before, newest, &plan.learner)?;
-    let open = questions.into_iter().find(|q| !is_answered(&log, q.action, q.against));
     let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
-    Ok(open.and_then(|q| Some((converged(q.action)?, converged(q.against)?))))
+    let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
+    let mut pairs = open.filter_map(|q| Some((converged(q.action)?, converged(q.against)?)));
+    Ok(pairs.find(|(a, b)| !standing.skipped.iter().any(|pair| *pair == (*a, *b) || *pair == (*b, *a))))
 }
 
 fn is_answered(log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {

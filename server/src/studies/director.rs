@@ -10,7 +10,7 @@ use super::record;
 use super::standing::Standing;
 use crate::error::Error;
 use crate::store::jobs::Lease;
-use crate::store::studies::{FeedbackMode, Study, StudyState};
+use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
 use crate::store::{
     Store, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies, subjects,
@@ -328,7 +328,10 @@ fn next_step(standing: &Standing) -> Result<Step, Error> {
         let finished = Step::Act(Act::Finish, format!("all {} trials are done", study.plan.trial_budget));
         return Ok(if open == 0 { finished } else { Step::Nothing });
     }
-    if open >= study.plan.parallel_trials as usize {
+    if let Some(reason) = standing.is_enough() {
+        return Ok(if open == 0 { Step::Act(Act::Finish, reason) } else { Step::Nothing });
+    }
+    if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
         return Ok(Step::Nothing);
     }
     match choice::next_trial(standing) {

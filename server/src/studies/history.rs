@@ -3,7 +3,7 @@
 //! An iteration is a result. Results count in the order in which they came, which is the order of the trials' numbers
 //! unless several trials run at the same time.
 
-use super::choice::best_trial;
+use super::choice::best_to_show;
 use super::standing::Standing;
 use crate::store::feedback::{FeedbackRow, Said};
 use crate::store::trials::{Trial, TrialState};
@@ -11,9 +11,10 @@ use crate::store::{Instant, TrialId};
 use gait_learner::LearnerError;
 use serde::Serialize;
 use std::collections::HashMap;
+use utoipa::ToSchema;
 
 /// The recommendation after some results.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Milestone {
     /// After how many results this held: 1, 2, ...
     pub iteration: u32,
@@ -77,7 +78,7 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
     let proposed = standing.trials.iter();
     milestones.extend(proposed.filter_map(|trial| milestone(results_before(&labelled, trial), trial.best_before?)));
     if !labelled.is_empty()
-        && let Some(best) = best_trial(standing)?
+        && let Some(best) = best_to_show(standing)?
     {
         milestones.extend(milestone(labelled.len(), best));
     }
@@ -87,4 +88,21 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
     milestones.dedup_by_key(|milestone| milestone.iteration);
     milestones.reverse();
     Ok(milestones)
+}
+
+/// What is known of some trials without asking the learner: the best when each was proposed. Iterations are those of
+/// one trial at a time.
+pub fn known(standing: &Standing) -> Vec<Milestone> {
+    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+    let best_before = |trial: &Trial| {
+        let best = by_id.get(&trial.best_before?)?;
+        Some(Milestone {
+            iteration: trial.number - 1,
+            trial_id: best.id,
+            number: best.number,
+            gait_rmse_rad: best.gait_rmse_rad,
+            cost_of_transport: best.cost_of_transport,
+        })
+    };
+    standing.trials.iter().filter_map(best_before).collect()
 }

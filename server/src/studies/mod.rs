@@ -5,7 +5,9 @@
 //! record does not have, so that a process that ends at any instant is continued by the next one.
 
 pub mod answer;
+pub mod blind;
 pub mod catalogue;
+pub mod change;
 pub mod choice;
 pub mod command;
 pub mod comparison;
@@ -15,6 +17,7 @@ pub mod lifecycle;
 pub mod person;
 pub mod plan;
 pub mod record;
+pub mod script;
 pub mod search;
 pub mod seed;
 pub mod standing;

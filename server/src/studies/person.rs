@@ -7,9 +7,10 @@ use crate::store::{OnConstraint, Writer};
 use gait_optimizer::Subject as Body;
 use serde::Deserialize;
 use serde_json::json;
+use utoipa::ToSchema;
 
 /// A subject to add.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewSubject {
     /// Site-given pseudonym: never a name.

@@ -3,15 +3,18 @@
 use super::{catalogue, search};
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
-use crate::store::studies::{FeedbackMode, Study, StudyPlan, StudyState};
-use crate::store::{DeviceId, ReferenceGaitId, SubjectId, Writer, devices, events, reference_gaits, studies, subjects};
+use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
+use crate::store::{
+    DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, reference_gaits, schema, studies, subjects,
+};
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use serde::Deserialize;
 use serde_json::json;
+use utoipa::ToSchema;
 
 /// A study to make. Everything but the subject has a default.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewStudy {
     /// Who walks.
@@ -30,25 +33,41 @@ pub struct NewStudy {
     pub muscles: bool,
     /// Settings of the gait problem.
     #[serde(default)]
+    #[schema(value_type = Object)]
     pub gait_settings: GaitSettings,
     /// Limits of one solve.
     #[serde(default)]
+    #[schema(value_type = Object)]
     pub solve_options: SolveOptions,
     /// Values of the bounds that are not tuned.
     #[serde(default)]
+    #[schema(value_type = schema::Bounds)]
     pub base_bounds: TunedBounds,
     /// What is tuned; by default Table I.
     #[serde(default)]
+    #[schema(value_type = Option<schema::SearchSpace>)]
     pub search_space: Option<SearchSpace>,
     /// Settings of the learner.
     #[serde(default)]
+    #[schema(value_type = Object)]
     pub learner: LearnerSettings,
     /// Who answers the comparisons.
     #[serde(default = "automatic")]
     pub feedback_mode: FeedbackMode,
+    /// Who evaluates the trials.
+    #[serde(default = "optimizer")]
+    pub evaluation: Evaluation,
     /// How many trials.
     #[serde(default = "fifteen")]
+    #[schema(minimum = 1, maximum = 10000)]
     pub trial_budget: u32,
+    /// No new trial once the solves so far took so many seconds together.
+    #[serde(default)]
+    pub solve_seconds_budget: Option<f64>,
+    /// Done when the best action stayed the same over so many results in a row.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 10000)]
+    pub unchanged_limit: Option<u32>,
     /// How many trials at the same time.
     #[serde(default = "one")]
     pub parallel_trials: u32,
@@ -68,6 +87,9 @@ fn yes() -> bool {
 }
 fn automatic() -> FeedbackMode {
     FeedbackMode::Automatic
+}
+fn optimizer() -> Evaluation {
+    Evaluation::Optimizer
 }
 fn fifteen() -> u32 {
     15
@@ -94,11 +116,41 @@ impl NewStudy {
             search_space: None,
             learner: LearnerSettings::default(),
             feedback_mode: FeedbackMode::Automatic,
+            evaluation: Evaluation::Optimizer,
             trial_budget: fifteen(),
+            solve_seconds_budget: None,
+            unchanged_limit: None,
             parallel_trials: one(),
             priority: 0,
             seed: one_seed(),
             start: true,
+        }
+    }
+}
+
+impl NewStudy {
+    /// A study with the set-up of another one, not started.
+    pub fn like(plan: &StudyPlan) -> Self {
+        Self {
+            subject_id: plan.subject_id,
+            name: Some(plan.name.clone()),
+            device_id: Some(plan.device_id),
+            reference_gait_id: Some(plan.reference_gait_id),
+            muscles: plan.muscles,
+            gait_settings: plan.gait_settings,
+            solve_options: plan.solve_options,
+            base_bounds: plan.base_bounds,
+            search_space: Some(plan.search_space.clone()),
+            learner: plan.learner.clone(),
+            feedback_mode: plan.feedback_mode,
+            evaluation: plan.evaluation,
+            trial_budget: plan.trial_budget,
+            solve_seconds_budget: plan.solve_seconds_budget,
+            unchanged_limit: plan.unchanged_limit,
+            parallel_trials: plan.parallel_trials,
+            priority: plan.priority,
+            seed: plan.seed,
+            start: false,
         }
     }
 }
@@ -111,12 +163,23 @@ pub const LARGEST_SEED: u64 = (1 << 53) - 1;
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference.
 pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result<Study, Error> {
+    create_from(writer, actor, new, None).await
+}
+
+/// The same, noting the study whose set-up it has.
+pub(super) async fn create_from(
+    writer: &mut Writer,
+    actor: &Actor,
+    new: NewStudy,
+    forked_from: Option<StudyId>,
+) -> Result<Study, Error> {
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
     let plan = checked(writer, new).await?;
-    let study = studies::insert(writer, &plan, state).await?;
+    let study = studies::insert(writer, &plan, state, forked_from).await?;
     let payload = json!({ "state": study.state, "reason": "created" });
     events::append(writer, study.id, "study_changed", &payload).await?;
-    let detail = json!({ "name": study.plan.name, "state": study.state, "seed": study.plan.seed });
+    let detail =
+        json!({ "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "forked_from": forked_from });
     audit::append(writer, actor, "study.create", &format!("study {}", study.id), &detail).await?;
     Ok(study)
 }
@@ -146,6 +209,12 @@ pub async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Er
     check_range("trial_budget", i64::from(new.trial_budget), 1, 10_000)?;
     check_range("parallel_trials", i64::from(new.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(new.priority), -10, 10)?;
+    if new.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {
+        return Err(Error::invalid("solve_seconds_budget", json!(new.solve_seconds_budget), "1 to 1e8, or absent"));
+    }
+    if let Some(limit) = new.unchanged_limit {
+        check_range("unchanged_limit", i64::from(limit), 1, 10_000)?;
+    }
     if new.seed > LARGEST_SEED {
         return Err(Error::invalid("seed", new.seed, &format!("0 to {LARGEST_SEED}")));
     }
@@ -174,14 +243,17 @@ pub async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Er
         search_space,
         learner: new.learner,
         feedback_mode: new.feedback_mode,
+        evaluation: new.evaluation,
         trial_budget: new.trial_budget,
+        solve_seconds_budget: new.solve_seconds_budget,
+        unchanged_limit: new.unchanged_limit,
         parallel_trials: new.parallel_trials,
         priority: new.priority,
         seed: new.seed,
     })
 }
 
-fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {
+pub(super) fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {
     if (minimum..=maximum).contains(&value) {
         Ok(())
     } else {

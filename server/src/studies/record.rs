@@ -130,6 +130,9 @@ pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Res
 pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
     trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
+    if row.asked_by.is_some() {
+        return Err(Error::conflict("a script evaluates this trial: it asks for another one"));
+    }
     jobs::reopen(writer, trial).await?;
     trials::requeue(writer, trial, "").await?;
     let payload = json!({ "trial_id": trial, "number": row.number, "state": TrialState::Queued });

@@ -1,9 +1,10 @@
 //! Where a study stands, as its learner sees it: the log of results and answers, by action.
 
+use super::blind;
 use crate::store::feedback::{FeedbackRow, LogVersion, Said, Source};
 use crate::store::studies::{FeedbackMode, Study};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, StoreResult, TrialId, feedback, trials};
+use crate::store::{Connection, StoreResult, TrialId, feedback, presentations, trials};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use std::collections::HashMap;
 
@@ -18,6 +19,10 @@ pub struct Standing {
     pub feedback: Vec<FeedbackRow>,
     /// The version of the feedback: a decision is written only if it is still current.
     pub version: LogVersion,
+    /// Trials whose gait a rater called unsafe: nobody is asked about them.
+    pub closed: Vec<TrialId>,
+    /// Pairs of which a rater could not tell which is better: not asked again.
+    pub skipped: Vec<(TrialId, TrialId)>,
 }
 
 impl Standing {
@@ -29,7 +34,25 @@ impl Standing {
         let version = feedback::version(db, study.id).await?;
         let trials = trials::of_study(db, study.id).await?;
         let feedback = feedback::of_study(db, study.id, 0).await?;
-        Ok(Self { study, trials, feedback, version })
+        let shown = presentations::of_study(db, study.id).await?;
+        let (closed, skipped) = (blind::unsafe_trials(&shown), blind::skipped_pairs(&shown));
+        Ok(Self { study, trials, feedback, version, closed, skipped })
+    }
+
+    /// The newest trials of a large study and the best one, for showing: the learner is not asked about it.
+    ///
+    /// # Errors
+    /// What the database reports.
+    pub async fn newest(db: &mut Connection, study: Study, limit: u32) -> StoreResult<Self> {
+        let version = feedback::version(db, study.id).await?;
+        let mut trials = trials::newest(db, study.id, None, limit).await?;
+        if let Some(best) = trials.last().and_then(|newest| newest.best_before)
+            && !trials.iter().any(|trial| trial.id == best)
+        {
+            trials.insert(0, trials::get(db, best).await?);
+        }
+        let feedback = feedback::newest_of_people(db, study.id, limit).await?;
+        Ok(Self { study, trials, feedback, version, closed: Vec::new(), skipped: Vec::new() })
     }
 
     /// The trial with this identifier.
@@ -55,6 +78,24 @@ impl Standing {
         self.trials.iter().filter(|trial| trial.state.is_open()).count()
     }
 
+    /// Why no further trial is needed though the number of trials would allow one: the time is used, or the best
+    /// action stayed the same for long enough.
+    pub fn is_enough(&self) -> Option<String> {
+        let plan = &self.study.plan;
+        let spent: f64 = self.trials.iter().filter_map(|trial| trial.seconds_total).sum();
+        if let Some(budget) = plan.solve_seconds_budget
+            && spent >= budget
+        {
+            return Some(format!("the solves took {spent:.0} s of {budget:.0} s"));
+        }
+        let limit = plan.unchanged_limit? as usize;
+        // What was the best when a trial was proposed, newest first.
+        let bests: Vec<TrialId> =
+            self.trials.iter().rev().filter_map(|trial| trial.best_before).take(limit + 1).collect();
+        let same = bests.len() > limit && bests.iter().all(|best| *best == bests[0]);
+        same.then(|| format!("the best action stayed the same over {limit} results"))
+    }
+
     /// What the learner hears: results in the order in which they were recorded, and every answer that was
     /// not taken back.
     pub fn log(&self) -> FeedbackLog {
@@ -64,7 +105,7 @@ impl Standing {
     /// The log of the converged trials alone, for choosing whom to compare with: a gait that does not exist
     /// cannot be compared, and its label has said so already.
     pub fn log_of_converged(&self) -> FeedbackLog {
-        self.log_where(|trial| trial.state == TrialState::Converged)
+        self.log_where(|trial| trial.state == TrialState::Converged && !self.closed.contains(&trial.id))
     }
 
     fn log_where(&self, visited: impl Fn(&Trial) -> bool) -> FeedbackLog {

@@ -3,9 +3,11 @@
 //! What is recorded has an id and is replayed after `Last-Event-ID`; iterations of running solves have none: who
 //! misses one sees the next.
 
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
+use crate::http::may::May;
 use crate::store::{StudyId, TrialId, events, studies};
 use crate::workers::Progress;
 use axum::extract::State;
@@ -32,7 +34,16 @@ pub(super) struct From {
 }
 
 /// `GET /studies/{id}/events`.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/events",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Begin after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "The last event that was seen")),
+    responses((status = 200, description = "Server-sent events; recorded ones carry an id and are replayed after `Last-Event-ID`", body = String, content_type = "text/event-stream")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn of_study(
+    _: May<Read>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Params(from): Params<From>,

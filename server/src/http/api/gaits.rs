@@ -1,8 +1,10 @@
 //! Gaits: the trajectory of a trial.
 
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
+use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::store::{TrialId, gaits, trials};
 use axum::extract::State;
@@ -11,7 +13,16 @@ use axum::response::{IntoResponse, Response};
 use gait_optimizer::Gait;
 
 /// `GET /trials/{id}/gait`: as the optimiser wrote it, or its trajectory as CSV.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/gait",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "The trajectory as the optimiser wrote it; CSV where `Accept` asks for it", content((Object = "application/json"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn get(
+    _: May<Read>,
     State(app): State<AppState>,
     Id(id): Id<TrialId>,
     headers: HeaderMap,
@@ -27,7 +38,15 @@ pub(super) async fn get(
 }
 
 /// `GET /trials/{id}/gait.csv`.
-pub(super) async fn get_csv(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Response, Error> {
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/gait.csv",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "One row per mesh point", body = String, content_type = "text/csv")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get_csv(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Response, Error> {
     table(&app, id).await
 }
 

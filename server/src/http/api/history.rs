@@ -1,8 +1,10 @@
 //! The best action by iteration.
 
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
+use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::store::{StudyId, studies};
 use crate::studies::history::{self, Milestone};
@@ -13,7 +15,16 @@ use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Response};
 
 /// `GET /studies/{id}/history`.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/history",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "By iteration; CSV where `Accept` asks for it", content((Vec<Milestone> = "application/json"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn of_study(
+    _: May<Read>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     headers: HeaderMap,
@@ -23,7 +34,19 @@ pub(super) async fn of_study(
 }
 
 /// `GET /studies/{id}/history.csv`.
-pub(super) async fn of_study_csv(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Response, Error> {
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/history.csv",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "By iteration", body = String, content_type = "text/csv")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study_csv(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+) -> Result<Response, Error> {
     table(id, &read(&app, id).await?)
 }
 

@@ -1,5 +1,9 @@
-//! REST under `/api/v1`: one file per resource.
+//! REST under `/api/v1`: one file per resource. Route and description are one thing: what is not described here is
+//! not reachable.
 
+mod audit;
+mod blind;
+mod comparison;
 mod devices;
 mod events;
 mod gaits;
@@ -8,47 +12,73 @@ mod history;
 mod motion;
 mod preferences;
 mod reference_gaits;
+mod scripts;
 mod studies;
 mod subjects;
+mod tokens;
 mod trials;
+mod users;
 
 use super::AppState;
-use axum::Router;
-use axum::routing::{get, post};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
 
 /// Every route below `/api/v1`.
-pub fn routes() -> Router<AppState> {
-    Router::new()
+pub fn routes() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
         // who and what
-        .route("/subjects", get(subjects::list).post(subjects::create))
-        .route("/subjects/{id}", get(subjects::get))
-        .route("/devices", get(devices::list))
-        .route("/devices/{id}", get(devices::get))
-        .route("/reference-gaits", get(reference_gaits::list))
-        .route("/reference-gaits/{id}", get(reference_gaits::get))
+        .routes(routes!(subjects::list, subjects::create))
+        .routes(routes!(subjects::get))
+        .routes(routes!(devices::list))
+        .routes(routes!(devices::get))
+        .routes(routes!(reference_gaits::list))
+        .routes(routes!(reference_gaits::get))
         // studies
-        .route("/studies", get(studies::list).post(studies::create))
-        .route("/studies/{id}", get(studies::get))
-        .route("/studies/{id}/start", post(studies::start))
-        .route("/studies/{id}/pause", post(studies::pause))
-        .route("/studies/{id}/resume", post(studies::resume))
-        .route("/studies/{id}/stop", post(studies::stop))
-        .route("/studies/{id}/trials", get(trials::of_study))
-        .route("/studies/{id}/trials.csv", get(trials::of_study_csv))
-        .route("/studies/{id}/history", get(history::of_study))
-        .route("/studies/{id}/history.csv", get(history::of_study_csv))
-        .route("/studies/{id}/preferences", get(preferences::of_study).post(preferences::create))
-        .route("/studies/{id}/events", get(events::of_study))
+        .routes(routes!(studies::list, studies::create))
+        .routes(routes!(studies::get, studies::patch))
+        .routes(routes!(studies::start))
+        .routes(routes!(studies::pause))
+        .routes(routes!(studies::resume))
+        .routes(routes!(studies::stop))
+        .routes(routes!(studies::extend))
+        .routes(routes!(studies::fork))
+        .routes(routes!(comparison::get))
+        .routes(routes!(trials::of_study))
+        .routes(routes!(trials::of_study_csv))
+        .routes(routes!(history::of_study))
+        .routes(routes!(history::of_study_csv))
+        .routes(routes!(preferences::of_study, preferences::create))
+        .routes(routes!(events::of_study))
         // trials
-        .route("/trials/{id}", get(trials::get))
-        .route("/trials/{id}/cancel", post(trials::cancel))
-        .route("/trials/{id}/retry", post(trials::retry))
-        .route("/trials/{id}/iterations", get(trials::iterations))
-        .route("/trials/{id}/gait", get(gaits::get))
-        .route("/trials/{id}/gait.csv", get(gaits::get_csv))
-        .route("/trials/{id}/motion", get(motion::get))
+        .routes(routes!(trials::get))
+        .routes(routes!(trials::cancel))
+        .routes(routes!(trials::retry))
+        .routes(routes!(trials::iterations))
+        .routes(routes!(gaits::get))
+        .routes(routes!(gaits::get_csv))
+        .routes(routes!(motion::get))
+        // scripts of the lab
+        .routes(routes!(scripts::ask))
+        .routes(routes!(scripts::tell))
+        // blind comparisons
+        .routes(routes!(blind::next))
+        .routes(routes!(blind::first))
+        .routes(routes!(blind::second))
+        .routes(routes!(blind::answer))
+        .routes(routes!(blind::raters))
+        .routes(routes!(blind::unblind))
         // answers
-        .route("/preferences/{id}", get(preferences::get))
-        .route("/preferences/{id}/retract", post(preferences::retract))
-        .route("/health", get(health::get))
+        .routes(routes!(preferences::get))
+        .routes(routes!(preferences::retract))
+        // access
+        .routes(routes!(users::me))
+        .routes(routes!(users::list, users::create))
+        .routes(routes!(users::link))
+        .routes(routes!(users::disable))
+        .routes(routes!(users::enable))
+        .routes(routes!(tokens::list, tokens::create))
+        .routes(routes!(tokens::revoke))
+        // operation
+        .routes(routes!(audit::list))
+        .routes(routes!(health::get))
 }

@@ -1,9 +1,11 @@
 //! The motion of a gait: what an animation draws.
 
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
 use crate::http::gait_series::points;
+use crate::http::may::May;
 use crate::store::{TrialId, gaits, trials};
 use axum::Json;
 use axum::extract::State;
@@ -13,7 +15,7 @@ use serde::Serialize;
 
 /// A gait in motion, over one stride from right heel strike.
 #[derive(Debug, Serialize)]
-pub(super) struct Motion {
+pub(in crate::http) struct Motion {
     /// Stride time, s.
     stride_time_s: f64,
     /// How far one stride goes, m.
@@ -33,7 +35,15 @@ struct Frame {
 }
 
 /// `GET /trials/{id}/motion`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Motion>, Error> {
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/motion",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "Stick figures over one stride", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Motion>, Error> {
     let mut reader = app.read().await?;
     trials::get(&mut reader, id).await?;
     let gait = gaits::get(&mut reader, id).await?;
@@ -41,7 +51,7 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Res
     Ok(Json(motion(&gait)?))
 }
 
-fn motion(gait: &Gait) -> Result<Motion, Error> {
+pub(in crate::http) fn motion(gait: &Gait) -> Result<Motion, Error> {
     let frames = stick_figures(gait)?
         .into_iter()
         .zip(points(gait))

@@ -1,74 +1,162 @@
 //! Preferences: answers to comparisons.
 
+use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
+use crate::http::extract::{Id, Params};
+use crate::http::may::May;
+use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::OnceWith;
+use crate::http::pages_of::{After, linked_after};
 use crate::store::feedback::{self, FeedbackRow, Said};
 use crate::store::{FeedbackId, StudyId, studies};
 use crate::studies::answer::{self, Answer};
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
 use serde::Deserialize;
+use utoipa::ToSchema;
 
-/// `GET /studies/{id}/preferences`: as given, retracted ones included.
+/// `GET /studies/{id}/preferences`: as given, retracted ones included, by pages; the `Link` header has the address of
+/// the next one.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/preferences",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "After this `seq`"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
+    responses((status = 200, description = "A page, by time; all of them as CSV where `Accept` asks for it. In a preference `trial_a` of the table is the winner", content((Vec<FeedbackRow> = "application/json"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn of_study(
+    _: May<Read>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
-) -> Result<Json<Vec<FeedbackRow>>, Error> {
+    Params(page): Params<After<i64>>,
+    headers: HeaderMap,
+) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let mut rows = feedback::of_study(&mut reader, id, 0).await?;
-    rows.retain(|row| matches!(row.said, Said::Preference { .. } | Said::Tie { .. }));
-    Ok(Json(rows))
+    if wants_csv(&headers) {
+        return table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?);
+    }
+    let limit = page.limit(1000)?;
+    let rows = feedback::comparisons(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
+    Ok(linked_after(&format!("/api/v1/studies/{id}/preferences"), rows, limit, |row| row.seq.to_string()))
+}
+
+fn table(study: StudyId, rows: &[FeedbackRow]) -> Result<Response, Error> {
+    let header = [
+        "seq",
+        "id",
+        "kind",
+        "trial_a",
+        "trial_b",
+        "source",
+        "author",
+        "note",
+        "created_at",
+        "retracted_at",
+        "retraction_reason",
+    ];
+    let rows = rows
+        .iter()
+        .filter_map(|row| {
+            let (kind, a, b) = match row.said {
+                Said::Preference { winner, loser } => ("preference", winner, loser),
+                Said::Tie { a, b } => ("tie", a, b),
+                Said::Label { .. } | Said::Suggestion { .. } => return None,
+            };
+            let retraction = row.retraction.as_ref();
+            Some(vec![
+                row.seq.to_string(),
+                row.id.to_string(),
+                kind.to_owned(),
+                a.to_string(),
+                b.to_string(),
+                row.source.as_str().to_owned(),
+                row.author.clone(),
+                row.note.clone(),
+                row.created_at.to_string(),
+                retraction.map(|r| r.created_at.to_string()).unwrap_or_default(),
+                retraction.map(|r| r.reason.clone()).unwrap_or_default(),
+            ])
+        })
+        .collect();
+    csv_answer(&format!("preferences-{}.csv", study.short()), &header, rows)
 }
 
 /// `GET /preferences/{id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<FeedbackId>) -> Result<Json<FeedbackRow>, Error> {
+#[utoipa::path(
+    get,
+    path = "/preferences/{id}",
+    tag = "preferences",
+    params(("id" = FeedbackId, Path, description = "The answer")),
+    responses((status = 200, description = "The answer", body = FeedbackRow)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<FeedbackId>,
+) -> Result<Json<FeedbackRow>, Error> {
     Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
 }
 
 /// `POST /studies/{id}/preferences`.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/preferences",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = Answer,
+    responses((status = 201, description = "Recorded", body = FeedbackRow)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
 pub(super) async fn create(
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
-    OnceWith(once, answer): OnceWith<Answer>,
+    OnceWith(once, answer): OnceWith<access::Answer, Answer>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let given = answer::give(&mut writer, &once.actor, id, &answer).await?;
+    let given = answer::give(&mut writer, &once.caller, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
     let location = format!("/api/v1/preferences/{given}");
     once.finish(&app, writer, StatusCode::CREATED, Some(location), &row).await
 }
 
 /// Why an answer is taken back.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Retract {
     reason: String,
-    #[serde(default = "unnamed")]
-    author: String,
-}
-
-fn unnamed() -> String {
-    "not signed in".to_owned()
+    /// By default the name of the caller.
+    #[serde(default)]
+    author: Option<String>,
 }
 
 /// `POST /preferences/{id}/retract`.
+#[utoipa::path(
+    post,
+    path = "/preferences/{id}/retract",
+    tag = "preferences",
+    params(("id" = FeedbackId, Path, description = "The answer")),
+    request_body = Retract,
+    responses((status = 200, description = "Taken back: the row stays, the learner does not hear it any more", body = FeedbackRow)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id): Id<FeedbackId>,
-    OnceWith(once, why): OnceWith<Retract>,
+    OnceWith(once, why): OnceWith<access::Answer, Retract>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = answer::retract(&mut writer, &once.actor, None, id, &why.author, &why.reason).await?;
+    let row = answer::retract(&mut writer, &once.caller, None, id, why.author.as_deref(), &why.reason).await?;
     once.finish(&app, writer, StatusCode::OK, None, &row).await
 }

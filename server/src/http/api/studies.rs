@@ -1,23 +1,29 @@
 //! Studies.
 
+use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
+use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::pages_of::Before;
+use crate::http::revision::{IfMatch, tagged};
 use crate::store::studies::{self, Study};
 use crate::store::trials::{self, TrialCounts};
-use crate::store::{Connection, StudyId};
+use crate::store::{Connection, StudyId, Writer};
+use crate::studies::change::{self, Change, Extend, Fork};
 use crate::studies::command;
 use crate::studies::lifecycle::{Act, acts_of_people};
 use crate::studies::plan::{self, NewStudy};
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
-use axum::response::Response;
+use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A study as answered.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 pub(super) struct StudyView {
     #[serde(flatten)]
     study: Study,
@@ -35,7 +41,7 @@ impl StudyView {
 }
 
 /// A page of studies.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 pub(super) struct StudyPage {
     studies: Vec<StudyView>,
     /// Give it as `before` to get the next page; absent on the last one.
@@ -43,22 +49,24 @@ pub(super) struct StudyPage {
     next: Option<StudyId>,
 }
 
-/// Which page.
-#[derive(Debug, Deserialize)]
-pub(super) struct PageParams {
-    before: Option<StudyId>,
-    limit: Option<u32>,
-}
-
 /// `GET`: newest first, by pages.
+#[utoipa::path(
+    get,
+    path = "/studies",
+    tag = "studies",
+    params(
+        ("before" = Option<StudyId>, Query, description = "Older than this one"),
+        ("limit" = Option<u32>, Query, description = "At most so many: 1 to 200")
+    ),
+    responses((status = 200, description = "A page", body = StudyPage)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn list(
+    _: May<Read>,
     State(app): State<AppState>,
-    Params(page): Params<PageParams>,
+    Params(page): Params<Before<StudyId>>,
 ) -> Result<Json<StudyPage>, Error> {
-    let limit = page.limit.unwrap_or(50);
-    if !(1..=200).contains(&limit) {
-        return Err(Error::invalid("limit", limit, "1 to 200"));
-    }
+    let limit = page.limit(200)?;
     let mut reader = app.read().await?;
     let mut found = studies::page(&mut reader, page.before, limit + 1).await?;
     let more = found.len() > limit as usize;
@@ -71,17 +79,39 @@ pub(super) async fn list(
     Ok(Json(StudyPage { studies: views, next }))
 }
 
-/// `GET {id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Json<StudyView>, Error> {
+/// `GET {id}`: its entity tag is its revision.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((
+        status = 200,
+        description = "The study",
+        body = StudyView,
+        headers(("ETag" = String, description = "Its revision: give it as If-Match with a change"))
+    )),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    Ok(Json(StudyView::of(&mut reader, study).await?))
+    let revision = study.revision;
+    Ok(tagged(Json(StudyView::of(&mut reader, study).await?).into_response(), revision))
 }
 
 /// `POST`: makes one, and starts it unless `start` is false.
+#[utoipa::path(
+    post,
+    path = "/studies",
+    tag = "studies",
+    request_body = NewStudy,
+    responses((status = 201, description = "Made", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
 pub(super) async fn create(
     State(app): State<AppState>,
-    OnceWith(once, new): OnceWith<NewStudy>,
+    OnceWith(once, new): OnceWith<Run, NewStudy>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
@@ -93,34 +123,194 @@ pub(super) async fn create(
     once.finish(&app, writer, StatusCode::CREATED, Some(location), &view).await
 }
 
+/// Why something is done.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Why {
+    /// At most 2000 characters; may be left out.
+    #[serde(default)]
+    reason: String,
+}
+
 /// `POST {id}/start`.
-pub(super) async fn start(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
-    act(&app, id, &once, Act::Start).await
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/start",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    request_body(content = Why, description = "May be left out"),
+    responses((status = 200, description = "Started", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn start(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    expected: IfMatch,
+    OnceWith(once, why): OnceWith<Run, Why>,
+) -> Result<Response, Error> {
+    act(&app, id, expected, &once, Act::Start, &why).await
 }
 
 /// `POST {id}/pause`.
-pub(super) async fn pause(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
-    act(&app, id, &once, Act::Pause).await
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/pause",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    request_body(content = Why, description = "May be left out"),
+    responses((status = 200, description = "Held: solves that run are finished, nothing new starts", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn pause(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    expected: IfMatch,
+    OnceWith(once, why): OnceWith<Run, Why>,
+) -> Result<Response, Error> {
+    act(&app, id, expected, &once, Act::Pause, &why).await
 }
 
 /// `POST {id}/resume`.
-pub(super) async fn resume(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
-    act(&app, id, &once, Act::Resume).await
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/resume",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    request_body(content = Why, description = "May be left out"),
+    responses((status = 200, description = "Goes on", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn resume(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    expected: IfMatch,
+    OnceWith(once, why): OnceWith<Run, Why>,
+) -> Result<Response, Error> {
+    act(&app, id, expected, &once, Act::Resume, &why).await
 }
 
 /// `POST {id}/stop`.
-pub(super) async fn stop(State(app): State<AppState>, Id(id): Id<StudyId>, once: Once) -> Result<Response, Error> {
-    act(&app, id, &once, Act::Stop).await
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/stop",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    request_body(content = Why, description = "May be left out"),
+    responses((status = 200, description = "Ended: open trials are cancelled", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn stop(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    expected: IfMatch,
+    OnceWith(once, why): OnceWith<Run, Why>,
+) -> Result<Response, Error> {
+    act(&app, id, expected, &once, Act::Stop, &why).await
 }
 
-async fn act(app: &AppState, id: StudyId, once: &Once, act: Act) -> Result<Response, Error> {
+async fn act(
+    app: &AppState,
+    id: StudyId,
+    expected: IfMatch,
+    once: &Once<Run>,
+    act: Act,
+    why: &Why,
+) -> Result<Response, Error> {
     let mut writer = match once.begin(app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let done = command::act(&mut writer, &once.actor, id, act, "").await?;
+    expected.check(studies::get(&mut writer, id).await?.revision)?;
+    let done = command::act(&mut writer, &once.actor, id, act, &why.reason).await?;
+    let revision = done.study.revision;
     let view = StudyView::of(&mut writer, done.study).await?;
     let answer = once.finish(app, writer, StatusCode::OK, None, &view).await?;
     done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
-    Ok(answer)
+    Ok(tagged(answer, revision))
+}
+
+/// `PATCH {id}`: changes it in place.
+#[utoipa::path(
+    patch,
+    path = "/studies/{id}",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    request_body = Change,
+    responses((status = 200, description = "Changed", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn patch(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    expected: IfMatch,
+    OnceWith(once, new): OnceWith<Run, Change>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    expected.check(studies::get(&mut writer, id).await?.revision)?;
+    let study = change::change(&mut writer, &once.actor, id, &new).await?;
+    answer(&app, &once, writer, study, StatusCode::OK).await
+}
+
+/// `POST {id}/extend`: more trials; an ended study goes on.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/extend",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study"), IfMatch),
+    request_body = Extend,
+    responses((status = 200, description = "Extended", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn extend(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    expected: IfMatch,
+    OnceWith(once, more): OnceWith<Run, Extend>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    expected.check(studies::get(&mut writer, id).await?.revision)?;
+    let study = change::extend(&mut writer, &once.actor, id, &more).await?;
+    answer(&app, &once, writer, study, StatusCode::OK).await
+}
+
+/// `POST {id}/fork`: a study with the same set-up and none of the trials.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/fork",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body(content = Fork, description = "What differs; may be left out"),
+    responses((status = 201, description = "Made", body = StudyView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn fork(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    OnceWith(once, differs): OnceWith<Run, Fork>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let study = change::fork(&mut writer, &once.actor, id, &differs).await?;
+    answer(&app, &once, writer, study, StatusCode::CREATED).await
+}
+
+async fn answer(
+    app: &AppState,
+    once: &Once<Run>,
+    mut writer: Writer,
+    study: Study,
+    status: StatusCode,
+) -> Result<Response, Error> {
+    let (id, revision) = (study.id, study.revision);
+    let view = StudyView::of(&mut writer, study).await?;
+    let location = (status == StatusCode::CREATED).then(|| format!("/api/v1/studies/{id}"));
+    Ok(tagged(once.finish(app, writer, status, location, &view).await?, revision))
 }

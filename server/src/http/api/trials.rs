@@ -1,12 +1,14 @@
 //! Trials.
 
+use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
+use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::Once;
 use crate::store::trials::{self, Trial};
-use crate::store::{Connection, StudyId, TrialId, gaits, studies};
+use crate::store::{Connection, StudyId, TrialId, gaits, schema, studies};
 use crate::studies::command;
 use axum::Json;
 use axum::extract::State;
@@ -14,10 +16,12 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use gait_optimizer::{IterationRecord, TunedBounds};
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use utoipa::ToSchema;
 
 /// A page of trials.
-#[derive(Debug, Serialize)]
-struct TrialPage {
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct TrialPage {
     trials: Vec<Trial>,
     /// Give it as `after` to get the next page; absent on the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -32,7 +36,16 @@ pub(super) struct PageParams {
 }
 
 /// `GET /studies/{id}/trials`: by number, by pages; all of them as CSV.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/trials",
+    tag = "trials",
+    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<u32>, Query, description = "After the trial with this number"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
+    responses((status = 200, description = "A page, by number; all of them as CSV where `Accept` asks for it", content((TrialPage = "application/json"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn of_study(
+    _: May<Read>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Params(page): Params<PageParams>,
@@ -55,19 +68,51 @@ pub(super) async fn of_study(
 }
 
 /// `GET /studies/{id}/trials.csv`.
-pub(super) async fn of_study_csv(State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Response, Error> {
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/trials.csv",
+    tag = "trials",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "All of them", body = String, content_type = "text/csv")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study_csv(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     table(&mut reader, id).await
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
+#[utoipa::path(
+    get,
+    path = "/trials/{id}",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "The trial", body = Trial)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
     Ok(Json(trials::get(&mut *app.read().await?, id).await?))
 }
 
 /// `POST /trials/{id}/cancel`.
-pub(super) async fn cancel(State(app): State<AppState>, Id(id): Id<TrialId>, once: Once) -> Result<Response, Error> {
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/cancel",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "Cancelled; its solve stops within one iteration", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn cancel(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    once: Once<Run>,
+) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
@@ -79,7 +124,19 @@ pub(super) async fn cancel(State(app): State<AppState>, Id(id): Id<TrialId>, onc
 }
 
 /// `POST /trials/{id}/retry`.
-pub(super) async fn retry(State(app): State<AppState>, Id(id): Id<TrialId>, once: Once) -> Result<Response, Error> {
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/retry",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "Queued once more", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn retry(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    once: Once<Run>,
+) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
@@ -89,7 +146,16 @@ pub(super) async fn retry(State(app): State<AppState>, Id(id): Id<TrialId>, once
 }
 
 /// `GET /trials/{id}/iterations`: of the running solve, or as recorded.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/iterations",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "Of the running solve, or as recorded", body = Vec<schema::Iteration>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
 pub(super) async fn iterations(
+    _: May<Read>,
     State(app): State<AppState>,
     Id(id): Id<TrialId>,
 ) -> Result<Json<Vec<IterationRecord>>, Error> {
@@ -114,7 +180,8 @@ async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Error> {
         "message",
     ]);
     let all = trials::of_study(db, study).await?;
-    let number_of = |id: Option<TrialId>| all.iter().find(|t| Some(t.id) == id).map(|t| t.number.to_string());
+    let numbers: HashMap<TrialId, u32> = all.iter().map(|trial| (trial.id, trial.number)).collect();
+    let number_of = |id: Option<TrialId>| id.and_then(|id| numbers.get(&id)).map(u32::to_string);
     let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     let rows = all
         .iter()

@@ -3,17 +3,21 @@
 use super::error::{Page, PageError, page};
 use super::gait_charts::{self, Drawn};
 use super::study::answer_in_words;
+use crate::access::{self, Caller, Read};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
+use crate::http::may::May;
 use crate::http::problem::Problem;
-use crate::store::audit::Actor;
 use crate::store::feedback::Source;
 use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
-use crate::store::{FeedbackId, StoreError, StudyId, TrialId, commit, feedback, gaits, reference_gaits, studies};
+use crate::store::{
+    FeedbackId, StoreError, StudyId, TrialId, commit, feedback, gaits, reference_gaits, studies, trials,
+};
 use crate::studies::answer::{self, Answer, Verdict};
+use crate::studies::choice::MANY;
 use crate::studies::comparison::open_question;
 use crate::studies::standing::Standing;
 use askama::Template;
@@ -62,8 +66,16 @@ struct Saved {
     retracted: bool,
 }
 
+/// So many trials of a large study are offered.
+const OFFERED: u32 = 200;
+
 /// `GET /studies/{id}/compare`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>, Params(choice): Params<Choice>) -> Page {
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Params(choice): Params<Choice>,
+) -> Page {
     show(&app, id, choice, Submitted::default(), None).await
 }
 
@@ -71,12 +83,17 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
-    let standing = Standing::read(&mut reader, study).await?;
+    let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
+    let standing = if large {
+        Standing::newest(&mut reader, study, OFFERED).await?
+    } else {
+        Standing::read(&mut reader, study).await?
+    };
     let saved = match choice.saved {
         Some(saved) => Some(feedback::get(&mut reader, saved).await?),
         None => None,
     };
-    let question = open_question(&standing).map_err(Error::Learner)?;
+    let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
     let mut trials: Vec<Offered> = standing
         .trials
         .iter()
@@ -147,8 +164,8 @@ impl Submitted {
             trial_a: identifier("trial_a", &self.a)?,
             trial_b: identifier("trial_b", &self.b)?,
             answer: verdict,
-            source,
-            author: self.author.clone(),
+            source: Some(source),
+            author: Some(self.author.clone()),
             note: self.note.clone(),
         };
         Ok((answer, identifier("key", &self.key)?))
@@ -176,11 +193,12 @@ enum Given {
 
 /// `POST /studies/{id}/compare`.
 pub(super) async fn post(
+    may: May<access::Answer>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Submitted>,
 ) -> Result<Response, PageError> {
-    let (saved, status, why) = match give(&app, id, &form).await {
+    let (saved, status, why) = match give(&app, &may.caller, id, &form).await {
         Ok(Given::Saved(saved)) => {
             return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")).into_response());
         }
@@ -199,20 +217,19 @@ pub(super) async fn post(
     Ok((status, show(&app, id, choice, form, Some(why)).await?).into_response())
 }
 
-async fn give(app: &AppState, id: StudyId, form: &Submitted) -> Result<Given, Error> {
+async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
     let (answer, key) = form.read()?;
-    let actor = Actor::anonymous();
     let mut writer = app.write().await?;
     // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
     let key = format!("form {key}");
     let request = form.fingerprint(id);
-    if let Some(before) = idempotency::find(&mut writer, &actor, &key).await? {
+    if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
         let same = before.request == request;
         return Ok(if same { Given::Saved(before.body) } else { Given::Before(before.body) });
     }
-    let saved = answer::give(&mut writer, &actor, id, &answer).await?.to_string();
+    let saved = answer::give(&mut writer, caller, id, &answer).await?.to_string();
     let kept = Kept { request, status: 303, location: None, body: saved.clone() };
-    idempotency::keep(&mut writer, &actor, &key, &kept).await?;
+    idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(Given::Saved(saved))
@@ -228,12 +245,13 @@ pub(super) struct Retract {
 
 /// `POST /studies/{id}/retract`.
 pub(super) async fn retract(
+    may: May<access::Answer>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Retract>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    answer::retract(&mut writer, &Actor::anonymous(), Some(id), form.feedback, &form.author, &form.reason).await?;
+    answer::retract(&mut writer, &may.caller, Some(id), form.feedback, Some(&form.author), &form.reason).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.feedback)))

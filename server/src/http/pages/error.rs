@@ -6,7 +6,7 @@ use askama::Template;
 use axum::extract::Request;
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::middleware::Next;
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{Html, IntoResponse, Redirect, Response};
 
 /// An error that is shown as a page.
 #[derive(Debug)]
@@ -28,6 +28,9 @@ impl IntoResponse for PageError {
     fn into_response(self) -> Response {
         if !self.0.is_input() {
             tracing::error!(error = %self.0, "a page failed");
+        }
+        if matches!(self.0, Error::NotSignedIn(_)) {
+            return Redirect::to("/sign-in").into_response();
         }
         shown(Problem::from(&self.0))
     }

@@ -3,9 +3,11 @@
 use super::error::{Page, page};
 use super::format::{self, Bound, words};
 use super::gait_charts::{self, Drawn};
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
+use crate::http::may::May;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
 use crate::store::{StoreError, TrialId, gaits, reference_gaits, studies, trials};
@@ -31,7 +33,7 @@ struct GaitPage {
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<TrialId>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;

@@ -2,9 +2,11 @@
 
 use super::error::{Page, page};
 use super::format::words;
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
+use crate::http::may::May;
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, studies, subjects, trials};
@@ -41,7 +43,7 @@ struct Row {
 }
 
 /// `GET /`.
-pub(super) async fn get(State(app): State<AppState>, Params(Before { before }): Params<Before>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(Before { before }): Params<Before>) -> Page {
     let mut reader = app.read().await?;
     let mut found = studies::page(&mut reader, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;

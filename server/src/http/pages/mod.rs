@@ -7,6 +7,9 @@ mod gait;
 mod gait_charts;
 mod home;
 mod new_study;
+mod rate;
+mod reference;
+mod sign_in;
 mod study;
 
 use super::AppState;
@@ -24,4 +27,12 @@ pub fn routes() -> Router<AppState> {
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
         .route("/trials/{id}", get(gait::get))
+        .route("/rate", get(rate::list))
+        .route("/rate/{id}", post(rate::next))
+        .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
+        .route("/api", get(reference::get))
+        .route("/sign-in", get(sign_in::get).post(sign_in::post))
+        .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))
+        .route("/sign-out", post(sign_in::out))
+        .route("/account", get(sign_in::account).post(sign_in::set_password))
 }

@@ -1,10 +1,11 @@
 //! The form for a new study.
 
 use super::error::{Page, PageError, page};
+use crate::access::{Caller, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::extract::Form;
-use crate::store::audit::Actor;
+use crate::http::may::May;
 use crate::store::studies::FeedbackMode;
 use crate::store::subjects::{self, Subject};
 use crate::store::{StudyId, SubjectId, commit};
@@ -78,14 +79,18 @@ impl NewStudyPage {
 }
 
 /// `GET /studies/new`.
-pub(super) async fn get(State(app): State<AppState>) -> Page {
+pub(super) async fn get(_: May<Run>, State(app): State<AppState>) -> Page {
     let subjects = subjects::all(&mut *app.read().await?).await?;
     page(&NewStudyPage { subjects, fields: Fields::default(), refused: None })
 }
 
 /// `POST /studies/new`.
-pub(super) async fn post(State(app): State<AppState>, Form(fields): Form<Fields>) -> Result<Response, PageError> {
-    let refused = match create(&app, &fields).await {
+pub(super) async fn post(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Form(fields): Form<Fields>,
+) -> Result<Response, PageError> {
+    let refused = match create(&app, &may.caller, &fields).await {
         Ok(id) => return Ok(Redirect::to(&format!("/studies/{id}")).into_response()),
         Err(Error::Invalid(field)) => *field,
         Err(Error::Conflict(reason)) => FieldError {
@@ -101,7 +106,7 @@ pub(super) async fn post(State(app): State<AppState>, Form(fields): Form<Fields>
     Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
 }
 
-async fn create(app: &AppState, fields: &Fields) -> Result<StudyId, Error> {
+async fn create(app: &AppState, caller: &Caller, fields: &Fields) -> Result<StudyId, Error> {
     let mut writer = app.write().await?;
     let subject = if fields.subject == NEW_SUBJECT {
         let new = NewSubject {
@@ -110,7 +115,7 @@ async fn create(app: &AppState, fields: &Fields) -> Result<StudyId, Error> {
             body_mass_kg: number("body_mass_kg", &fields.body_mass_kg, "a number of kilograms")?,
             notes: String::new(),
         };
-        person::add(&mut writer, &Actor::anonymous(), &new).await?.id
+        person::add(&mut writer, &caller.actor, &new).await?.id
     } else {
         nothing_described(fields)?;
         number::<SubjectId>("subject", &fields.subject, "a subject of the list")?
@@ -129,7 +134,7 @@ async fn create(app: &AppState, fields: &Fields) -> Result<StudyId, Error> {
         seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
         ..NewStudy::of(subject)
     };
-    let study = plan::create(&mut writer, &Actor::anonymous(), new).await?;
+    let study = plan::create(&mut writer, &caller.actor, new).await?;
     commit(writer).await?;
     app.director.changed();
     Ok(study.id)

@@ -2,16 +2,17 @@
 
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
+use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id};
+use crate::http::may::May;
 use crate::plots::{Chart, Stroke};
-use crate::store::audit::Actor;
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{StudyId, TrialId, commit, devices, events, reference_gaits, studies, subjects, trials};
-use crate::studies::choice::best_trial;
+use crate::studies::choice::{MANY, best_trial};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
@@ -95,8 +96,11 @@ struct AnswerRow {
     at: String,
 }
 
+/// So many trials of a large study are shown; the downloads have all of them.
+const SHOWN: u32 = 200;
+
 /// `GET /studies/{id}`.
-pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let last_event = events::last(&mut reader, id).await?;
@@ -110,7 +114,7 @@ pub(super) async fn get(State(app): State<AppState>, Id(id): Id<StudyId>) -> Pag
 }
 
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
-pub(super) async fn live(State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+pub(super) async fn live(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
     page(&read_live(&app, id).await?)
 }
 
@@ -122,6 +126,7 @@ pub(super) struct Do {
 
 /// `POST /studies/{id}/do`.
 pub(super) async fn post(
+    may: May<Run>,
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
     Form(form): Form<Do>,
@@ -131,7 +136,7 @@ pub(super) async fn post(
         .find(|act| button(*act).is_some_and(|b| b.act == form.act))
         .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop"))?;
     let mut writer = app.write().await?;
-    let done = command::act(&mut writer, &Actor::anonymous(), id, act, "").await?;
+    let done = command::act(&mut writer, &may.caller.actor, id, act, "").await?;
     commit(writer).await?;
     done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
     app.director.changed();
@@ -161,10 +166,15 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let large = counts.total as usize >= MANY;
+    let standing = if large {
+        Standing::newest(&mut reader, study, SHOWN).await?
+    } else {
+        Standing::read(&mut reader, study).await?
+    };
     drop(reader);
     let (standing, figures) = tokio::task::spawn_blocking(move || {
-        let figures = figures(&standing);
+        let figures = figures(&standing, large);
         (standing, figures)
     })
     .await
@@ -179,7 +189,12 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
     Ok(view(standing, counts, &figures, running))
 }
 
-fn figures(standing: &Standing) -> Result<Figures, gait_learner::LearnerError> {
+fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
+    if large {
+        let best = standing.trials.last().and_then(|newest| newest.best_before);
+        let question = standing.study.state == StudyState::Waiting;
+        return Ok(Figures { unanswered: false, best, history: history::known(standing), question });
+    }
     let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
     if standing.waits_for_first_answer() {
         return Ok(Figures { unanswered: true, best: None, history: Vec::new(), question });

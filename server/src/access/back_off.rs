@@ -1,0 +1,87 @@
+//! Login back-off: each failed attempt for a name doubles the wait before the next one is even looked at.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Failures that cost nothing: people mistype.
+const FREE: u32 = 3;
+/// The longest wait.
+const LONGEST: Duration = Duration::from_mins(15);
+/// Names remembered at most; beyond it those that wait least are forgotten.
+const MOST_NAMES: usize = 10_000;
+
+#[derive(Debug, Clone, Copy)]
+struct Failures {
+    count: u32,
+    until: Instant,
+}
+
+/// Failed attempts by name.
+#[derive(Debug, Default)]
+pub struct BackOff(Mutex<HashMap<String, Failures>>);
+
+impl BackOff {
+    /// How long the name must still wait; `None`: an attempt may be made.
+    pub fn wait(&self, name: &str, now: Instant) -> Option<Duration> {
+        let until = self.names().get(&name.to_lowercase())?.until;
+        until.checked_duration_since(now).filter(|wait| !wait.is_zero())
+    }
+
+    /// Counts a failed attempt.
+    pub fn failed(&self, name: &str, now: Instant) {
+        let mut names = self.names();
+        if names.len() >= MOST_NAMES {
+            names.retain(|_, failures| failures.until > now);
+            if names.len() >= MOST_NAMES {
+                names.clear();
+            }
+        }
+        let failures = names.entry(name.to_lowercase()).or_insert(Failures { count: 0, until: now });
+        failures.count = failures.count.saturating_add(1);
+        failures.until = now + wait_after(failures.count);
+    }
+
+    /// Forgets the failures of a name that signed in.
+    pub fn succeeded(&self, name: &str) {
+        self.names().remove(&name.to_lowercase());
+    }
+
+    fn names(&self) -> MutexGuard<'_, HashMap<String, Failures>> {
+        // The map is whole between any two statements that hold the lock.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn wait_after(failures: u32) -> Duration {
+    match failures.checked_sub(FREE) {
+        None | Some(0) => Duration::ZERO,
+        Some(more) => Duration::from_secs(1 << more.min(10)).min(LONGEST),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waits_double_after_three_failures_and_end_with_a_success() {
+        let back_off = BackOff::default();
+        let now = Instant::now();
+        let mut waits = Vec::new();
+        for _ in 0..8 {
+            back_off.failed("Ada", now);
+            waits.push(back_off.wait("ada", now).map_or(0, |wait| wait.as_secs()));
+        }
+        assert_eq!(waits, [0, 0, 0, 2, 4, 8, 16, 32]);
+        assert_eq!(back_off.wait("ada", now + Duration::from_secs(32)), None);
+        assert_eq!(back_off.wait("bob", now), None, "others do not wait");
+        back_off.succeeded("ADA");
+        assert_eq!(back_off.wait("ada", now), None);
+    }
+
+    #[test]
+    fn no_wait_is_longer_than_a_quarter_of_an_hour() {
+        assert_eq!(wait_after(u32::MAX), LONGEST);
+    }
+}

@@ -1,0 +1,16 @@
+//! Access: who is there, and what they may do. Says nothing of HTTP.
+//!
+//! People sign in with a one-time link or a password and have a role; programs of the lab carry a token and have
+//! scopes. Either gives [`Rights`], the only thing that is ever asked for.
+
+mod back_off;
+mod caller;
+pub mod people;
+mod right;
+pub mod secret;
+pub mod sign_in;
+pub mod tokens;
+
+pub use back_off::BackOff;
+pub use caller::Caller;
+pub use right::{Administer, Answer, Permission, Rate, Read, Right, Rights, Role, Run};

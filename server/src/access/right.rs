@@ -1,0 +1,128 @@
+//! Rights, and which of them a role or a token has.
+
+use crate::store::StoreError;
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// Something that may be allowed. A token has some of these as its scopes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Right {
+    /// See everything but blind sessions.
+    Read,
+    /// Make, start, hold and end studies; ask for trials and tell what they gave.
+    Run,
+    /// Say which gait is better, knowing which is which.
+    Answer,
+    /// Compare gaits blindly.
+    Rate,
+    /// Users, tokens, unblinding, the audit trail, backups.
+    Administer,
+}
+
+impl Right {
+    /// Every right.
+    pub const ALL: [Self; 5] = [Self::Read, Self::Run, Self::Answer, Self::Rate, Self::Administer];
+
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Run => "run",
+            Self::Answer => "answer",
+            Self::Rate => "rate",
+            Self::Administer => "administer",
+        }
+    }
+}
+
+/// A set of rights.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Rights(Vec<Right>);
+
+impl Rights {
+    /// Every right.
+    pub fn all() -> Self {
+        Self(Right::ALL.to_vec())
+    }
+
+    /// These rights.
+    pub fn of(rights: &[Right]) -> Self {
+        Self(rights.to_vec())
+    }
+
+    /// Whether it is one of them.
+    pub fn has(&self, right: Right) -> bool {
+        self.0.contains(&right)
+    }
+}
+
+/// What a person is here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// May do everything.
+    Admin,
+    /// Runs studies and answers.
+    Clinician,
+    /// Compares gaits blindly, and sees nothing else.
+    Rater,
+}
+
+impl Role {
+    /// Every role.
+    pub const ALL: [Self; 3] = [Self::Admin, Self::Clinician, Self::Rater];
+
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Admin => "admin",
+            Self::Clinician => "clinician",
+            Self::Rater => "rater",
+        }
+    }
+
+    /// What it may do.
+    pub fn rights(self) -> Rights {
+        match self {
+            Self::Admin => Rights::all(),
+            Self::Clinician => Rights::of(&[Right::Read, Right::Run, Right::Answer, Right::Rate]),
+            Self::Rater => Rights::of(&[Right::Rate]),
+        }
+    }
+}
+
+impl FromStr for Role {
+    type Err = StoreError;
+    fn from_str(text: &str) -> Result<Self, StoreError> {
+        Self::ALL
+            .into_iter()
+            .find(|role| role.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "role", reason: text.to_owned() })
+    }
+}
+
+/// A right as a type: what a handler asks for in its arguments.
+pub trait Permission: Send + Sync + 'static {
+    /// The right.
+    const NEEDED: Right;
+}
+
+macro_rules! permission {
+    ($name:ident) => {
+        #[doc = concat!("Asks for [`Right::", stringify!($name), "`].")]
+        #[derive(Debug, Clone, Copy)]
+        pub struct $name;
+
+        impl Permission for $name {
+            const NEEDED: Right = Right::$name;
+        }
+    };
+}
+
+permission!(Read);
+permission!(Run);
+permission!(Answer);
+permission!(Rate);
+permission!(Administer);

@@ -1,0 +1,89 @@
+//! Secrets: drawn by the system, shown once, stored as SHA-256. Passwords as argon2id.
+
+use crate::error::Error;
+use argon2::Argon2;
+use argon2::password_hash::phc::PasswordHash;
+use argon2::password_hash::{PasswordHasher as _, PasswordVerifier as _};
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+
+/// Shortest password.
+pub const SHORTEST_PASSWORD: usize = 10;
+
+/// A fresh secret of 256 bits, as hexadecimal digits.
+///
+/// # Errors
+/// When the system has no random numbers.
+pub fn fresh() -> Result<String, Error> {
+    let mut bytes = [0_u8; 32];
+    getrandom::fill(&mut bytes).map_err(|e| Error::Internal(format!("no random numbers: {e}")))?;
+    Ok(hexadecimal(&bytes))
+}
+
+/// What is stored of a random secret. It has too many bits to be guessed, so a fast hash is enough.
+pub fn hash(secret: &str) -> String {
+    hexadecimal(&Sha256::digest(secret.as_bytes()))
+}
+
+/// What is stored of a password. Takes tens of milliseconds on purpose: call it where that does no harm.
+///
+/// # Errors
+/// [`Error::Invalid`] for a password that is too short or too long.
+pub fn hash_password(password: &str) -> Result<String, Error> {
+    let length = password.chars().count();
+    if length < SHORTEST_PASSWORD || password.len() > 1000 {
+        let allowed = format!("{SHORTEST_PASSWORD} characters or more, at most 1000 bytes");
+        return Err(Error::invalid("password", format!("{length} characters"), &allowed));
+    }
+    let mut salt = [0_u8; 16];
+    getrandom::fill(&mut salt).map_err(|e| Error::Internal(format!("no random numbers: {e}")))?;
+    let hash = Argon2::default()
+        .hash_password_with_salt(password.as_bytes(), &salt)
+        .map_err(|e| Error::Internal(format!("cannot hash a password: {e}")))?;
+    Ok(hash.to_string())
+}
+
+/// Whether a password is the one that was stored. Takes as long when nothing was stored.
+pub fn is_password(password: &str, stored: Option<&str>) -> bool {
+    let parsed = stored.and_then(|text| PasswordHash::new(text).ok());
+    if let Some(hash) = parsed {
+        return Argon2::default().verify_password(password.as_bytes(), &hash).is_ok();
+    }
+    // As much work as a real comparison: the time says nothing about who exists.
+    let _ = Argon2::default().hash_password_with_salt(password.as_bytes(), b"nobody is there!");
+    false
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn secrets_differ_and_their_hashes_do_not_show_them() {
+        let (a, b) = (fresh().unwrap(), fresh().unwrap());
+        assert_ne!(a, b);
+        assert_eq!((a.len(), hash(&a).len()), (64, 64));
+        assert_ne!(hash(&a), a);
+        assert_eq!(hash(&a), hash(&a));
+    }
+
+    #[test]
+    fn a_password_is_recognised_and_salted() {
+        let stored = hash_password("correct horse").unwrap();
+        assert!(stored.starts_with("$argon2id$"));
+        assert_ne!(stored, hash_password("correct horse").unwrap());
+        assert!(is_password("correct horse", Some(&stored)));
+        assert!(!is_password("correct horsf", Some(&stored)));
+        assert!(!is_password("correct horse", None));
+        assert!(hash_password("short").is_err());
+    }
+}

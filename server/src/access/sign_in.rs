@@ -1,0 +1,109 @@
+//! Signing in and out, and recognising who was signed in.
+
+use super::caller::Caller;
+use super::secret;
+use crate::error::Error;
+use crate::store::audit::{self, Actor};
+use crate::store::users::{self, User};
+use crate::store::{Connection, Writer, now, sessions, tokens};
+use serde_json::json;
+
+/// An instant at which the person did something is written at most this often.
+const SEEN_EVERY_SECONDS: f64 = 60.0;
+
+/// Signs in with a one-time link: the user and the secret of the session.
+///
+/// # Errors
+/// [`Error::NotSignedIn`] when the link is unknown, used, too old, or of a user who was shut out.
+pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String), Error> {
+    let refused = || Error::NotSignedIn("this link was used or is too old; ask for another one".to_owned());
+    let hash = secret::hash(link);
+    let id = sessions::link(writer, &hash).await?.ok_or_else(refused)?;
+    let user = users::get(writer, id).await?;
+    if user.disabled_at.is_some() {
+        return Err(refused());
+    }
+    sessions::use_link(writer, &hash).await?;
+    let secret = begin(writer, &user, "link").await?;
+    Ok((user, secret))
+}
+
+/// Begins a session of a user whose password was found right.
+///
+/// # Errors
+/// What the database reports.
+pub async fn with_password(writer: &mut Writer, user: &User) -> Result<String, Error> {
+    begin(writer, user, "password").await
+}
+
+async fn begin(writer: &mut Writer, user: &User, by: &str) -> Result<String, Error> {
+    let secret = secret::fresh()?;
+    sessions::begin(writer, &secret::hash(&secret), user.id).await?;
+    let actor = Caller::person(user.id, &user.name, user.role).actor;
+    audit::append(writer, &actor, "session.begin", &format!("user {}", user.id), &json!({ "by": by })).await?;
+    Ok(secret)
+}
+
+/// A session in place of those that ended when the user set a password; part of that act in the audit trail.
+///
+/// # Errors
+/// What the database reports.
+pub async fn renew(writer: &mut Writer, user: &User) -> Result<String, Error> {
+    let secret = secret::fresh()?;
+    sessions::begin(writer, &secret::hash(&secret), user.id).await?;
+    Ok(secret)
+}
+
+/// Notes a failed attempt with a password.
+///
+/// # Errors
+/// What the database reports.
+pub async fn failed(writer: &mut Writer, name: &str) -> Result<(), Error> {
+    let name: String = name.chars().filter(|c| !c.is_control()).take(80).collect();
+    audit::append(writer, &Actor::anonymous(), "session.refuse", "session", &json!({ "name": name })).await?;
+    Ok(())
+}
+
+/// Signs out.
+///
+/// # Errors
+/// What the database reports.
+pub async fn out(writer: &mut Writer, actor: &Actor, session: &str) -> Result<(), Error> {
+    sessions::end(writer, &secret::hash(session)).await?;
+    audit::append(writer, actor, "session.end", "session", &json!({})).await?;
+    Ok(())
+}
+
+/// Whose session it is, and whether it is time to note that the person did something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_session(db: &mut Connection, session: &str, idle: f64) -> Result<Option<(Caller, bool)>, Error> {
+    let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(None) };
+    let since = now().seconds_since(found.seen_at);
+    if since > idle {
+        return Ok(None);
+    }
+    let user = users::get(db, found.user).await?;
+    if user.disabled_at.is_some() {
+        return Ok(None);
+    }
+    Ok(Some((Caller::person(user.id, &user.name, user.role), since > SEEN_EVERY_SECONDS.min(idle / 4.0))))
+}
+
+/// Notes that the person did something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn seen(writer: &mut Writer, session: &str) -> Result<(), Error> {
+    Ok(sessions::seen(writer, &secret::hash(session)).await?)
+}
+
+/// Whose token it is.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_token(db: &mut Connection, token: &str) -> Result<Option<Caller>, Error> {
+    let found = tokens::by_hash(db, &secret::hash(token)).await?;
+    Ok(found.map(|token| Caller::token(&token.name, &token.scopes)))
+}

@@ -1,0 +1,290 @@
+//! Configuration of the service: flags, then environment, then file, then defaults; each value knows where it is from.
+
+use super::numbers::workers;
+use crate::error::Error;
+use clap::{Args, Subcommand};
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// The file that is read when none is named.
+const DEFAULT_FILE: &str = "gaitwright.toml";
+
+/// What can be set: name in the file, default, meaning. Flag and environment follow from the name.
+const KNOWN: [(&str, &str, &str); 10] = [
+    ("listen", "127.0.0.1:8080", "where to listen"),
+    ("database", "gaitwright.db", "the SQLite file"),
+    (
+        "host_names",
+        "",
+        "names under which browsers reach the service, besides its address and localhost; commas between",
+    ),
+    ("workers", "cores", "how many solves at the same time"),
+    ("sign_in", "true", "whether people and programs say who they are; false on this machine only"),
+    ("idle_minutes", "60", "a session without a sign of life for so long ends"),
+    ("tls_certificate", "", "PEM file with the certificate chain; with tls_key, the service speaks HTTPS"),
+    ("tls_key", "", "PEM file with the private key"),
+    ("log", "warn,gaitwright=info", "what is logged, as RUST_LOG"),
+    ("log_format", "text", "text or json"),
+];
+
+/// Flags that say where settings come from.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct Flags {
+    /// Settings file (TOML); default: gaitwright.toml, if it is there.
+    #[arg(long, env = "GAITWRIGHT_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Where to listen; default 127.0.0.1:8080.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<String>,
+    /// The SQLite file, made if it does not exist; default gaitwright.db.
+    #[arg(long, value_name = "FILE")]
+    database: Option<String>,
+    /// A name under which browsers reach the service, besides its address and localhost; may be given several times.
+    #[arg(long, value_delimiter = ',', value_name = "NAME")]
+    host_name: Vec<String>,
+    /// How many solves at the same time; default: the number of cores.
+    #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
+    workers: Option<usize>,
+    /// Ask nobody to sign in: for one person on this machine.
+    #[arg(long)]
+    no_sign_in: bool,
+    /// A session without a sign of life for so long ends; default 60.
+    #[arg(long, value_name = "MINUTES")]
+    idle_minutes: Option<String>,
+    /// PEM file with the certificate chain; with --tls-key, the service speaks HTTPS.
+    #[arg(long, value_name = "FILE")]
+    tls_certificate: Option<String>,
+    /// PEM file with the private key.
+    #[arg(long, value_name = "FILE")]
+    tls_key: Option<String>,
+}
+
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Origin {
+    Flag,
+    Environment(String),
+    File(PathBuf),
+    Default,
+}
+
+impl std::fmt::Display for Origin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Flag => write!(f, "flag"),
+            Self::Environment(name) => write!(f, "environment {name}"),
+            Self::File(path) => write!(f, "file {}", path.display()),
+            Self::Default => write!(f, "default"),
+        }
+    }
+}
+
+/// Every setting, as text, with its origin.
+#[derive(Debug)]
+pub(super) struct Settings(BTreeMap<&'static str, (String, Origin)>);
+
+impl Settings {
+    /// Reads flags, environment and file.
+    pub(super) fn read(flags: &Flags) -> Result<Self, Error> {
+        Self::resolve(flags, |name| std::env::var(name).ok())
+    }
+
+    fn resolve(flags: &Flags, environment: impl Fn(&str) -> Option<String>) -> Result<Self, Error> {
+        let (path, file) = match &flags.config {
+            Some(path) => (path.clone(), Some(read(path)?)),
+            None => (
+                PathBuf::from(DEFAULT_FILE),
+                Path::new(DEFAULT_FILE).exists().then(|| read(Path::new(DEFAULT_FILE))).transpose()?,
+            ),
+        };
+        let file = parse(&path, file.as_deref().unwrap_or(""))?;
+        let mut found = BTreeMap::new();
+        for (name, default, _) in KNOWN {
+            let variable = format!("GAITWRIGHT_{}", name.to_uppercase());
+            let value = if let Some(value) = flags.get(name) {
+                (value, Origin::Flag)
+            } else if let Some(value) = environment(&variable) {
+                (value, Origin::Environment(variable))
+            } else if let Some(value) = file.get(name) {
+                (value.clone(), Origin::File(path.clone()))
+            } else {
+                (default.to_owned(), Origin::Default)
+            };
+            found.insert(name, value);
+        }
+        Ok(Self(found))
+    }
+
+    fn text(&self, name: &str) -> &str {
+        self.0.get(name).map_or("", |(value, _)| value)
+    }
+
+    fn parsed<T: FromStr>(&self, name: &str, allowed: &str) -> Result<T, Error> {
+        self.text(name).parse().map_err(|_| self.refused(name, allowed))
+    }
+
+    /// The refusal of a setting, naming where it comes from.
+    pub(super) fn refused(&self, name: &str, allowed: &str) -> Error {
+        let origin = self.0.get(name).map_or(&Origin::Default, |(_, origin)| origin);
+        Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
+    }
+
+    pub(super) fn listen(&self) -> Result<SocketAddr, Error> {
+        self.parsed("listen", "an address and a port such as 127.0.0.1:8080")
+    }
+
+    pub(super) fn database(&self) -> PathBuf {
+        PathBuf::from(self.text("database"))
+    }
+
+    pub(super) fn workers(&self) -> Result<Option<usize>, Error> {
+        match self.text("workers") {
+            "cores" => Ok(None),
+            _ => match self.parsed("workers", "1 to 64")? {
+                workers @ 1..=64 => Ok(Some(workers)),
+                _ => Err(self.refused("workers", "1 to 64")),
+            },
+        }
+    }
+
+    pub(super) fn host_names(&self) -> Vec<String> {
+        let names = self.text("host_names").split(',').map(str::trim);
+        names.filter(|name| !name.is_empty()).map(str::to_owned).collect()
+    }
+
+    pub(super) fn sign_in(&self) -> Result<bool, Error> {
+        self.parsed("sign_in", "true, false")
+    }
+
+    pub(super) fn idle_seconds(&self) -> Result<f64, Error> {
+        let minutes: f64 = self.parsed("idle_minutes", "1 to 1440")?;
+        if (1.0..=1440.0).contains(&minutes) {
+            Ok(60.0 * minutes)
+        } else {
+            Err(self.refused("idle_minutes", "1 to 1440"))
+        }
+    }
+
+    /// Certificate and key, both or neither.
+    pub(super) fn tls(&self) -> Result<Option<(PathBuf, PathBuf)>, Error> {
+        match (self.text("tls_certificate"), self.text("tls_key")) {
+            ("", "") => Ok(None),
+            ("", _) => Err(self.refused("tls_certificate", "a file, because tls_key is set")),
+            (_, "") => Err(self.refused("tls_key", "a file, because tls_certificate is set")),
+            (certificate, key) => Ok(Some((certificate.into(), key.into()))),
+        }
+    }
+
+    pub(super) fn log(&self) -> (&str, bool) {
+        (self.text("log"), self.text("log_format") == "json")
+    }
+}
+
+impl Flags {
+    fn get(&self, name: &str) -> Option<String> {
+        match name {
+            "listen" => self.listen.clone(),
+            "database" => self.database.clone(),
+            "host_names" => Some(self.host_name.join(",")).filter(|names| !names.is_empty()),
+            "workers" => self.workers.map(|workers| workers.to_string()),
+            "sign_in" => self.no_sign_in.then(|| "false".to_owned()),
+            "idle_minutes" => self.idle_minutes.clone(),
+            "tls_certificate" => self.tls_certificate.clone(),
+            "tls_key" => self.tls_key.clone(),
+            _ => None,
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
+}
+
+fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>, Error> {
+    let malformed = |reason: String| Error::Malformed(format!("{}: {reason}", path.display()));
+    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| malformed(e.to_string()))?;
+    let mut values = BTreeMap::new();
+    for (name, value) in table {
+        if !KNOWN.iter().any(|(known, ..)| *known == name) {
+            let known = KNOWN.map(|(known, ..)| known).join(", ");
+            return Err(malformed(format!("{name} is not a setting; known: {known}")));
+        }
+        let value = match value {
+            toml::Value::String(text) => text,
+            toml::Value::Integer(number) => number.to_string(),
+            toml::Value::Float(number) => number.to_string(),
+            toml::Value::Boolean(flag) => flag.to_string(),
+            _ => return Err(malformed(format!("{name}: a text, a number or true/false is expected"))),
+        };
+        values.insert(name, value);
+    }
+    Ok(values)
+}
+
+/// `gaitwright config`.
+#[derive(Debug, Args)]
+pub(super) struct Config {
+    #[command(subcommand)]
+    what: ConfigCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum ConfigCommand {
+    /// Show every setting of `gaitwright serve`, its value and where that comes from.
+    Show {
+        #[command(flatten)]
+        flags: Box<Flags>,
+    },
+}
+
+impl Config {
+    pub(super) fn run(self) -> Result<(), Error> {
+        let ConfigCommand::Show { flags } = self.what;
+        let settings = Settings::read(&flags)?;
+        for (name, _, meaning) in KNOWN {
+            let origin = settings.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
+            println!("{name} = {:?}  # {origin}; {meaning}", settings.text(name));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(flags: &Flags, environment: &[(&str, &str)]) -> Result<Settings, Error> {
+        Settings::resolve(flags, |name| {
+            environment.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
+        })
+    }
+
+    #[test]
+    fn flags_come_before_environment_before_file_before_defaults() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("g.toml");
+        std::fs::write(&file, "workers = 3\nidle_minutes = 15\ndatabase = \"file.db\"\n").unwrap();
+        let flags = Flags { config: Some(file.clone()), workers: Some(5), ..Flags::default() };
+        let found = settings(&flags, &[("GAITWRIGHT_WORKERS", "4"), ("GAITWRIGHT_DATABASE", "env.db")]).unwrap();
+        assert_eq!(found.workers().unwrap(), Some(5));
+        assert_eq!(found.0["workers"].1, Origin::Flag);
+        assert_eq!(found.0["database"], ("env.db".to_owned(), Origin::Environment("GAITWRIGHT_DATABASE".to_owned())));
+        assert_eq!(found.0["idle_minutes"], ("15".to_owned(), Origin::File(file)));
+        assert_eq!(found.0["listen"].1, Origin::Default);
+        assert_eq!(found.idle_seconds().unwrap(), 900.0);
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_its_origin() {
+        let settings_of = settings(&Flags::default(), &[("GAITWRIGHT_WORKERS", "0")]).unwrap();
+        let refused = settings_of.workers().unwrap_err().to_string();
+        assert!(refused.contains("GAITWRIGHT_WORKERS") && refused.contains("1 to 64"), "{refused}");
+        let half = Flags { tls_key: Some("k.pem".to_owned()), ..Flags::default() };
+        assert!(settings(&half, &[]).unwrap().tls().is_err());
+        assert!(parse(Path::new("x.toml"), "colour = 1").unwrap_err().to_string().contains("colour is not a setting"));
+        assert!(parse(Path::new("x.toml"), "workers = [1]").is_err());
+        assert!(parse(Path::new("x.toml"), "workers = ").is_err());
+    }
+}

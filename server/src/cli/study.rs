@@ -1,0 +1,137 @@
+//! `gaitwright export` and `gaitwright import`: a whole study as one file. `gaitwright prune`: retention.
+
+use super::record::exists;
+use crate::error::Error;
+use crate::store::audit::{self, Actor};
+use crate::store::{Store, StoreError, StudyId, archive, backup, commit, events, gaits, studies};
+use crate::studies::choice::best_to_show;
+use crate::studies::standing::Standing;
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(super) struct Export {
+    /// The study.
+    study: StudyId,
+    /// Where the archive goes: a new file.
+    to: PathBuf,
+    /// The SQLite file; the service may be running.
+    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
+    database: PathBuf,
+}
+
+impl Export {
+    pub(super) async fn run(self) -> Result<(), Error> {
+        exists(&self.database)?;
+        let pool = backup::open_read_only(&self.database).await?;
+        let packed = match pool.begin().await {
+            // One transaction: every table as of the same instant.
+            Ok(mut reader) => match studies::get(&mut reader, self.study).await {
+                Ok(_) => archive::pack(&mut reader, self.study).await,
+                Err(error) => Err(error),
+            },
+            Err(error) => Err(StoreError::from(error)),
+        };
+        pool.close().await;
+        let bytes = packed?;
+        let cannot = |e: std::io::Error| Error::Malformed(format!("cannot write {}: {e}", self.to.display()));
+        let mut file = std::fs::File::create_new(&self.to).map_err(cannot)?;
+        std::io::Write::write_all(&mut file, &bytes).and_then(|()| file.sync_all()).map_err(cannot)?;
+        println!("{}", self.to.display());
+        Ok(())
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Import {
+    /// An archive made by `gaitwright export`.
+    from: PathBuf,
+    /// The SQLite file; no service may be running on it.
+    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
+    database: PathBuf,
+}
+
+impl Import {
+    pub(super) async fn run(self) -> Result<(), Error> {
+        let file = std::fs::read(&self.from)
+            .map_err(|e| Error::Malformed(format!("cannot read {}: {e}", self.from.display())))?;
+        let store = Store::open(&self.database).await?;
+        let done = import(&store, &file).await;
+        store.close().await;
+        println!("{}", done?);
+        Ok(())
+    }
+}
+
+/// Writes the study of an archive into a record.
+///
+/// # Errors
+/// [`Error::Malformed`] for a file that is no whole archive, [`Error::Conflict`] when the study is there.
+pub async fn import(store: &Store, file: &[u8]) -> Result<StudyId, Error> {
+    let archive = archive::open(file).map_err(|e| Error::Malformed(e.to_string()))?;
+    let study = archive.study()?;
+    let mut writer = store.write().await?;
+    match studies::get(&mut writer, study).await {
+        Ok(_) => return Err(Error::conflict(format!("study {study} is in this record already"))),
+        Err(StoreError::Missing { .. }) => {}
+        Err(other) => return Err(other.into()),
+    }
+    archive::unpack(&mut writer, &archive)
+        .await
+        .map_err(|e| Error::conflict(format!("the archive does not fit this record, nothing was changed: {e}")))?;
+    let present = studies::get(&mut writer, study).await?;
+    let payload = json!({ "state": present.state, "reason": "imported" });
+    events::append(&mut writer, study, "study_changed", &payload).await?;
+    let detail = json!({ "name": present.plan.name });
+    audit::append(&mut writer, &Actor::terminal(), "study.import", &format!("study {study}"), &detail).await?;
+    commit(writer).await?;
+    Ok(study)
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Prune {
+    /// Trajectories of studies that ended longer ago than this are dropped; the best trial of each is kept.
+    #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=36_500))]
+    older_than_days: u32,
+    /// The SQLite file; no service may be running on it.
+    #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
+    database: PathBuf,
+}
+
+impl Prune {
+    pub(super) async fn run(self) -> Result<(), Error> {
+        exists(&self.database)?;
+        let store = Store::open(&self.database).await?;
+        let done = prune(&store, self.older_than_days).await;
+        store.close().await;
+        println!("{} trajectories dropped", done?);
+        Ok(())
+    }
+}
+
+/// Drops the trajectories of studies that ended so many days ago, but those of their best trials.
+///
+/// # Errors
+/// What the database or the learner reports.
+pub async fn prune(store: &Store, days: u32) -> Result<u64, Error> {
+    let before = crate::store::now().plus_seconds(-86_400 * i64::from(days));
+    let mut dropped = 0;
+    for study in studies::ended_before(&mut *store.read().await?, before).await? {
+        let id = study.id;
+        let standing = Standing::read(&mut *store.read().await?, study).await?;
+        let best = tokio::task::spawn_blocking(move || best_to_show(&standing))
+            .await
+            .map_err(|e| Error::Internal(e.to_string()))?
+            .map_err(Error::Learner)?;
+        let mut writer = store.write().await?;
+        let count = gaits::drop_of_study(&mut writer, id, best).await?;
+        if count > 0 {
+            let detail = json!({ "trajectories": count, "kept": best });
+            audit::append(&mut writer, &Actor::terminal(), "study.prune", &format!("study {id}"), &detail).await?;
+            commit(writer).await?;
+        }
+        dropped += count;
+    }
+    Ok(dropped)
+}

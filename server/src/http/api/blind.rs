@@ -1,0 +1,194 @@
+//! Blind comparisons: what a rater may see, and what is known of raters.
+
+use crate::access::{Administer, Rate, Read};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::blind_motion::{Figure, blind_motion};
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::{Once, OnceWith};
+use crate::store::presentations::{self, Presentation};
+use crate::store::{StudyId, gaits, studies};
+use crate::studies::blind::{self, Answered, RaterAnswer, RaterFigures};
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// A pair to compare, as a rater sees it.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Pair {
+    /// What the pair is known by.
+    token: String,
+    /// Number of the pair for this rater.
+    number: u32,
+    /// Where the motion that is shown first is.
+    first: String,
+    /// Where the motion that is shown second is.
+    second: String,
+}
+
+/// The next pair, or none.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct NextPair {
+    /// None: the study asks for nothing now.
+    pair: Option<Pair>,
+}
+
+/// `POST /studies/{id}/blind/next`: the pair that this rater should compare. Asking again before answering gives the
+/// same one.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/blind/next",
+    tag = "blind",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "The pair, or none", body = NextPair)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn next(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    once: Once<Rate>,
+) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let (writer, shown) = blind::next(&mut *app.read().await?, app.store(), &once.caller, id).await?;
+    let pair = shown.map(|shown| Pair {
+        first: format!("/api/v1/blind/{}/first", shown.token),
+        second: format!("/api/v1/blind/{}/second", shown.token),
+        token: shown.token,
+        number: shown.number,
+    });
+    once.finish(&app, writer, StatusCode::OK, None, &NextPair { pair }).await
+}
+
+/// `GET /blind/{token}/first`: 101 figures over one stride, each ten places: hip, shoulder, then knee, ankle, heel, toe
+/// of the left and of the right leg; forward and up, m.
+#[utoipa::path(
+    get,
+    path = "/blind/{token}/first",
+    tag = "blind",
+    params(("token" = String, Path, description = "The pair")),
+    responses((status = 200, description = "The motion", body = Vec<Vec<Vec<f64>>>)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn first(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Path(token): Path<String>,
+) -> Result<Json<Vec<Figure>>, Error> {
+    motion(&app, &may, &token, |shown| shown.shown_first).await
+}
+
+/// `GET /blind/{token}/second`: as the first one.
+#[utoipa::path(
+    get,
+    path = "/blind/{token}/second",
+    tag = "blind",
+    params(("token" = String, Path, description = "The pair")),
+    responses((status = 200, description = "The motion", body = Vec<Vec<Vec<f64>>>)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn second(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Path(token): Path<String>,
+) -> Result<Json<Vec<Figure>>, Error> {
+    motion(&app, &may, &token, |shown| shown.shown_second).await
+}
+
+async fn motion(
+    app: &AppState,
+    may: &May<Rate>,
+    token: &str,
+    side: impl Fn(&Presentation) -> crate::store::TrialId,
+) -> Result<Json<Vec<Figure>>, Error> {
+    let mut reader = app.read().await?;
+    let shown = blind::own(&mut reader, &may.caller, token).await?;
+    // An error here must not say which trial it was.
+    let gait = gaits::get(&mut reader, side(&shown)).await.map_err(|error| {
+        tracing::error!(%error, "a gait cannot be shown to a rater");
+        Error::NotFound { what: "the motion of the comparison".to_owned(), id: "with this token".to_owned() }
+    })?;
+    drop(reader);
+    Ok(Json(blind_motion(&gait)?))
+}
+
+/// `POST /blind/{token}/answer`.
+#[utoipa::path(
+    post,
+    path = "/blind/{token}/answer",
+    tag = "blind",
+    params(("token" = String, Path, description = "The pair")),
+    request_body = RaterAnswer,
+    responses((status = 201, description = "Recorded", body = Answered)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn answer(
+    State(app): State<AppState>,
+    Path(token): Path<String>,
+    OnceWith(once, given): OnceWith<Rate, RaterAnswer>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let (_, answered) = blind::answer(&mut writer, &once.caller, &token, &given).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &answered).await
+}
+
+/// `GET /studies/{id}/raters`: agreement with themselves, position bias, differences seen where there is none.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/raters",
+    tag = "blind",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "One row per rater", body = Vec<RaterFigures>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn raters(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+) -> Result<Json<Vec<RaterFigures>>, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    Ok(Json(blind::figures(&presentations::of_study(&mut reader, id).await?)))
+}
+
+/// Whose blindness ends, and why.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Unblind {
+    /// The rater.
+    rater: String,
+    /// Why: 1 to 2000 characters.
+    reason: String,
+}
+
+/// `POST /studies/{id}/unblind`: what a rater was shown. An act: it is in the audit trail, and what the rater is shown
+/// from now on is marked.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/unblind",
+    tag = "blind",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = Unblind,
+    responses((status = 200, description = "Every pair of the rater, in order", body = Vec<Presentation>)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn unblind(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    OnceWith(once, whose): OnceWith<Administer, Unblind>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let shown = blind::unblind(&mut writer, &once.caller, id, &whose.rater, &whose.reason).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &shown).await
+}

@@ -1,0 +1,101 @@
+//! Several studies side by side.
+
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Params;
+use crate::http::may::May;
+use crate::store::studies::{self, StudyState};
+use crate::store::trials::{self, TrialCounts};
+use crate::store::{Connection, StudyId, schema};
+use crate::studies::choice::best_to_show;
+use crate::studies::standing::Standing;
+use axum::Json;
+use axum::extract::State;
+use gait_optimizer::TunedBounds;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Most studies that are compared at once.
+const MOST: usize = 20;
+
+/// Which studies.
+#[derive(Debug, Deserialize)]
+pub(super) struct Which {
+    ids: String,
+}
+
+/// A study beside others.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Compared {
+    id: StudyId,
+    name: String,
+    muscles: bool,
+    seed: u64,
+    state: StudyState,
+    trials: TrialCounts,
+    /// Number of the recommended trial.
+    best_trial: Option<u32>,
+    /// Its action.
+    #[schema(value_type = Option<schema::Bounds>)]
+    best_action: Option<TunedBounds>,
+    /// Its Gait RMSE, rad.
+    best_gait_rmse_rad: Option<f64>,
+    /// Its cost of transport.
+    best_cost_of_transport: Option<f64>,
+    /// Time of all solves together, s.
+    solve_seconds: f64,
+}
+
+/// `GET /compare`: several studies side by side, in the order in which they are named.
+#[utoipa::path(
+    get,
+    path = "/compare",
+    tag = "studies",
+    params(("ids" = String, Query, description = "2 to 20 identifiers of studies, with commas between them")),
+    responses((status = 200, description = "One row per study", body = Vec<Compared>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Params(which): Params<Which>,
+) -> Result<Json<Vec<Compared>>, Error> {
+    let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
+    if !(2..=MOST).contains(&named.len()) {
+        return Err(Error::invalid("ids", which.ids, &format!("2 to {MOST} identifiers, with commas between them")));
+    }
+    let mut reader = app.read().await?;
+    let mut rows = Vec::with_capacity(named.len());
+    for id in named {
+        let id = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
+        rows.push(row(&mut reader, id).await?);
+    }
+    Ok(Json(rows))
+}
+
+async fn row(db: &mut Connection, id: StudyId) -> Result<Compared, Error> {
+    let study = studies::get(db, id).await?;
+    let counts = trials::counts(db, id).await?;
+    let standing = Standing::read(db, study).await?;
+    let (standing, best) = tokio::task::spawn_blocking(move || {
+        let best = best_to_show(&standing);
+        (standing, best)
+    })
+    .await
+    .map_err(|e| Error::Internal(e.to_string()))?;
+    let best = best.map_err(Error::Learner)?.and_then(|id| standing.trial(id));
+    Ok(Compared {
+        id,
+        name: standing.study.plan.name.clone(),
+        muscles: standing.study.plan.muscles,
+        seed: standing.study.plan.seed,
+        state: standing.study.state,
+        trials: counts,
+        best_trial: best.map(|trial| trial.number),
+        best_action: best.map(|trial| trial.action),
+        best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
+        best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        solve_seconds: standing.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+    })
+}

@@ -1,0 +1,74 @@
+//! Ask and tell: for scripts of the lab that evaluate trials themselves.
+
+use crate::access::Run;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::once::OnceWith;
+use crate::store::trials::Trial;
+use crate::store::{StudyId, TrialId};
+use crate::studies::script::{self, Ask, Tell};
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+
+/// So often a decision is made anew when the study moved on meanwhile.
+const TRIES: usize = 20;
+
+/// `POST /studies/{id}/ask`: a trial to evaluate. Asking again before telling gives the same one.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/ask",
+    tag = "scripts",
+    params(("id" = StudyId, Path, description = "The study: one with `evaluation` = `script`")),
+    request_body(content = Ask, description = "May be left out"),
+    responses((status = 200, description = "The trial to evaluate", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn ask(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    OnceWith(once, ask): OnceWith<Run, Ask>,
+) -> Result<Response, Error> {
+    let worker = ask.worker.as_deref().unwrap_or(&once.caller.name).trim();
+    for _ in 0..TRIES {
+        let suggestion = script::suggest(&mut *app.read().await?, id, worker).await;
+        let mut writer = match once.begin(&app).await? {
+            Ok(writer) => writer,
+            Err(before) => return Ok(before),
+        };
+        if let Some(trial) = script::give_out(&mut writer, &once.caller, worker, &suggestion?).await? {
+            return once.finish(&app, writer, StatusCode::OK, None, &trial).await;
+        }
+    }
+    Err(Error::conflict("the study changes too fast; try again"))
+}
+
+/// `POST /trials/{id}/tell`: what a trial gave. That there is no gait is a result, too; a failure of the script is
+/// none: cancel the trial then.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/tell",
+    tag = "scripts",
+    params(("id" = TrialId, Path, description = "The trial")),
+    request_body = Tell,
+    responses((status = 200, description = "Recorded", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn tell(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    OnceWith(once, tell): OnceWith<Run, Tell>,
+) -> Result<Response, Error> {
+    for _ in 0..TRIES {
+        let heard = script::hear(&mut *app.read().await?, id, &tell).await;
+        let mut writer = match once.begin(&app).await? {
+            Ok(writer) => writer,
+            Err(before) => return Ok(before),
+        };
+        if let Some(trial) = script::record(&mut writer, &once.caller, id, &heard?).await? {
+            return once.finish(&app, writer, StatusCode::OK, None, &trial).await;
+        }
+    }
+    Err(Error::conflict("the study changes too fast; try again"))
+}

@@ -1,0 +1,79 @@
+//! Tokens of scripts.
+
+use crate::access::Administer;
+use crate::access::tokens::{self as making, NewToken};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::{Once, OnceWith};
+use crate::store::TokenId;
+use crate::store::tokens::{self, Token};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// A token that was just made.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct MadeToken {
+    /// The token.
+    #[serde(flatten)]
+    token: Token,
+    /// Its secret, shown once: send it as `Authorization: Bearer ...`.
+    secret: String,
+}
+
+/// `GET /tokens`: oldest first.
+#[utoipa::path(
+    get,
+    path = "/tokens",
+    tag = "access",
+    responses((status = 200, description = "All of them, without their secrets", body = Vec<Token>)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Result<Json<Vec<Token>>, Error> {
+    Ok(Json(tokens::all(&mut *app.read().await?).await?))
+}
+
+/// `POST /tokens`. Never repeated: an Idempotency-Key is refused, because the secret is not stored.
+#[utoipa::path(
+    post,
+    path = "/tokens",
+    tag = "access",
+    request_body = NewToken,
+    responses((status = 201, description = "Made; the secret is shown once", body = MadeToken)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    OnceWith(once, new): OnceWith<Administer, NewToken>,
+) -> Result<Response, Error> {
+    let mut writer = once.begin_secret(&app).await?;
+    let (token, secret) = making::make(&mut writer, &once.actor, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &MadeToken { token, secret }).await
+}
+
+/// `POST /tokens/{id}/revoke`.
+#[utoipa::path(
+    post,
+    path = "/tokens/{id}/revoke",
+    tag = "access",
+    params(("id" = TokenId, Path, description = "The token")),
+    responses((status = 200, description = "Ended", body = Token)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn revoke(
+    State(app): State<AppState>,
+    Id(id): Id<TokenId>,
+    once: Once<Administer>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let token = making::revoke(&mut writer, &once.actor, id).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &token).await
+}

@@ -1,0 +1,61 @@
+//! Authorisation as a handler's argument: a handler that does not ask for a right does not learn who calls it.
+
+use crate::access::{Caller, Permission};
+use crate::error::Error;
+use crate::http::pages::error::PageError;
+use axum::extract::{FromRequestParts, OptionalFromRequestParts, OriginalUri};
+use axum::http::Extensions;
+use axum::http::request::Parts;
+use axum::response::{IntoResponse, Response};
+use std::convert::Infallible;
+use std::marker::PhantomData;
+
+/// The caller, who has the right `P`.
+#[derive(Debug)]
+pub(crate) struct May<P> {
+    /// Who calls.
+    pub(crate) caller: Caller,
+    right: PhantomData<P>,
+}
+
+/// The refusal: a problem document below `/api/`, a page elsewhere.
+#[derive(Debug)]
+pub(crate) struct Refused {
+    error: Error,
+    api: bool,
+}
+
+impl IntoResponse for Refused {
+    fn into_response(self) -> Response {
+        if self.api { self.error.into_response() } else { PageError::from(self.error).into_response() }
+    }
+}
+
+/// The caller in a request, if the right is there.
+pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller, Error> {
+    let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    if caller.may(P::NEEDED) {
+        return Ok(caller.clone());
+    }
+    Err(Error::Forbidden(format!("this needs the right {:?}, which {} does not have", P::NEEDED.as_str(), caller.name)))
+}
+
+impl<P: Permission, S: Send + Sync> FromRequestParts<S> for May<P> {
+    type Rejection = Refused;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refused> {
+        // Nested routers see the rest of the path alone.
+        let whole = parts.extensions.get::<OriginalUri>().map_or(&parts.uri, |original| &original.0);
+        let api = whole.path().starts_with("/api/");
+        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused { error, api })?;
+        Ok(Self { caller, right: PhantomData })
+    }
+}
+
+impl<S: Send + Sync> OptionalFromRequestParts<S> for Caller {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Option<Self>, Infallible> {
+        Ok(parts.extensions.get::<Self>().cloned())
+    }
+}

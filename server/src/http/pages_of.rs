@@ -1,0 +1,73 @@
+//! Keyset pages of lists: a page says where the next one begins, so that it is as fast as the first.
+
+use crate::error::Error;
+use axum::Json;
+use axum::http::{HeaderValue, header};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+
+/// A page of what is older than something, newest first.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Before<K> {
+    /// Where the page before ended.
+    pub(crate) before: Option<K>,
+    limit: Option<u32>,
+}
+
+/// A page of what comes after something, in order.
+#[derive(Debug, Deserialize)]
+pub(crate) struct After<K> {
+    /// Where the page before ended.
+    pub(crate) after: Option<K>,
+    limit: Option<u32>,
+}
+
+impl<K> Before<K> {
+    /// How many rows, by default as many as are allowed.
+    pub(crate) fn limit(&self, most: u32) -> Result<u32, Error> {
+        checked(self.limit, most)
+    }
+}
+
+impl<K> After<K> {
+    /// How many rows, by default as many as are allowed.
+    pub(crate) fn limit(&self, most: u32) -> Result<u32, Error> {
+        checked(self.limit, most)
+    }
+}
+
+fn checked(limit: Option<u32>, most: u32) -> Result<u32, Error> {
+    match limit {
+        None => Ok(most),
+        Some(limit) if (1..=most).contains(&limit) => Ok(limit),
+        Some(limit) => Err(Error::invalid("limit", limit, &format!("1 to {most}"))),
+    }
+}
+
+/// At most `limit` of the rows as JSON; with more of them, a `Link` header to the page `before` the last one.
+pub(crate) fn linked<T: Serialize>(path: &str, rows: Vec<T>, limit: u32, key: impl Fn(&T) -> String) -> Response {
+    page(path, "before", rows, limit, key)
+}
+
+/// The same for the page `after` the last one.
+pub(crate) fn linked_after<T: Serialize>(path: &str, rows: Vec<T>, limit: u32, key: impl Fn(&T) -> String) -> Response {
+    page(path, "after", rows, limit, key)
+}
+
+fn page<T: Serialize>(
+    path: &str,
+    parameter: &str,
+    mut rows: Vec<T>,
+    limit: u32,
+    key: impl Fn(&T) -> String,
+) -> Response {
+    let more = rows.len() > limit as usize;
+    rows.truncate(limit as usize);
+    let next = rows.last().filter(|_| more).map(key);
+    let mut answer = Json(rows).into_response();
+    let link = next.map(|key| format!("<{path}?{parameter}={key}&limit={limit}>; rel=\"next\""));
+    if let Some(link) = link.and_then(|text| HeaderValue::from_str(&text).ok()) {
+        answer.headers_mut().insert(header::LINK, link);
+    }
+    answer
+}

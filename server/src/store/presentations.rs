@@ -1,0 +1,286 @@
+//! Presentations: which two gaits a rater was shown, and what the rater said.
+
+use super::{Connection, FeedbackId, Instant, PresentationId, StoreError, StoreResult, StudyId, TrialId, now};
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// Why a pair is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The study asks for it.
+    New,
+    /// An earlier pair, sides swapped: does the rater agree with itself?
+    Repeat,
+    /// The same gait twice: how often does the rater see a difference where none is?
+    Null,
+}
+
+impl Kind {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::New => "new",
+            Self::Repeat => "repeat",
+            Self::Null => "null",
+        }
+    }
+}
+
+impl FromStr for Kind {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::New, Self::Repeat, Self::Null]
+            .into_iter()
+            .find(|kind| kind.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "presentation kind", reason: text.to_owned() })
+    }
+}
+
+/// What a rater says of two gaits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Said {
+    /// The gait shown first is better.
+    First,
+    /// The gait shown second is better.
+    Second,
+    /// There is no difference.
+    NoDifference,
+    /// The rater cannot say.
+    CannotTell,
+    /// The first gait must not be walked.
+    UnsafeFirst,
+    /// The second gait must not be walked.
+    UnsafeSecond,
+    /// Neither gait may be walked.
+    UnsafeBoth,
+    /// Taken away by the program: one of the gaits was found unsafe meanwhile.
+    Withdrawn,
+}
+
+impl Said {
+    /// Every answer.
+    pub const ALL: [Self; 8] = [
+        Self::First,
+        Self::Second,
+        Self::NoDifference,
+        Self::CannotTell,
+        Self::UnsafeFirst,
+        Self::UnsafeSecond,
+        Self::UnsafeBoth,
+        Self::Withdrawn,
+    ];
+
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::First => "first",
+            Self::Second => "second",
+            Self::NoDifference => "no_difference",
+            Self::CannotTell => "cannot_tell",
+            Self::UnsafeFirst => "unsafe_first",
+            Self::UnsafeSecond => "unsafe_second",
+            Self::UnsafeBoth => "unsafe_both",
+            Self::Withdrawn => "withdrawn",
+        }
+    }
+}
+
+impl FromStr for Said {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|said| said.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "presentation answer", reason: text.to_owned() })
+    }
+}
+
+/// A presentation of the record. What of it a rater may see is decided in `studies::blind`.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Presentation {
+    /// Identifier.
+    pub id: PresentationId,
+    /// What the rater knows it by.
+    #[serde(skip)]
+    pub token: String,
+    /// The study.
+    pub study_id: StudyId,
+    /// Who was shown it.
+    pub rater: String,
+    /// 1, 2, ... of this rater in this study.
+    pub number: u32,
+    /// Why it was shown.
+    pub kind: Kind,
+    /// The trial shown first.
+    pub shown_first: TrialId,
+    /// The trial shown second.
+    pub shown_second: TrialId,
+    /// The presentation that it repeats.
+    pub repeats: Option<PresentationId>,
+    /// Whether the rater had been told which is which before.
+    pub unblinded: bool,
+    /// When it was drawn.
+    pub created_at: Instant,
+    /// What the rater said; none: nothing yet.
+    pub answer: Option<Said>,
+    /// When.
+    pub answered_at: Option<Instant>,
+}
+
+/// A presentation to write.
+#[derive(Debug, Clone)]
+pub struct NewPresentation {
+    /// What the rater knows it by.
+    pub token: String,
+    /// The study.
+    pub study_id: StudyId,
+    /// Who is shown it.
+    pub rater: String,
+    /// 1, 2, ... of this rater in this study.
+    pub number: u32,
+    /// Why it is shown.
+    pub kind: Kind,
+    /// The trial shown first.
+    pub shown_first: TrialId,
+    /// The trial shown second.
+    pub shown_second: TrialId,
+    /// The presentation that it repeats.
+    pub repeats: Option<PresentationId>,
+    /// Whether the rater has been told which is which.
+    pub unblinded: bool,
+}
+
+/// Adds a presentation.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<PresentationId> {
+    let id = PresentationId::fresh();
+    sqlx::query(
+        "insert into presentations (id, token, study_id, rater, number, kind, shown_first, shown_second, repeats, \
+         unblinded, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(&new.token)
+    .bind(new.study_id)
+    .bind(&new.rater)
+    .bind(new.number)
+    .bind(new.kind.as_str())
+    .bind(new.shown_first)
+    .bind(new.shown_second)
+    .bind(new.repeats)
+    .bind(new.unblinded)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// An answer to write.
+#[derive(Debug, Clone, Copy)]
+pub struct NewAnswer<'a> {
+    /// What the rater says.
+    pub said: Said,
+    /// How long it took by the rater's clock, ms.
+    pub response_ms: Option<i64>,
+    /// Free text.
+    pub note: &'a str,
+    /// What the learner hears of it.
+    pub feedback: Option<FeedbackId>,
+}
+
+/// Writes the answer of a presentation. `false`: it has one already.
+///
+/// # Errors
+/// What the database reports.
+pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into presentation_answers (presentation_id, answer, response_ms, note, feedback_id, created_at) \
+         values (?, ?, ?, ?, ?, ?) on conflict (presentation_id) do nothing",
+    )
+    .bind(id)
+    .bind(new.said.as_str())
+    .bind(new.response_ms)
+    .bind(new.note)
+    .bind(new.feedback)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+const SELECT: &str = "select p.*, a.answer, a.created_at as answered_at from presentations p \
+                      left join presentation_answers a on a.presentation_id = p.id ";
+
+/// The presentation with this token.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn by_token(db: &mut Connection, token: &str) -> StoreResult<Presentation> {
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where p.token = ?"));
+    let row = sqlx::query(sql).bind(token).fetch_optional(db).await?;
+    let missing = || StoreError::Missing { what: "comparison", id: "with this token".to_owned() };
+    row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
+}
+
+/// Every presentation of a study, in the order in which they were drawn.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where p.study_id = ? order by p.id"));
+    let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Notes that a rater was told which gait is which.
+///
+/// # Errors
+/// What the database reports.
+pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &str, reason: &str) -> StoreResult<()> {
+    sqlx::query("insert into unblindings (study_id, rater, actor, reason, created_at) values (?, ?, ?, ?, ?)")
+        .bind(study)
+        .bind(rater)
+        .bind(actor)
+        .bind(reason)
+        .bind(now())
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Whether a rater was told which gait is which in a study.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_unblinded(db: &mut Connection, study: StudyId, rater: &str) -> StoreResult<bool> {
+    let row = sqlx::query("select 1 from unblindings where study_id = ? and rater = ? limit 1")
+        .bind(study)
+        .bind(rater)
+        .fetch_optional(db)
+        .await?;
+    Ok(row.is_some())
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Presentation> {
+    Ok(Presentation {
+        id: row.try_get("id")?,
+        token: row.try_get("token")?,
+        study_id: row.try_get("study_id")?,
+        rater: row.try_get("rater")?,
+        number: row.try_get("number")?,
+        kind: row.try_get::<&str, _>("kind")?.parse()?,
+        shown_first: row.try_get("shown_first")?,
+        shown_second: row.try_get("shown_second")?,
+        repeats: row.try_get("repeats")?,
+        unblinded: row.try_get("unblinded")?,
+        created_at: row.try_get("created_at")?,
+        answer: row.try_get::<Option<&str>, _>("answer")?.map(str::parse).transpose()?,
+        answered_at: row.try_get("answered_at")?,
+    })
+}

@@ -1,0 +1,119 @@
+//! Sessions of people who signed in, and the one-time links they come by. Secrets are here as hashes alone.
+
+use super::{Connection, Instant, StoreResult, UserId, now};
+use sqlx::Row;
+
+/// A session that was found by the hash of its secret.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Session {
+    /// Whose.
+    pub user: UserId,
+    /// When the person last did something.
+    pub seen_at: Instant,
+}
+
+/// Begins a session.
+///
+/// # Errors
+/// What the database reports.
+pub async fn begin(db: &mut Connection, hash: &str, user: UserId) -> StoreResult<()> {
+    let at = now();
+    sqlx::query("insert into sessions (hash, user_id, created_at, seen_at) values (?, ?, ?, ?)")
+        .bind(hash)
+        .bind(user)
+        .bind(at)
+        .bind(at)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// The session with this hash, unless it has ended.
+///
+/// # Errors
+/// What the database reports.
+pub async fn find(db: &mut Connection, hash: &str) -> StoreResult<Option<Session>> {
+    let row = sqlx::query("select user_id, seen_at from sessions where hash = ? and ended_at is null")
+        .bind(hash)
+        .fetch_optional(db)
+        .await?;
+    row.map(|row| Ok(Session { user: row.try_get("user_id")?, seen_at: row.try_get("seen_at")? })).transpose()
+}
+
+/// Notes that the person did something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn seen(db: &mut Connection, hash: &str) -> StoreResult<()> {
+    sqlx::query("update sessions set seen_at = ? where hash = ? and ended_at is null")
+        .bind(now())
+        .bind(hash)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Ends a session.
+///
+/// # Errors
+/// What the database reports.
+pub async fn end(db: &mut Connection, hash: &str) -> StoreResult<()> {
+    sqlx::query("update sessions set ended_at = ? where hash = ? and ended_at is null")
+        .bind(now())
+        .bind(hash)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Ends every session of a user and makes the user's links useless.
+///
+/// # Errors
+/// What the database reports.
+pub async fn end_all(db: &mut Connection, user: UserId) -> StoreResult<()> {
+    let at = now();
+    for sql in [
+        "update sessions set ended_at = ? where user_id = ? and ended_at is null",
+        "update sign_in_links set used_at = ? where user_id = ? and used_at is null",
+    ] {
+        sqlx::query(sql).bind(at).bind(user).execute(&mut *db).await?;
+    }
+    Ok(())
+}
+
+/// Adds a one-time link.
+///
+/// # Errors
+/// What the database reports.
+pub async fn add_link(db: &mut Connection, hash: &str, user: UserId, expires_at: Instant) -> StoreResult<()> {
+    sqlx::query("insert into sign_in_links (hash, user_id, created_at, expires_at) values (?, ?, ?, ?)")
+        .bind(hash)
+        .bind(user)
+        .bind(now())
+        .bind(expires_at)
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Whose link it is, if it can still be used.
+///
+/// # Errors
+/// What the database reports.
+pub async fn link(db: &mut Connection, hash: &str) -> StoreResult<Option<UserId>> {
+    let row = sqlx::query("select user_id from sign_in_links where hash = ? and used_at is null and expires_at > ?")
+        .bind(hash)
+        .bind(now())
+        .fetch_optional(db)
+        .await?;
+    Ok(row.map(|row| row.try_get(0)).transpose()?)
+}
+
+/// Uses a link up.
+///
+/// # Errors
+/// What the database reports.
+pub async fn use_link(db: &mut Connection, hash: &str) -> StoreResult<()> {
+    sqlx::query("update sign_in_links set used_at = ? where hash = ?").bind(now()).bind(hash).execute(db).await?;
+    Ok(())
+}

@@ -1,0 +1,196 @@
+//! What a rater does: takes the next pair, answers it. And the act that ends blindness.
+
+use super::draw::draw;
+use super::{skipped_pairs, unsafe_trials};
+use crate::access::{Caller, secret};
+use crate::error::Error;
+use crate::store::audit;
+use crate::store::feedback::{self, Source, Voice};
+use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
+use crate::store::studies::{FeedbackMode, StudyState};
+use crate::store::{Connection, StudyId, TrialId, Writer, events, studies};
+use crate::studies::comparison::open_question;
+use crate::studies::standing::Standing;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// What a rater answers.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RaterAnswer {
+    /// What the rater says; `withdrawn` is the program's own word.
+    pub answer: Said,
+    /// How long the rater took, ms.
+    #[serde(default)]
+    #[schema(minimum = 0)]
+    pub response_ms: Option<i64>,
+    /// Free text, at most 2000 characters.
+    #[serde(default)]
+    pub note: String,
+}
+
+/// An answer as read back to the rater: nothing in it says which gaits they were.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Answered {
+    /// Number of the pair for this rater.
+    pub number: u32,
+    /// What was recorded.
+    pub answer: Said,
+}
+
+/// The pair that a study asks for, newest first, computed outside any transaction.
+async fn question(db: &mut Connection, study: StudyId) -> Result<(u64, Option<(TrialId, TrialId)>), Error> {
+    let study = studies::get(db, study).await?;
+    let seed = study.plan.seed;
+    if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
+        return Ok((seed, None));
+    }
+    let standing = Standing::read(db, study).await?;
+    let found = tokio::task::spawn_blocking(move || open_question(&standing))
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))?;
+    Ok((seed, found.map_err(Error::Learner)?))
+}
+
+/// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
+///
+/// `reader` looks, `writer` writes: what is computed between them holds no transaction.
+///
+/// # Errors
+/// [`Error::NotFound`], or what the database and the learner report.
+pub async fn next(
+    reader: &mut Connection,
+    store: &crate::store::Store,
+    caller: &Caller,
+    study: StudyId,
+) -> Result<(Writer, Option<Presentation>), Error> {
+    let (seed, question) = question(reader, study).await?;
+    let mut writer = store.write().await?;
+    let all = presentations::of_study(&mut writer, study).await?;
+    let closed = unsafe_trials(&all);
+    let own: Vec<Presentation> = all.iter().filter(|shown| shown.rater == caller.name).cloned().collect();
+    if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
+        if !closed.contains(&open.shown_first) && !closed.contains(&open.shown_second) {
+            note(&mut writer, caller, open, "presentation.show").await?;
+            return Ok((writer, Some(open.clone())));
+        }
+        let withdrawn = NewAnswer { said: Said::Withdrawn, response_ms: None, note: "", feedback: None };
+        presentations::answer(&mut writer, open.id, withdrawn).await?;
+    }
+    let is_closed = |pair: &(TrialId, TrialId)| {
+        closed.contains(&pair.0)
+            || closed.contains(&pair.1)
+            || skipped_pairs(&all).iter().any(|(a, b)| (*a, *b) == *pair || (*b, *a) == *pair)
+    };
+    let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
+    let drawn = draw(seed, &caller.name, pair, &own, &closed);
+    let token = secret::fresh()?;
+    let new = NewPresentation {
+        token: token.clone(),
+        study_id: study,
+        rater: caller.name.clone(),
+        number: u32::try_from(own.len()).unwrap_or(u32::MAX).saturating_add(1),
+        kind: drawn.kind,
+        shown_first: drawn.first,
+        shown_second: drawn.second,
+        repeats: drawn.repeats,
+        unblinded: presentations::is_unblinded(&mut writer, study, &caller.name).await?,
+    };
+    presentations::insert(&mut writer, &new).await?;
+    let shown = presentations::by_token(&mut writer, &token).await?;
+    note(&mut writer, caller, &shown, "presentation.draw").await?;
+    Ok((writer, Some(shown)))
+}
+
+async fn note(writer: &mut Writer, caller: &Caller, shown: &Presentation, action: &str) -> Result<(), Error> {
+    let detail = json!({ "study": shown.study_id, "rater": shown.rater, "number": shown.number });
+    Ok(audit::append(writer, &caller.actor, action, &format!("presentation {}", shown.id), &detail).await?)
+}
+
+/// Records what a rater says.
+///
+/// # Errors
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it was answered, [`Error::Invalid`].
+pub async fn answer(
+    writer: &mut Writer,
+    caller: &Caller,
+    token: &str,
+    given: &RaterAnswer,
+) -> Result<(StudyId, Answered), Error> {
+    let shown = own(writer, caller, token).await?;
+    if given.answer == Said::Withdrawn {
+        return Err(Error::invalid("answer", "withdrawn", "what a rater can say"));
+    }
+    if given.note.chars().count() > 2000 {
+        return Err(Error::invalid("note", given.note.chars().count(), "at most 2000 characters"));
+    }
+    if given.response_ms.is_some_and(|ms| ms < 0) {
+        return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));
+    }
+    let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
+    let voice = Voice { source, author: &caller.name, note: &given.note };
+    let feedback = match heard(&shown, given.answer) {
+        Some(said) => Some(feedback::append(writer, shown.study_id, &said, voice).await?),
+        None => None,
+    };
+    let row = NewAnswer { said: given.answer, response_ms: given.response_ms, note: &given.note, feedback };
+    if !presentations::answer(writer, shown.id, row).await? {
+        return Err(Error::conflict("this pair was answered already"));
+    }
+    let payload = json!({ "feedback_id": feedback, "presentation_id": shown.id });
+    events::append(writer, shown.study_id, "feedback_given", &payload).await?;
+    let detail = json!({ "study": shown.study_id, "number": shown.number, "answer": given.answer });
+    audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
+    Ok((shown.study_id, Answered { number: shown.number, answer: given.answer }))
+}
+
+/// The presentation of a token, if it is this rater's.
+pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Presentation, Error> {
+    let shown = presentations::by_token(db, token).await?;
+    if shown.rater != caller.name {
+        return Err(Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() });
+    }
+    Ok(shown)
+}
+
+/// What the learner hears of an answer: pairs of the study alone. That a gait is unsafe says that the other is better.
+fn heard(shown: &Presentation, said: Said) -> Option<feedback::Said> {
+    let (first, second) = (shown.shown_first, shown.shown_second);
+    if shown.kind != Kind::New {
+        return None;
+    }
+    match said {
+        Said::First | Said::UnsafeSecond => Some(feedback::Said::Preference { winner: first, loser: second }),
+        Said::Second | Said::UnsafeFirst => Some(feedback::Said::Preference { winner: second, loser: first }),
+        Said::NoDifference => Some(feedback::Said::Tie { a: first, b: second }),
+        Said::CannotTell | Said::UnsafeBoth | Said::Withdrawn => None,
+    }
+}
+
+/// Tells which gaits a rater was shown; from now on the rater's pairs are marked.
+///
+/// # Errors
+/// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`].
+pub async fn unblind(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    rater: &str,
+    reason: &str,
+) -> Result<Vec<Presentation>, Error> {
+    studies::get(writer, study).await?;
+    let reason = reason.trim();
+    if reason.is_empty() || reason.chars().count() > 2000 {
+        return Err(Error::invalid("reason", reason, "1 to 2000 characters: why blindness ends"));
+    }
+    let mut shown = presentations::of_study(writer, study).await?;
+    shown.retain(|shown| shown.rater == rater);
+    if shown.is_empty() {
+        return Err(Error::invalid("rater", rater, "somebody who was shown a pair of this study"));
+    }
+    presentations::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
+    let detail = json!({ "rater": rater, "reason": reason });
+    audit::append(writer, &caller.actor, "study.unblind", &format!("study {study}"), &detail).await?;
+    Ok(shown)
+}

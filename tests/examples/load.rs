@@ -1,0 +1,141 @@
+//! Load on loopback while real solves run: durable preference writes at a steady rate, and study reads.
+//!
+//! `cargo run --release -p gaitwright-tests --example load -- [SECONDS] [WRITES_PER_SECOND]`
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::workers::{Assignment, Evaluate, GaitSolver};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// Studies with muscles are solved, others answered at once.
+struct Both(Analytic);
+
+impl Evaluate for Both {
+    fn evaluate(
+        &self,
+        assignment: &Assignment,
+        observer: &mut dyn FnMut(&IterationRecord),
+        cancel: &CancelToken,
+    ) -> Result<SolveOutcome, String> {
+        if assignment.problem.muscles {
+            GaitSolver.evaluate(assignment, observer, cancel)
+        } else {
+            self.0.evaluate(assignment, observer, cancel)
+        }
+    }
+}
+
+/// A connection that is kept.
+struct Connection(BufReader<TcpStream>);
+
+impl Connection {
+    fn open(address: &str) -> Self {
+        let stream = TcpStream::connect(address).unwrap();
+        stream.set_nodelay(true).unwrap();
+        Self(BufReader::new(stream))
+    }
+
+    fn send(&mut self, method: &str, path: &str, body: &str) -> u16 {
+        let request = format!(
+            "{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n{body}",
+            body.len()
+        );
+        self.0.get_mut().write_all(request.as_bytes()).unwrap();
+        let (mut status, mut length) = (0, 0);
+        loop {
+            let mut line = String::new();
+            self.0.read_line(&mut line).unwrap();
+            let line = line.trim_end().to_ascii_lowercase();
+            if let Some(rest) = line.strip_prefix("http/1.1 ") {
+                status = rest[..3].parse().unwrap();
+            } else if let Some(rest) = line.strip_prefix("content-length: ") {
+                length = rest.parse().unwrap();
+            } else if line.is_empty() {
+                break;
+            }
+        }
+        let mut bytes = vec![0; length];
+        self.0.read_exact(&mut bytes).unwrap();
+        status
+    }
+}
+
+fn report(what: &str, mut times: Vec<Duration>, seconds: f64) {
+    times.sort();
+    let at = |percent: usize| times[(times.len() - 1) * percent / 100].as_secs_f64() * 1e3;
+    println!(
+        "{what}: {:.0} requests/s, p50 {:.2} ms, p99 {:.2} ms, slowest {:.2} ms ({} requests)",
+        times.len() as f64 / seconds,
+        at(50),
+        at(99),
+        at(100),
+        times.len()
+    );
+}
+
+#[tokio::main]
+async fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let seconds: f64 = arguments.next().map_or(20.0, |text| text.parse().expect("seconds"));
+    let rate: f64 = arguments.next().map_or(200.0, |text| text.parse().expect("writes per second"));
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Both(Analytic::default()), 1).await;
+    let study = service
+        .study(|new| (new.trial_budget, new.muscles, new.feedback_mode) = (15, false, FeedbackMode::Mixed))
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let solved = service.study(|new| (new.trial_budget, new.muscles) = (500, true)).await;
+    let converged: Vec<_> =
+        service.trials(study).await.into_iter().filter(|trial| trial.state.as_str() == "converged").collect();
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let router = service.router();
+    tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
+    let body = format!(
+        "{{\"trial_a\":\"{}\",\"trial_b\":\"{}\",\"answer\":\"a\",\"author\":\"load\"}}",
+        converged[0].id, converged[1].id
+    );
+    let write = format!("/api/v1/studies/{study}/preferences");
+    let read = format!("/api/v1/studies/{study}");
+
+    let writer = std::thread::spawn({
+        let address = address.clone();
+        move || {
+            let mut connection = Connection::open(&address);
+            let (begun, mut times) = (Instant::now(), Vec::new());
+            while begun.elapsed().as_secs_f64() < seconds {
+                // From when the request was due: a slow answer delays the next one, and that counts.
+                let due = begun + Duration::from_secs_f64(times.len() as f64 / rate);
+                std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                assert_eq!(connection.send("POST", &write, &body), 201);
+                times.push(due.elapsed());
+            }
+            times
+        }
+    });
+    let reader = std::thread::spawn(move || {
+        let mut connection = Connection::open(&address);
+        let (begun, mut times) = (Instant::now(), Vec::new());
+        while begun.elapsed().as_secs_f64() < seconds {
+            let sent = Instant::now();
+            assert_eq!(connection.send("GET", &read, ""), 200);
+            times.push(sent.elapsed());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        times
+    });
+    let (writes, reads) =
+        tokio::task::spawn_blocking(|| (writer.join().unwrap(), reader.join().unwrap())).await.unwrap();
+    let trials = service.trials(solved).await;
+    let running = trials.iter().any(|trial| trial.state.is_open());
+    println!("a solve with muscles ran on one worker: {running}; trials of that study: {}", trials.len());
+    report("durable preference writes", writes, seconds);
+    report("study reads", reads, seconds);
+    service.stop().await;
+}

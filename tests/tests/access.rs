@@ -1,0 +1,327 @@
+//! Who may do what: roles, tokens, sessions, links, back-off.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode, header};
+use gaitwright::access::people::{self, NewUser};
+use gaitwright::access::tokens::{self, NewToken};
+use gaitwright::access::{Right, Role, secret, sign_in};
+use gaitwright::http::{Access, openapi};
+use gaitwright::store::audit::{self, Actor};
+use gaitwright::store::{UserId, commit};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use std::sync::Arc;
+use tempfile::TempDir;
+
+const UNKNOWN: &str = "01890000-0000-7000-8000-000000000000";
+const FORM: &str = "application/x-www-form-urlencoded";
+
+/// A service where everybody signs in.
+async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    service.access = Arc::new(Access::by_sign_in(3600.0));
+    (folder, service)
+}
+
+/// How a request says who sends it.
+#[derive(Debug, Clone)]
+enum As {
+    Nobody,
+    Session(String),
+    Token(String),
+}
+
+async fn user(service: &Service, name: &str, role: Role) -> (UserId, String) {
+    let mut writer = service.store.write().await.unwrap();
+    let new = NewUser { name: name.to_owned(), role };
+    let user = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let link = people::link(&mut writer, &Actor::program(), user.id).await.unwrap();
+    commit(writer).await.unwrap();
+    (user.id, link)
+}
+
+async fn signed_in(service: &Service, role: Role) -> As {
+    let (_, link) = user(service, &format!("a {}", role.as_str()), role).await;
+    let mut writer = service.store.write().await.unwrap();
+    let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
+    commit(writer).await.unwrap();
+    As::Session(session)
+}
+
+async fn token(service: &Service, scopes: &[Right]) -> As {
+    let mut writer = service.store.write().await.unwrap();
+    let new = NewToken { name: format!("{scopes:?}"), scopes: scopes.to_vec(), days: Some(1) };
+    let (_, secret) = tokens::make(&mut writer, &Actor::program(), &new).await.unwrap();
+    commit(writer).await.unwrap();
+    As::Token(secret)
+}
+
+async fn send(service: &Service, who: &As, method: &Method, path: &str, kind: &str, body: &str) -> Answer {
+    let mut request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, kind);
+    request = match who {
+        As::Nobody => request,
+        As::Session(secret) => request
+            .header(header::COOKIE, format!("gaitwright_session={secret}"))
+            .header("sec-fetch-site", "same-origin"),
+        As::Token(secret) => request.header(header::AUTHORIZATION, format!("Bearer {secret}")),
+    };
+    service.send(request.body(Body::from(body.to_owned())).unwrap()).await
+}
+
+/// Everybody there is, with their rights.
+async fn everybody(service: &Service) -> Vec<(As, Vec<Right>)> {
+    let mut callers = vec![(As::Nobody, Vec::new())];
+    for role in Role::ALL {
+        let rights = Right::ALL.into_iter().filter(|right| role.rights().has(*right)).collect();
+        callers.push((signed_in(service, role).await, rights));
+    }
+    for right in [Right::Read, Right::Run, Right::Answer, Right::Rate] {
+        callers.push((token(service, &[right]).await, vec![right]));
+    }
+    callers
+}
+
+#[tokio::test]
+async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
+    let (_folder, service) = service().await;
+    let callers = everybody(&service).await;
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut checked = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let needed = &operation["security"][0]["token"];
+            let method: Method = method.to_uppercase().parse().unwrap();
+            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown");
+            for (who, rights) in &callers {
+                let answer = send(&service, who, &method, &address, "application/json", "{}").await;
+                let what = format!("{method} {path} as {who:?}: {} {}", answer.status, answer.text);
+                let allowed = match needed[0].as_str() {
+                    Some(needed) => rights.iter().any(|right| right.as_str() == needed),
+                    None => needed.is_null() || !matches!(who, As::Nobody),
+                };
+                let refusal = if matches!(who, As::Nobody) { StatusCode::UNAUTHORIZED } else { StatusCode::FORBIDDEN };
+                if allowed {
+                    assert!(!matches!(answer.status, StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN), "{what}");
+                    let status = answer.status.as_u16().to_string();
+                    assert!(operation["responses"][&status].is_object(), "undocumented: {what}");
+                } else {
+                    assert_eq!(answer.status, refusal, "{what}");
+                }
+                assert!(!answer.status.is_server_error(), "{what}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 250, "{checked}");
+    service.stop().await;
+}
+
+/// The pages, as the router lists them: a page that is added and not listed here fails the test.
+const PAGES: [(&str, Option<Right>); 21] = [
+    ("get /", Some(Right::Read)),
+    ("get /studies/new", Some(Right::Run)),
+    ("post /studies/new", Some(Right::Run)),
+    ("get /studies/{id}", Some(Right::Read)),
+    ("get /studies/{id}/live", Some(Right::Read)),
+    ("post /studies/{id}/do", Some(Right::Run)),
+    ("get /studies/{id}/compare", Some(Right::Read)),
+    ("post /studies/{id}/compare", Some(Right::Answer)),
+    ("post /studies/{id}/retract", Some(Right::Answer)),
+    ("get /trials/{id}", Some(Right::Read)),
+    ("get /rate", Some(Right::Rate)),
+    ("post /rate/{id}", Some(Right::Rate)),
+    ("get /rate/pair/{token}", Some(Right::Rate)),
+    ("post /rate/pair/{token}", Some(Right::Rate)),
+    ("get /api", None),
+    ("get /sign-in", None),
+    ("post /sign-in", None),
+    ("get /sign-in/{link}", None),
+    ("post /sign-in/{link}", None),
+    ("post /sign-out", None),
+    ("get /account", None),
+];
+
+#[tokio::test]
+async fn every_page_is_shown_to_those_who_may_see_it() {
+    let listed = include_str!("../../server/src/http/pages/mod.rs");
+    let (_folder, service) = service().await;
+    let callers = everybody(&service).await;
+    for line in listed.lines().filter(|line| line.contains(".route(\"")) {
+        let path = line.split('"').nth(1).unwrap();
+        for method in ["get", "post"] {
+            if !line.contains(&format!("{method}(")) || (path, method) == ("/account", "post") {
+                continue;
+            }
+            let entry = format!("{method} {path}");
+            let (_, needed) = PAGES.iter().find(|(known, _)| *known == entry).unwrap_or_else(|| panic!("{entry}"));
+            let Some(needed) = needed else { continue };
+            let method: Method = method.to_uppercase().parse().unwrap();
+            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown");
+            for (who, rights) in &callers {
+                let answer = send(&service, who, &method, &address, FORM, "").await;
+                let what = format!("{entry} as {who:?}: {}", answer.status);
+                if rights.contains(needed) {
+                    assert!(!matches!(answer.status, StatusCode::SEE_OTHER | StatusCode::FORBIDDEN), "{what}");
+                } else if matches!(who, As::Nobody) {
+                    assert_eq!(answer.headers["location"], "/sign-in", "{what}");
+                } else {
+                    assert_eq!(answer.status, StatusCode::FORBIDDEN, "{what}");
+                }
+            }
+        }
+    }
+    service.stop().await;
+}
+
+fn session_of(answer: &Answer) -> As {
+    let cookie = answer.headers["set-cookie"].to_str().unwrap();
+    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Lax"), "{cookie}");
+    As::Session(cookie.split(';').next().unwrap().split_once('=').unwrap().1.to_owned())
+}
+
+#[tokio::test]
+async fn a_link_signs_in_once_and_a_password_after_that() {
+    let (_folder, service) = service().await;
+    let (_, link) = user(&service, "Ada", Role::Admin).await;
+    let path = format!("/sign-in/{link}");
+    assert_eq!(send(&service, &As::Nobody, &Method::GET, &path, FORM, "").await.status, StatusCode::OK);
+    let first = send(&service, &As::Nobody, &Method::POST, &path, FORM, "").await;
+    assert_eq!((first.status, &first.headers["location"]), (StatusCode::SEE_OTHER, &"/".parse().unwrap()));
+    let ada = session_of(&first);
+    let again = send(&service, &As::Nobody, &Method::POST, &path, FORM, "").await;
+    assert_eq!(again.headers["location"], "/sign-in", "a link works once");
+
+    let me = send(&service, &ada, &Method::GET, "/api/v1/me", "", "").await.json();
+    assert_eq!((&me["name"], &me["role"]), (&json!("Ada"), &json!("admin")));
+    let short = send(&service, &ada, &Method::POST, "/account", FORM, "password=short").await;
+    assert_eq!(short.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    let newer = session_of(&set);
+    assert_eq!(send(&service, &ada, &Method::GET, "/api/v1/me", "", "").await.status, StatusCode::UNAUTHORIZED);
+    assert_eq!(send(&service, &newer, &Method::GET, "/api/v1/me", "", "").await.status, StatusCode::OK);
+
+    let body = "name=ada&password=correct+horse";
+    let by_password = session_of(&send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, body).await);
+    let out = send(&service, &by_password, &Method::POST, "/sign-out", FORM, "").await;
+    assert!(out.headers["set-cookie"].to_str().unwrap().contains("Max-Age=0"));
+    assert_eq!(send(&service, &by_password, &Method::GET, "/", "", "").await.headers["location"], "/sign-in");
+
+    // No secret is in the record.
+    service.store.close().await;
+    let bytes = std::fs::read(service.store.path()).unwrap();
+    for secret in [link.as_str(), "correct horse"] {
+        assert!(!bytes.windows(secret.len()).any(|window| window == secret.as_bytes()), "{secret}");
+    }
+}
+
+#[tokio::test]
+async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
+    let (_folder, service) = service().await;
+    let (id, _) = user(&service, "Ada", Role::Clinician).await;
+    let hashed = secret::hash_password("correct horse").unwrap();
+    let mut writer = service.store.write().await.unwrap();
+    people::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
+    commit(writer).await.unwrap();
+    let wrong = "name=Ada&password=wrong";
+    for _ in 0..4 {
+        let refused = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, wrong).await;
+        assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
+    }
+    let right = "name=Ada&password=correct+horse";
+    let waits = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, right).await;
+    assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
+    let rows = audit::page(&mut service.store.read().await.unwrap(), None, 100).await.unwrap();
+    assert_eq!(rows.iter().filter(|row| row.action == "session.refuse").count(), 4);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn sessions_end_when_idle_when_disabled_and_tokens_when_revoked() {
+    let (_folder, mut service) = service().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let script = token(&service, &[Right::Read]).await;
+    let me = "/api/v1/me";
+    for who in [&admin, &clinician, &script] {
+        assert_eq!(send(&service, who, &Method::GET, me, "", "").await.status, StatusCode::OK);
+    }
+    let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.json();
+    let id_of = |role: &str| {
+        let all = users.as_array().unwrap();
+        all.iter().find(|user| user["role"] == role).unwrap()["id"].as_str().unwrap().to_owned()
+    };
+    let disable = |id: String| format!("/api/v1/users/{id}/disable");
+    let json = "application/json";
+    let last = send(&service, &admin, &Method::POST, &disable(id_of("admin")), json, "").await;
+    assert_eq!(last.status, StatusCode::CONFLICT, "somebody must administer");
+    assert_eq!(
+        send(&service, &admin, &Method::POST, &disable(id_of("clinician")), json, "").await.status,
+        StatusCode::OK
+    );
+    assert_eq!(send(&service, &clinician, &Method::GET, me, "", "").await.status, StatusCode::UNAUTHORIZED);
+
+    let all = send(&service, &admin, &Method::GET, "/api/v1/tokens", "", "").await;
+    let As::Token(secret) = &script else { panic!() };
+    assert!(!all.text.contains(secret.as_str()));
+    let revoke = format!("/api/v1/tokens/{}/revoke", all.json()[0]["id"].as_str().unwrap());
+    assert_eq!(send(&service, &admin, &Method::POST, &revoke, json, "").await.status, StatusCode::OK);
+    assert_eq!(send(&service, &script, &Method::GET, me, "", "").await.status, StatusCode::UNAUTHORIZED);
+
+    service.access = Arc::new(Access::by_sign_in(0.0));
+    tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    assert_eq!(send(&service, &admin, &Method::GET, me, "", "").await.status, StatusCode::UNAUTHORIZED);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_signed_in_browser_that_hides_its_origin_may_not_change_anything() {
+    let (_folder, service) = service().await;
+    let As::Session(secret) = signed_in(&service, Role::Admin).await else { panic!() };
+    for (header_name, value, expected) in [
+        ("x-nothing", "", StatusCode::FORBIDDEN),
+        ("sec-fetch-site", "cross-site", StatusCode::FORBIDDEN),
+        ("sec-fetch-site", "same-site", StatusCode::FORBIDDEN),
+        ("origin", "https://evil.example", StatusCode::FORBIDDEN),
+        ("sec-fetch-site", "same-origin", StatusCode::CREATED),
+    ] {
+        let request = Request::post("/api/v1/subjects")
+            .header(header::COOKIE, format!("gaitwright_session={secret}"))
+            .header(header::CONTENT_TYPE, "application/json")
+            .header(header_name, value)
+            .body(Body::from(json!({"pseudonym": "S9", "height_m": 1.8, "body_mass_kg": 70}).to_string()))
+            .unwrap();
+        assert_eq!(service.send(request).await.status, expected, "{header_name}: {value}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn every_answer_carries_the_security_headers() {
+    let (_folder, service) = service().await;
+    for path in ["/sign-in", "/", "/api/v1/studies", "/static/gaitwright.css", "/nothing"] {
+        let answer = send(&service, &As::Nobody, &Method::GET, path, "", "").await;
+        for name in [
+            "content-security-policy",
+            "x-content-type-options",
+            "referrer-policy",
+            "x-frame-options",
+            "cache-control",
+            "cross-origin-opener-policy",
+            "cross-origin-resource-policy",
+            "permissions-policy",
+        ] {
+            assert!(answer.headers.contains_key(name), "{path}: {name}");
+        }
+        let policy = answer.headers["content-security-policy"].to_str().unwrap();
+        assert!(policy.contains("default-src 'self'") && !policy.contains("unsafe"), "{policy}");
+    }
+    let large = "x".repeat(2 << 20);
+    let admin = signed_in(&service, Role::Admin).await;
+    let answer = send(&service, &admin, &Method::POST, "/api/v1/subjects", "application/json", &large).await;
+    assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
+    service.stop().await;
+}

@@ -1,0 +1,215 @@
+//! Every operation that changes something leaves exactly one row in the audit trail, and the form, REST and the
+//! unattended loop leave the same rows in the record. The table is compared with the description: an operation that is
+//! added and not listed here fails the test.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Request, header};
+use gaitwright::http::openapi;
+use gaitwright::store::audit::{self, Verdict};
+use gaitwright::store::feedback::FeedbackRow;
+use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright::store::trials::Trial;
+use gaitwright::store::{StudyId, feedback};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+async fn rows(service: &Service) -> usize {
+    audit::page(&mut service.store.read().await.unwrap(), None, 10_000).await.unwrap().len()
+}
+
+/// Everything that the requests below need.
+struct Scene {
+    service: Service,
+    finished: StudyId,
+    draft: StudyId,
+    script: StudyId,
+    human: StudyId,
+}
+
+impl Scene {
+    async fn set(folder: &std::path::Path) -> Self {
+        let service = Service::start(&folder.join("a.db"), Analytic::slow(Duration::from_millis(10)), 1).await;
+        let finished = service.study(|new| new.trial_budget = 3).await;
+        service.wait_for(finished, &[StudyState::Finished]).await;
+        let draft = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+        let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 9)).await;
+        let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 4)).await;
+        service.wait_for(human, &[StudyState::Waiting]).await;
+        Self { service, finished, draft, script, human }
+    }
+
+    /// Sends it, requires success and exactly one row.
+    async fn one(&self, done: &mut BTreeSet<String>, operation: &str, path: &str, body: Value) -> Value {
+        let (method, _) = operation.split_once(' ').unwrap();
+        let before = rows(&self.service).await;
+        let request = Request::builder()
+            .method(method.to_uppercase().as_str())
+            .uri(path)
+            .header(header::CONTENT_TYPE, "application/json")
+            .body(Body::from(body.to_string()))
+            .unwrap();
+        let answer = self.service.send(request).await;
+        assert!(answer.status.is_success(), "{operation}: {} {}", answer.status, answer.text);
+        assert_eq!(rows(&self.service).await, before + 1, "{operation}");
+        done.insert(operation.replace("/api/v1", ""));
+        answer.json()
+    }
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap()
+}
+
+#[tokio::test]
+async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Scene::set(folder.path()).await;
+    let Scene { service, finished, draft, script, human } = &scene;
+    let trials = service.trials(*finished).await;
+    let done = &mut BTreeSet::new();
+    let api = "/api/v1";
+
+    let subject = json!({"pseudonym": "S1", "height_m": 1.8, "body_mass_kg": 70});
+    scene.one(done, "post /subjects", &format!("{api}/subjects"), subject).await;
+    let study = json!({"subject_id": service.subject().await, "start": false});
+    scene.one(done, "post /studies", &format!("{api}/studies"), study).await;
+    let of_draft = format!("{api}/studies/{draft}");
+    scene.one(done, "patch /studies/{id}", &of_draft, json!({"priority": -10})).await;
+    for (act, body) in [("fork", json!({})), ("start", json!({})), ("pause", json!({})), ("resume", json!({}))] {
+        scene.one(done, &format!("post /studies/{{id}}/{act}"), &format!("{of_draft}/{act}"), body).await;
+    }
+    service.wait_for(*draft, &[StudyState::Finished]).await;
+    let more = json!({"trial_budget": 4000});
+    scene.one(done, "post /studies/{id}/extend", &format!("{of_draft}/extend"), more).await;
+    while !service.trials(*draft).await.iter().any(|trial| trial.state.is_open()) {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    scene.one(done, "post /studies/{id}/stop", &format!("{of_draft}/stop"), json!({"reason": "enough"})).await;
+    let cancelled = service.trials(*draft).await.into_iter().find(|trial| trial.state.as_str() == "cancelled").unwrap();
+
+    let ask = format!("{api}/studies/{script}/ask");
+    let asked = scene.one(done, "post /studies/{id}/ask", &ask, json!({})).await;
+    let tell = json!({"outcome": "not_converged", "reason": "r"});
+    scene.one(done, "post /trials/{id}/tell", &format!("{api}/trials/{}/tell", text(&asked["id"])), tell).await;
+    let asked = scene.one(done, "post /studies/{id}/ask", &ask, json!({})).await;
+    let cancel = format!("{api}/trials/{}/cancel", text(&asked["id"]));
+    scene.one(done, "post /trials/{id}/cancel", &cancel, json!({})).await;
+    let retry = format!("{api}/trials/{}/retry", cancelled.id);
+    scene.one(done, "post /trials/{id}/retry", &retry, json!({})).await;
+
+    let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});
+    let give = format!("{api}/studies/{finished}/preferences");
+    let given = scene.one(done, "post /studies/{id}/preferences", &give, answer).await;
+    let retract = format!("{api}/preferences/{}/retract", text(&given["id"]));
+    scene.one(done, "post /preferences/{id}/retract", &retract, json!({"reason": "r"})).await;
+
+    let next = format!("{api}/studies/{human}/blind/next");
+    let pair = scene.one(done, "post /studies/{id}/blind/next", &next, json!({})).await;
+    let say = format!("{api}/blind/{}/answer", text(&pair["pair"]["token"]));
+    scene.one(done, "post /blind/{token}/answer", &say, json!({"answer": "first"})).await;
+    let unblind = json!({"rater": "not signed in", "reason": "r"});
+    scene.one(done, "post /studies/{id}/unblind", &format!("{api}/studies/{human}/unblind"), unblind).await;
+
+    let user = json!({"name": "Ada", "role": "clinician"});
+    let user = scene.one(done, "post /users", &format!("{api}/users"), user).await;
+    for act in ["link", "disable", "enable"] {
+        let path = format!("{api}/users/{}/{act}", text(&user["id"]));
+        scene.one(done, &format!("post /users/{{id}}/{act}"), &path, json!({})).await;
+    }
+    let token =
+        scene.one(done, "post /tokens", &format!("{api}/tokens"), json!({"name": "t", "scopes": ["read"]})).await;
+    let revoke = format!("{api}/tokens/{}/revoke", text(&token["id"]));
+    scene.one(done, "post /tokens/{id}/revoke", &revoke, json!({})).await;
+
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut described = BTreeSet::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for method in item.as_object().unwrap().keys().filter(|method| *method != "get") {
+            described.insert(format!("{method} {}", path.trim_start_matches("/api/v1")));
+        }
+    }
+    assert_eq!(*done, described);
+    let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(verdict, Verdict::Whole { .. }));
+    scene.service.stop().await;
+}
+
+/// What a study heard, without identifiers, times, and who said it.
+fn essence(trials: &[Trial], heard: &[FeedbackRow]) -> Vec<String> {
+    let number = |id: &str| trials.iter().find(|trial| trial.id.to_string() == id).map(|trial| trial.number);
+    heard
+        .iter()
+        .map(|row| {
+            let said = serde_json::to_value(row.said).unwrap();
+            let named: Vec<String> = said
+                .as_object()
+                .unwrap()
+                .iter()
+                .map(|(name, value)| match value.as_str().and_then(number) {
+                    Some(number) => format!("{name} trial {number}"),
+                    None => format!("{name} {value}"),
+                })
+                .collect();
+            named.join(", ")
+        })
+        .collect()
+}
+
+#[tokio::test]
+async fn form_rest_and_unattended_loop_leave_the_same_rows_for_the_same_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let automatic = service.study(|new| new.trial_budget = 12).await;
+    service.wait_for(automatic, &[StudyState::Finished]).await;
+    let heard = service.feedback(automatic).await;
+    let expected = essence(&service.trials(automatic).await, &heard);
+    for by_form in [false, true] {
+        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+        while service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await.state == StudyState::Waiting {
+            let trials = service.trials(study).await;
+            // Answers as Gait RMSE would: the question is the newest gait against the one the page offers.
+            let page = service.fetch(&format!("/studies/{study}/compare")).await.text;
+            let offered = |name: &str| {
+                let list =
+                    page.split(&format!("<select id=\"{name}\"")).nth(1).unwrap().split("</select>").next().unwrap();
+                let option = list.split("<option ").find(|option| option.contains(" selected")).unwrap();
+                option.split('"').nth(1).unwrap().to_owned()
+            };
+            let (a, b) = (offered("a"), offered("b"));
+            let rmse = |id: &str| trials.iter().find(|t| t.id.to_string() == id).unwrap().gait_rmse_rad.unwrap();
+            let answer = if rmse(&a) < rmse(&b) { "a" } else { "b" };
+            let before = service.feedback(study).await.len();
+            if by_form {
+                let key = feedback_key(before);
+                let form = format!("a={a}&b={b}&answer={answer}&source=clinician&author=K&key={key}");
+                let path = format!("/studies/{study}/compare");
+                let sent = service.post_text(&path, "application/x-www-form-urlencoded", &form).await;
+                assert!(sent.status.is_redirection(), "{}", sent.text);
+            } else {
+                let body = json!({"trial_a": a, "trial_b": b, "answer": answer, "source": "clinician", "author": "K"});
+                let sent = service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await;
+                assert!(sent.status.is_success(), "{}", sent.text);
+            }
+            assert_eq!(service.feedback(study).await.len(), before + 1);
+            for _ in 0..500 {
+                let state = service.get(study).await.state;
+                if state != StudyState::Waiting {
+                    break;
+                }
+                tokio::time::sleep(Duration::from_millis(2)).await;
+            }
+        }
+        let heard = feedback::of_study(&mut service.store.read().await.unwrap(), study, 0).await.unwrap();
+        assert_eq!(essence(&service.trials(study).await, &heard), expected, "by form: {by_form}");
+    }
+    service.stop().await;
+}
+
+fn feedback_key(count: usize) -> String {
+    format!("01890000-0000-7000-8000-{:012}", count + 1)
+}

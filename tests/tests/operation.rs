@@ -1,0 +1,162 @@
+//! Running the service: archives, retention, migrations, figures, HTTPS, restore.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::cli::study::{import, prune};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::{Store, archive, gaits, studies};
+use gaitwright::studies::standing::Standing;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use serde_json::json;
+use std::path::Path;
+use std::process::Command;
+
+async fn posterior(service: &Service, study: gaitwright::store::StudyId) -> Vec<(u64, u64)> {
+    let mut reader = service.store.read().await.unwrap();
+    let study = studies::get(&mut reader, study).await.unwrap();
+    let standing = Standing::read(&mut reader, study).await.unwrap();
+    let plan = &standing.study.plan;
+    let belief = gait_learner::posterior(&plan.search_space, &standing.log(), &plan.learner).unwrap();
+    let mean = |trial: &gaitwright::store::trials::Trial| belief.mean(trial.action_index).unwrap().to_bits();
+    standing.trials.iter().map(|trial| (trial.action_index.0, mean(trial))).collect()
+}
+
+#[tokio::test]
+async fn an_exported_study_gives_the_same_posterior_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let converged: Vec<_> =
+        trials.iter().filter(|t| t.gait_rmse_rad.is_some() && t.state.as_str() == "converged").collect();
+    let answer = json!({"trial_a": converged[0].id, "trial_b": converged[1].id, "answer": "b", "author": "K"});
+    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await.json();
+    let retract = format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap());
+    assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
+    let answer =
+        json!({"trial_a": converged[2].id, "trial_b": converged[0].id, "answer": "no_difference", "author": "K"});
+    service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
+    let expected = posterior(&service, study).await;
+    let file = archive::pack(&mut service.store.read().await.unwrap(), study).await.unwrap();
+
+    // Another record, with rows of its own.
+    let other = Service::start(&folder.path().join("b.db"), Analytic::default(), 1).await;
+    let own = other.study(|new| (new.trial_budget, new.seed) = (3, 5)).await;
+    other.wait_for(own, &[StudyState::Finished]).await;
+    let refused = import(&other.store, &file).await.unwrap_err().to_string();
+    assert!(refused.contains("nothing was changed"), "the pseudonym is taken by another subject there: {refused}");
+    other.stop().await;
+
+    let fresh = Store::open(&folder.path().join("c.db")).await.unwrap();
+    assert_eq!(import(&fresh, &file).await.unwrap(), study);
+    assert!(import(&fresh, &file).await.unwrap_err().to_string().contains("already"));
+    for place in [30, file.len() / 2, file.len() - 1] {
+        let mut changed = file.clone();
+        changed[place] ^= 1;
+        assert!(archive::open(&changed).is_err(), "byte {place}");
+    }
+    assert!(archive::open(&file[..file.len() - 7]).is_err());
+    assert!(archive::open(b"").is_err());
+    fresh.close().await;
+    drop(fresh);
+    let again = Service::start_as_is(&folder.path().join("c.db"), Analytic::default(), 1).await;
+    assert_eq!(posterior(&again, study).await, expected);
+    let strip = |text: String| text;
+    for path in ["trials", "preferences", "history"] {
+        let path = format!("/api/v1/studies/{study}/{path}");
+        let (a, b) = (service.fetch(&path).await.text, again.fetch(&path).await.text);
+        assert_eq!(strip(a), strip(b), "{path}");
+    }
+    again.stop().await;
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn old_trajectories_are_dropped_and_the_best_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 6).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    assert_eq!(prune(&service.store, 1).await.unwrap(), 0, "it ended just now");
+    let mut kept = 0;
+    for trial in service.trials(study).await {
+        kept += u32::from(gaits::get(&mut service.store.read().await.unwrap(), trial.id).await.is_ok());
+    }
+    assert_eq!(kept, 6);
+    tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    assert_eq!(prune(&service.store, 0).await.unwrap(), 5);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn figures_for_prometheus_count_requests_by_route() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 2).await;
+    let study = service.study(|new| new.trial_budget = 2).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let text = service.fetch("/metrics").await.text;
+    assert!(text.contains("gaitwright_studies{state=\"finished\"} 1"), "{text}");
+    assert!(text.contains("gaitwright_workers 2"), "{text}");
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let value = line.rsplit(' ').next().unwrap();
+        assert!(value.parse::<f64>().is_ok(), "{line}");
+    }
+    assert_eq!(service.fetch("/ready").await.status, StatusCode::OK);
+    service.director.stop();
+    assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
+}
+
+fn gaitwright(folder: &Path, arguments: &[&str]) -> (bool, String) {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_gaitwright-cli")).args(arguments).current_dir(folder).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (output.status.success(), text)
+}
+
+#[tokio::test]
+async fn a_copy_is_restored_and_the_present_record_is_kept_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("gaitwright.db");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 4).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let before = service.fetch(&format!("/api/v1/studies/{study}/trials")).await.text;
+    let (done, text) = gaitwright(folder.path(), &["backup", "copy.db"]);
+    assert!(done, "{text}");
+    let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
+    assert!(!done && text.contains("in use by another gaitwright process"), "{text}");
+    let later = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(later, &[StudyState::Finished]).await;
+    service.stop().await;
+
+    let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
+    assert!(done, "{text}");
+    let kept = std::fs::read_dir(folder.path())
+        .unwrap()
+        .flatten()
+        .any(|file| file.file_name().to_string_lossy().contains("before-"));
+    assert!(kept, "the record that was replaced is kept");
+    let (done, text) = gaitwright(folder.path(), &["audit", "verify"]);
+    assert!(done && text.contains("whole"), "{text}");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    assert_eq!(service.fetch(&format!("/api/v1/studies/{study}/trials")).await.text, before);
+    assert_eq!(service.fetch(&format!("/api/v1/studies/{later}")).await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn settings_show_where_each_value_comes_from() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "idle_minutes = 15\n").unwrap();
+    let (done, text) = gaitwright(folder.path(), &["config", "show", "--workers", "3"]);
+    assert!(done, "{text}");
+    assert!(text.contains("idle_minutes = \"15\"  # file gaitwright.toml"), "{text}");
+    assert!(text.contains("workers = \"3\"  # flag"), "{text}");
+    assert!(text.contains("listen = \"127.0.0.1:8080\"  # default"), "{text}");
+    std::fs::write(folder.path().join("gaitwright.toml"), "colour = 3\n").unwrap();
+    let (done, text) = gaitwright(folder.path(), &["config", "show"]);
+    assert!(!done && text.contains("colour is not a setting"), "{text}");
+}

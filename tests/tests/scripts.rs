@@ -1,0 +1,200 @@
+//! Ask and tell, and the life of a study, through the REST interface.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode, header};
+use gaitwright::store::StudyId;
+use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 2).await;
+    (folder, service)
+}
+
+async fn script_study(service: &Service, trials: u32, parallel: u32) -> StudyId {
+    service
+        .study(|new| (new.evaluation, new.trial_budget, new.parallel_trials) = (Evaluation::Script, trials, parallel))
+        .await
+}
+
+/// What a script of a lab does: ask, measure, tell.
+async fn run(service: &Service, study: StudyId, worker: &str, trials: usize) -> Vec<(u64, f64)> {
+    let mut done = Vec::new();
+    for _ in 0..trials {
+        let asked = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({ "worker": worker })).await;
+        assert_eq!(asked.status, StatusCode::OK, "{}", asked.text);
+        let trial = asked.json();
+        let rmse = 0.1 + (trial["action"]["a5"].as_f64().unwrap() - 0.026).abs();
+        let told = json!({"outcome": "converged", "gait_rmse_rad": rmse});
+        let told = service.post(&format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap()), &told).await;
+        assert_eq!(told.status, StatusCode::OK, "{}", told.text);
+        assert_eq!(told.json()["state"], "converged");
+        done.push((trial["action_index"].as_u64().unwrap(), rmse));
+    }
+    done
+}
+
+#[tokio::test]
+async fn a_script_asks_and_tells_until_the_study_is_finished_and_twice_gives_the_same() {
+    let (_folder, service) = service().await;
+    let first = script_study(&service, 8, 1).await;
+    let done = run(&service, first, "rig", 8).await;
+    let finished = service.wait_for(first, &[StudyState::Finished]).await;
+    assert!(finished.state_reason.contains("all 8 trials"));
+    let feedback = service.feedback(first).await;
+    assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "convergence").count(), 8);
+    assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "gait_rmse").count(), 7);
+
+    let second = script_study(&service, 8, 1).await;
+    assert_eq!(run(&service, second, "rig", 8).await, done, "the same seed and results give the same suggestions");
+    let late = service.post(&format!("/api/v1/studies/{second}/ask"), &json!({})).await;
+    assert_eq!(late.status, StatusCode::CONFLICT, "{}", late.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_suggestion_is_sticky_and_each_worker_has_its_own() {
+    let (_folder, service) = service().await;
+    let study = script_study(&service, 10, 2).await;
+    let ask = format!("/api/v1/studies/{study}/ask");
+    let of = |worker: &str| json!({ "worker": worker });
+    let left = service.post(&ask, &of("left")).await.json();
+    assert_eq!(service.post(&ask, &of("left")).await.json(), left);
+    let right = service.post(&ask, &of("right")).await.json();
+    assert_ne!(right["id"], left["id"]);
+    assert_ne!(right["action_index"], left["action_index"]);
+    let third = service.post(&ask, &of("third")).await;
+    assert_eq!(third.status, StatusCode::CONFLICT, "{}", third.text);
+
+    let tell = format!("/api/v1/trials/{}/tell", left["id"].as_str().unwrap());
+    for (body, field) in [
+        (json!({"outcome": "not_converged"}), "reason"),
+        (json!({"outcome": "converged"}), "gait_rmse_rad"),
+        (json!({"outcome": "converged", "gait_rmse_rad": -1}), "gait_rmse_rad"),
+    ] {
+        let refused = service.post(&tell, &body).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+        assert_eq!(refused.json()["field"], field);
+    }
+    let told = json!({"outcome": "not_converged", "reason": "the foot scuffed"});
+    let told = service.post(&tell, &told).await.json();
+    assert_eq!((&told["state"], &told["message"]), (&json!("not_converged"), &json!("the foot scuffed")));
+    assert_eq!(
+        service.post(&tell, &json!({"outcome": "not_converged", "reason": "x"})).await.status,
+        StatusCode::CONFLICT
+    );
+    assert_ne!(service.post(&ask, &of("left")).await.json()["id"], left["id"]);
+
+    // What failed is cancelled, never told, and never reaches the learner.
+    let cancel = format!("/api/v1/trials/{}/cancel", right["id"].as_str().unwrap());
+    assert_eq!(service.post(&cancel, &json!({})).await.json()["state"], "cancelled");
+    assert_eq!(service.feedback(study).await.len(), 1);
+
+    let own = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    assert_eq!(service.post(&format!("/api/v1/studies/{own}/ask"), &json!({})).await.status, StatusCode::CONFLICT);
+    service.stop().await;
+}
+
+async fn send(service: &Service, method: Method, path: &str, tag: Option<&str>, body: &Value) -> Answer {
+    let mut request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, "application/json");
+    if let Some(tag) = tag {
+        request = request.header(header::IF_MATCH, tag);
+    }
+    service.send(request.body(Body::from(body.to_string())).unwrap()).await
+}
+
+#[tokio::test]
+async fn a_change_made_from_an_old_reading_is_refused() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.trial_budget, new.start) = (3, false)).await;
+    let path = format!("/api/v1/studies/{study}");
+    let tag = service.fetch(&path).await.headers["etag"].to_str().unwrap().to_owned();
+    let changed = send(&service, Method::PATCH, &path, Some(&tag), &json!({"priority": 3})).await;
+    assert_eq!((changed.status, &changed.json()["priority"]), (StatusCode::OK, &json!(3)));
+    let newer = changed.headers["etag"].to_str().unwrap().to_owned();
+    assert_ne!(newer, tag);
+    let stale = send(&service, Method::PATCH, &path, Some(&tag), &json!({"priority": 4})).await;
+    assert_eq!((stale.status, &stale.json()["type"]), (StatusCode::PRECONDITION_FAILED, &json!("/problems/changed")));
+    let stale = send(&service, Method::POST, &format!("{path}/start"), Some(&tag), &json!({})).await;
+    assert_eq!(stale.status, StatusCode::PRECONDITION_FAILED);
+    let bad = send(&service, Method::POST, &format!("{path}/start"), Some("seven"), &json!({})).await;
+    assert_eq!(bad.status, StatusCode::BAD_REQUEST);
+    assert_eq!(send(&service, Method::PATCH, &path, None, &json!({"priority": 11})).await.json()["field"], "priority");
+    let started = send(&service, Method::POST, &format!("{path}/start"), Some(&newer), &json!({"reason": "go"})).await;
+    assert_eq!((started.status, &started.json()["state_reason"]), (StatusCode::OK, &json!("go")));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_finished_study_is_extended_forked_and_compared() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let path = format!("/api/v1/studies/{study}");
+    let less = service.post(&format!("{path}/extend"), &json!({"trial_budget": 3})).await;
+    assert_eq!((less.status, &less.json()["allowed"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("4 to 10000")));
+    let more = service.post(&format!("{path}/extend"), &json!({"trial_budget": 5})).await;
+    assert_eq!((more.status, &more.json()["state"]), (StatusCode::OK, &json!("running")), "{}", more.text);
+    service.wait_for(study, &[StudyState::Finished]).await;
+    assert_eq!(service.trials(study).await.len(), 5);
+
+    let fork = service.post(&format!("{path}/fork"), &json!({"seed": 9, "start": true})).await;
+    assert_eq!(fork.status, StatusCode::CREATED, "{}", fork.text);
+    let fork = fork.json();
+    assert_eq!((&fork["forked_from"], &fork["seed"], &fork["trial_budget"]), (&json!(study), &json!(9), &json!(5)));
+    let forked: StudyId = fork["id"].as_str().unwrap().parse().unwrap();
+    service.wait_for(forked, &[StudyState::Finished]).await;
+    let both = service.fetch(&format!("/api/v1/compare?ids={study},{forked}")).await.json();
+    assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
+    assert!(both[0]["best_gait_rmse_rad"].is_f64());
+    assert_eq!(service.fetch(&format!("/api/v1/compare?ids={study}")).await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn time_and_a_settled_best_end_a_study() {
+    let (_folder, service) = service().await;
+    // Every analytic solve says that it took 0.01 s; a budget is at least one second.
+    let timed = service.study(|new| (new.trial_budget, new.solve_seconds_budget) = (400, Some(1.0))).await;
+    let settled = service.study(|new| (new.trial_budget, new.unchanged_limit) = (400, Some(6))).await;
+    let settled = service.wait_for(settled, &[StudyState::Finished]).await;
+    assert!(settled.state_reason.contains("stayed the same over 6 results"), "{}", settled.state_reason);
+    let timed = service.wait_for(timed, &[StudyState::Finished]).await;
+    assert!(timed.state_reason.contains("of 1 s"), "{}", timed.state_reason);
+    let trials = service.trials(timed.id).await.len();
+    assert!((100..=101).contains(&trials), "{trials}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn people_compare_what_a_script_walked() {
+    let (_folder, service) = service().await;
+    let study = service
+        .study(|new| {
+            (new.evaluation, new.feedback_mode, new.trial_budget) = (Evaluation::Script, FeedbackMode::Human, 4);
+        })
+        .await;
+    let ask = format!("/api/v1/studies/{study}/ask");
+    for _ in 0..2 {
+        let trial = service.post(&ask, &json!({})).await.json();
+        let tell = format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap());
+        assert_eq!(service.post(&tell, &json!({"outcome": "converged"})).await.status, StatusCode::OK);
+    }
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::CONFLICT, "first the answer");
+    let trials = service.trials(study).await;
+    let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "b", "author": "S01"});
+    assert_eq!(
+        service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await.status,
+        StatusCode::CREATED
+    );
+    service.wait_for(study, &[StudyState::Running]).await;
+    assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::OK);
+    service.stop().await;
+}

@@ -1,0 +1,106 @@
+//! `gaitwright serve` as a process: the sign-in link, HTTPS from files, the end.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright_tests::client::{get, send};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+/// A service as a process, killed when dropped.
+struct Process {
+    child: Child,
+    /// What it said until it was ready.
+    said: Vec<String>,
+    origin: String,
+}
+
+impl Process {
+    fn start(folder: &Path, arguments: &[&str], ready: &str) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--workers", "1"])
+            .args(arguments)
+            .current_dir(folder)
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut said = Vec::new();
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        while !said.last().is_some_and(|line: &String| line.contains(ready)) {
+            said.push(lines.next().expect("it ended before it was ready").unwrap());
+        }
+        // Whatever it says later must not fill the pipe.
+        std::thread::spawn(move || lines.for_each(drop));
+        let listening = said.iter().find(|line| line.contains("listening on ")).unwrap();
+        let origin = listening.split("listening on ").nth(1).unwrap().split_whitespace().next().unwrap().to_owned();
+        Self { child, said, origin }
+    }
+
+    fn address(&self) -> &str {
+        self.origin.split("://").nth(1).unwrap()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn the_first_start_prints_a_link_that_signs_in_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let process = Process::start(folder.path(), &[], "sign in");
+    let line = process.said.last().unwrap();
+    let path = line.split(process.address()).nth(1).unwrap().to_owned();
+    assert_eq!(get(process.address(), "/api/v1/studies").unwrap().status, 401);
+    assert_eq!(get(process.address(), "/health").unwrap().status, 200);
+    let first = send(process.address(), "POST", &path, "").unwrap();
+    assert_eq!(first.status, 303);
+    assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
+    let second = send(process.address(), "POST", &path, "").unwrap();
+    assert!(!second.head.to_lowercase().contains("set-cookie"), "{}", second.head);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_term_signal_ends_it_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    assert_eq!(get(process.address(), "/api/v1/studies").unwrap().status, 200);
+    let killed = Command::new("kill").args(["-TERM", &process.child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    assert!(process.child.wait().unwrap().success());
+    let log = folder.path().join("gaitwright.db-wal");
+    assert!(!log.exists(), "the write-ahead log is folded into the file");
+}
+
+#[test]
+fn it_speaks_https_with_a_certificate_from_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = Command::new("openssl")
+        .args(["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"])
+        .args(["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", "k.pem", "-out", "c.pem"])
+        .current_dir(folder.path())
+        .output();
+    let curl = Command::new("curl").arg("--version").output();
+    let (Ok(made), Ok(_)) = (made, curl) else {
+        println!("skipped: openssl and curl are needed");
+        return;
+    };
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let tls = ["--no-sign-in", "--tls-certificate", "c.pem", "--tls-key", "k.pem"];
+    let process = Process::start(folder.path(), &tls, "listening on ");
+    assert!(process.origin.starts_with("https://"), "{}", process.origin);
+    let answer = Command::new("curl")
+        .args(["--silent", "--show-error", "--include", "--cacert", "c.pem", &format!("{}/health", process.origin)])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&answer.stdout).to_lowercase();
+    assert!(text.contains("\"status\":\"ready\""), "{text} {}", String::from_utf8_lossy(&answer.stderr));
+    assert!(text.contains("strict-transport-security"), "{text}");
+    assert!(get(process.address(), "/health").is_err(), "plain HTTP is not answered");
+}

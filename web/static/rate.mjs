@@ -1,0 +1,87 @@
+// @ts-check
+// Two motions on one clock. Both have the same length, scale and colours; positions come from the server.
+
+/** @typedef {[number, number]} Place */
+
+const STRIDE_MS = 1400;
+const box = /** @type {HTMLElement | null} */ (document.querySelector("[data-pair]"));
+
+if (box) {
+  const state = /** @type {HTMLElement} */ (document.querySelector("[data-state]"));
+  const play = /** @type {HTMLButtonElement} */ (document.querySelector("[data-play]"));
+  const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-answer]"));
+  const save = /** @type {HTMLButtonElement} */ (form.querySelector("[type=submit]"));
+  const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
+  save.disabled = true;
+  let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let phase = 0;
+  let last = 0;
+
+  /** @param {string} side @returns {Promise<Place[][]>} */
+  const load = async (side) => {
+    const reply = await fetch(`/api/v1/blind/${box.dataset.pair}/${side}`);
+    if (!reply.ok) throw new Error(`${reply.status}`);
+    return reply.json();
+  };
+
+  /** @param {HTMLCanvasElement} canvas @param {Place[][]} motion */
+  const draw = (canvas, motion) => {
+    const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    const figure = motion[Math.min(Math.floor(phase * motion.length), motion.length - 1)];
+    const scale = canvas.height / 2.1;
+    const middle = figure[0][0];
+    /** @param {Place} place @returns {Place} */
+    const at = ([x, z]) => [canvas.width / 2 + (x - middle) * scale, canvas.height - 30 - z * scale];
+    /** @param {number[]} joints @param {number} width @param {number[]} dash */
+    const line = (joints, width, dash) => {
+      pen.lineWidth = width;
+      pen.setLineDash(dash);
+      pen.beginPath();
+      joints.forEach((joint, i) => (i ? pen.lineTo(...at(figure[joint])) : pen.moveTo(...at(figure[joint]))));
+      pen.stroke();
+    };
+    const colour = getComputedStyle(canvas).color;
+    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.strokeStyle = colour;
+    pen.lineCap = "round";
+    line([1, 0], 6, []);
+    line([0, 2, 3, 4, 5, 3], 4, []);
+    line([0, 6, 7, 8, 9, 7], 4, [9, 7]);
+    pen.setLineDash([]);
+    pen.lineWidth = 1;
+    pen.beginPath();
+    pen.moveTo(0, canvas.height - 30);
+    pen.lineTo(canvas.width, canvas.height - 30);
+    pen.stroke();
+  };
+
+  try {
+    const motions = await Promise.all(canvases.map((canvas) => load(String(canvas.dataset.side))));
+    const begun = performance.now();
+    const show = () => canvases.forEach((canvas, i) => draw(canvas, motions[i]));
+    /** @param {number} now */
+    const step = (now) => {
+      if (playing) phase = (phase + (now - last) / STRIDE_MS) % 1;
+      last = now;
+      show();
+      requestAnimationFrame(step);
+    };
+    last = begun;
+    requestAnimationFrame(step);
+    const label = () => (play.textContent = playing ? "Pause" : "Play");
+    label();
+    play.addEventListener("click", () => {
+      playing = !playing;
+      label();
+    });
+    form.addEventListener("submit", () => {
+      /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms")).value = String(
+        Math.round(performance.now() - begun),
+      );
+    });
+    save.disabled = false;
+    state.textContent = "";
+  } catch (error) {
+    state.textContent = "The gaits could not be loaded: reload the page before you answer.";
+  }
+}
