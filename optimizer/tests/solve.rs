@@ -49,7 +49,11 @@ fn bounds_that_leave_no_posture_are_tried_all_the_same() {
 
         let warm = solved(&problem(bounds), Some(&COLD.warm_start), 15).report;
         assert_ne!(warm.status, SolveStatus::Converged);
-        assert!(warm.attempts.iter().map(|a| a.strategy.as_str()).eq(["warm start", "cold, direct"]));
+        assert!(warm.attempts.iter().map(|a| a.strategy.as_str()).eq([
+            "warm start",
+            "cold, direct",
+            "cold, direct, early rise"
+        ]));
         assert_eq!(warm.attempts.iter().filter(|a| a.chosen).count(), 1);
         assert!(warm.max_violation <= cold.report.max_violation, "the better of the two is kept");
     }
