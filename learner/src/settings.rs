@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
+use crate::given::GivenSettings;
 use crate::likelihood::Interval;
 
 /// How the next action is chosen.
@@ -80,8 +81,11 @@ pub enum Partner {
 ///
 /// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors,
 /// except that it never repeats an action and compares each with the best so far.
+///
+/// In a document every field is optional: one that names a method has [`LearnerSettings::of`] that method in what it
+/// leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(from = "GivenSettings")]
 pub struct LearnerSettings {
     /// How the next action is chosen.
     pub method: Method,

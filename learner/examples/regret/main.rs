@@ -81,12 +81,13 @@ fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
         None => (options.method.as_str(), false),
     };
     let method = serde_json::from_value(name.into())?;
-    let settings = if published { LearnerSettings::published(method) } else { LearnerSettings::of(method) };
-    let serde_json::Value::Object(mut document) = serde_json::to_value(settings)? else {
-        return Err("settings are an object".into());
+    let mut document = if published {
+        serde_json::to_value(LearnerSettings::published(method))?
+    } else {
+        serde_json::json!({ "method": method })
     };
-    document.extend(options.set.clone());
-    Ok(serde_json::from_value(document.into())?)
+    document.as_object_mut().ok_or("settings are an object")?.extend(options.set.clone());
+    Ok(serde_json::from_value(document)?)
 }
 
 /// Somebody who knows the utility and answers with noise.

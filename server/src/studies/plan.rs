@@ -40,7 +40,7 @@ pub struct NewStudy {
     /// What is tuned; by default Table I.
     #[serde(default)]
     pub search_space: Option<SearchSpace>,
-    /// Settings of the learner.
+    /// Settings of the learner; what is left out is what is recommended for the method.
     #[serde(default)]
     pub learner: LearnerSettings,
     /// Who answers the comparisons.
