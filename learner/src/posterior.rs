@@ -274,6 +274,14 @@ impl Posterior {
         best.map(|(action, _)| action)
     }
 
+    /// Where labels are separate and of two actions only one is in the lowest category: the other one. Its comparison
+    /// is decided by the labels, whatever the utility.
+    pub(crate) fn decided_by_labels(&self, a: ActionIndex, b: ActionIndex) -> Option<ActionIndex> {
+        let fails = |action| self.infeasible.contains(&action);
+        let decided = self.feasibility.is_some() && fails(a) != fails(b);
+        decided.then(|| if fails(a) { b } else { a })
+    }
+
     /// Answers given, in order.
     pub(crate) fn feedback(&self) -> &[Feedback] {
         &self.feedback
