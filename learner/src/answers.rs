@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::acquisition::thompson;
+use crate::belief::Belief;
 use crate::error::{LearnerError, Result};
 use crate::feedback::Feedback;
 use crate::grid::Grid;
@@ -56,7 +57,8 @@ pub struct Agreement {
     pub comparisons_agreeing: usize,
     /// Labels given.
     pub labels: usize,
-    /// Of these, the ones in whose category the posterior mean lies.
+    /// Of these, the ones in whose category the posterior mean lies (of the lowest category and the grades above it,
+    /// where labels are separate).
     pub labels_agreeing: usize,
     /// Ties given.
     pub ties: usize,
@@ -82,12 +84,24 @@ impl Posterior {
     /// When the action is not in the space.
     pub fn category_probabilities(&self, action: ActionIndex) -> Result<Vec<f64>> {
         self.space().check(action)?;
-        let belief = self.feasibility.as_ref().unwrap_or(&self.utility);
-        let view = belief.view(action, self.space().levels(action));
-        let variance = belief.variance(&view);
-        Ok((0..self.settings().categories())
-            .map(|category| self.probability(self.settings().label_interval(category), view.mean, variance))
-            .collect())
+        let settings = self.settings();
+        let moments = |belief: &Belief| {
+            let view = belief.view(action, self.space().levels(action));
+            (view.mean, belief.variance(&view))
+        };
+        let (mean, variance) = moments(&self.utility);
+        let Some(feasibility) = &self.feasibility else {
+            let of = |category| self.probability(settings.label_interval(category), mean, variance);
+            return Ok((0..settings.categories()).map(of).collect());
+        };
+        let (feasibility_mean, feasibility_variance) = moments(feasibility);
+        let of = |category| {
+            let interval = settings.feasibility_interval(category);
+            let grade = settings.grade_interval(category);
+            self.probability(interval, feasibility_mean, feasibility_variance)
+                * grade.map_or(1.0, |interval| self.probability(interval, mean, variance))
+        };
+        Ok((0..settings.categories()).map(of).collect())
     }
 
     /// Probability that an action's label is not the lowest category: that it converges.
@@ -242,11 +256,19 @@ impl Posterior {
                     agreement.ties_agreeing += usize::from(alike && self.decided_by_labels(a, b).is_none());
                 }
                 Feedback::Label { action, category } => {
-                    let belief = self.feasibility.as_ref().unwrap_or(&self.utility);
-                    let at = belief.mean(action, &self.space().levels(action));
-                    let interval = self.settings().label_interval(category);
+                    let settings = self.settings();
+                    let within = |at: f64, interval: Interval| at >= interval.low && at <= interval.high;
+                    let agrees = match &self.feasibility {
+                        None => within(mean(action), settings.label_interval(category)),
+                        Some(belief) => {
+                            let at = belief.mean(action, &self.space().levels(action));
+                            let grade = settings.grade_interval(category);
+                            within(at, settings.feasibility_interval(category))
+                                && grade.is_none_or(|interval| within(mean(action), interval))
+                        }
+                    };
                     agreement.labels += 1;
-                    agreement.labels_agreeing += usize::from(at >= interval.low && at <= interval.high);
+                    agreement.labels_agreeing += usize::from(agrees);
                 }
             }
         }
@@ -403,5 +425,34 @@ mod tests {
         assert_eq!(p.to_bits(), unlabelled.preference_probability(other, converges).unwrap().to_bits());
         let both = FeedbackLog { feedback: [&compared.feedback[..], &labels].concat(), ..compared };
         assert!(posterior(&space, &both, &settings).unwrap().preference_probability(other, converges).unwrap() > 0.7);
+    }
+
+    #[test]
+    fn grades_above_the_lowest_category_reach_the_utility() {
+        let dimension = Dimension { name: "x".into(), values: (0..9).map(f64::from).collect(), lengthscale: 1.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let actions = [0, 2, 4, 6, 8].map(ActionIndex);
+        let feedback = actions
+            .iter()
+            .zip([1, 2, 3, 4, 2])
+            .map(|(&action, category)| Feedback::Label { action, category })
+            .collect();
+        let log = FeedbackLog { visited: actions.to_vec(), feedback };
+        for labels in [Labels::InUtility, Labels::Separate] {
+            for method in [Method::LineCoSpar, Method::Eubo] {
+                let ordinal_thresholds = vec![-0.5, -0.1, 0.3, 0.7];
+                let settings = LearnerSettings { labels, ordinal_thresholds, ..LearnerSettings::of(method) };
+                let belief = posterior(&space, &log, &settings).unwrap();
+                assert_eq!(belief.best(), Some(ActionIndex(6)), "{settings:?}");
+                let agreement = belief.agreement();
+                assert_eq!((agreement.labels, agreement.labels_agreeing), (5, 5), "{settings:?}");
+                let categories = belief.category_probabilities(ActionIndex(6)).unwrap();
+                assert!((categories.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+                assert_eq!(argmax(&categories), 4, "{categories:?}");
+                let p = belief.preference_probability(ActionIndex(6), ActionIndex(0)).unwrap();
+                // Laplace is cautious about whether either converges.
+                assert!(p > 0.7, "{p} {settings:?}");
+            }
+        }
     }
 }

@@ -50,8 +50,9 @@ pub enum Link {
 pub enum Labels {
     /// Labels are about the utility itself, as in the literature.
     InUtility,
-    /// Labels are about a second function of the action; a comparison that the labels alone decide (one action in
-    /// the lowest category, the other not) says nothing more about the utility.
+    /// Whether a label is the lowest category is about a second function of the action; the grades above it, where
+    /// there are several, are about the utility. A comparison that the labels alone decide (one action in the lowest
+    /// category, the other not) says nothing more about the utility.
     Separate,
 }
 
@@ -219,6 +220,24 @@ impl LearnerSettings {
         let bounds = &self.ordinal_thresholds;
         let low = category.checked_sub(1).and_then(|below| bounds.get(below)).copied().unwrap_or(f64::NEG_INFINITY);
         Interval { low, high: bounds.get(category).copied().unwrap_or(f64::INFINITY), noise: self.ordinal_noise }
+    }
+
+    /// Where labels are separate, what a category says of feasibility: below the lowest threshold or above it.
+    pub(crate) fn feasibility_interval(&self, category: usize) -> Interval {
+        let lowest = self.label_interval(0);
+        if category == 0 { lowest } else { Interval { low: lowest.high, high: f64::INFINITY, ..lowest } }
+    }
+
+    /// Where labels are separate, what a category says of the utility: of several grades above the lowest category,
+    /// which one. None where it says nothing.
+    pub(crate) fn grade_interval(&self, category: usize) -> Option<Interval> {
+        let interval = self.label_interval(category);
+        match category {
+            0 => None,
+            _ if self.categories() < 3 => None,
+            1 => Some(Interval { low: f64::NEG_INFINITY, ..interval }),
+            _ => Some(interval),
+        }
     }
 
     /// Number of categories of labels.

@@ -254,6 +254,16 @@ fn any_feedback(actions: u64, categories: usize) -> impl Strategy<Value = Feedba
     ]
 }
 
+/// The same log with the categories that there are.
+fn with_categories_of(settings: &LearnerSettings, mut feedback: Vec<Feedback>) -> Vec<Feedback> {
+    for feedback in &mut feedback {
+        if let Feedback::Label { category, .. } = feedback {
+            *category %= settings.categories();
+        }
+    }
+    feedback
+}
+
 fn any_settings() -> impl Strategy<Value = LearnerSettings> {
     let all = all_settings();
     ((0..all.len()), 1e-3..2.0_f64, 1e-3..2.0_f64, 0.3..4.0_f64, any::<bool>(), 1_usize..4).prop_map(
@@ -274,10 +284,11 @@ proptest! {
     #[test]
     fn any_log_gives_a_finite_belief_and_a_proposal(
         settings in any_settings(),
-        feedback in prop::collection::vec(any_feedback(36, 2), 0..60),
+        feedback in prop::collection::vec(any_feedback(36, 5), 0..60),
         visited in prop::collection::vec(0_u64..36, 0..40),
     ) {
         let space = space(&[3, 4, 3]);
+        let feedback = with_categories_of(&settings, feedback);
         let log = FeedbackLog { visited: visited.into_iter().map(ActionIndex).collect(), feedback };
         exercise(&space, &log, &settings);
         if let Ok(batch) = propose_batch(&space, &log, &[], &settings, 1) {
@@ -290,12 +301,12 @@ proptest! {
     fn spaces_of_any_shape_and_no_or_few_actions(
         settings in any_settings(),
         shape in prop::collection::vec(1_usize..4, 1..6),
-        feedback in prop::collection::vec(any_feedback(1 << 20, 2), 0..20),
+        feedback in prop::collection::vec(any_feedback(1 << 20, 5), 0..20),
         visited in prop::collection::vec(any::<u64>(), 0..12),
     ) {
         let space = space(&shape);
         let within = |action: ActionIndex| ActionIndex(action.0 % space.len());
-        let feedback = feedback
+        let feedback = with_categories_of(&settings, feedback)
             .into_iter()
             .map(|feedback| match feedback {
                 Feedback::Preference { winner, loser } => {
@@ -321,10 +332,11 @@ proptest! {
     #[test]
     fn the_cache_never_changes_a_bit(
         settings in any_settings(),
-        feedback in prop::collection::vec(any_feedback(36, 2), 1..40),
+        feedback in prop::collection::vec(any_feedback(36, 5), 1..40),
         stops in prop::collection::vec(0_usize..40, 1..6),
     ) {
         let space = space(&[3, 4, 3]);
+        let feedback = with_categories_of(&settings, feedback);
         let log_to = |end: usize| {
             let feedback = feedback[..end.min(feedback.len())].to_vec();
             let visited = (0..feedback.len() as u64).map(|i| ActionIndex(i * 7 % 36)).collect();
