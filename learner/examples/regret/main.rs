@@ -10,7 +10,7 @@
 //! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having
 //! been answered (`k + 1` actions tried), and prints the quartiles. `--noise S` answers with logistic noise of scale
 //! `S` on the utility. `--batch N` proposes `N` actions before the first of them is answered. `--set` changes settings
-//! of the method. Regret is 1 minus the utility of the recommended action.
+//! of the method. Regret is 1 minus the utility of the recommended action. `--seeds A..B` does not include `B`.
 //!
 //! `--summarise` reads such files: medians with bootstrap intervals and quartiles, and, of every further file against
 //! the first, how many seeds were better and worse with the p-values of the paired sign test and of Wilcoxon's.
@@ -40,6 +40,14 @@ struct Options {
     out: Option<String>,
 }
 
+/// A finite number that is not below the least one that makes sense.
+fn number(name: &str, value: &str, least: f64) -> Result<f64, String> {
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= least => Ok(number),
+        _ => Err(format!("{name} needs a number of at least {least}, not {value}")),
+    }
+}
+
 fn options() -> Result<Options, Box<dyn Error>> {
     let mut options = Options {
         problem: "table1".into(),
@@ -60,11 +68,14 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--seeds" => {
                 let (from, to) = value.split_once("..").ok_or("--seeds needs A..B")?;
                 options.seeds = from.parse()?..to.parse()?;
+                if options.seeds.is_empty() {
+                    return Err(format!("--seeds {value} holds no seed: B is the first one left out").into());
+                }
             }
             "--method" => options.method = value,
             "--comparisons" => options.comparisons = value.parse()?,
-            "--noise" => options.noise = value.parse()?,
-            "--lengthscale" => options.lengthscale = Some(value.parse()?),
+            "--noise" => options.noise = number(&name, &value, 0.0)?,
+            "--lengthscale" => options.lengthscale = Some(number(&name, &value, 1e-6)?),
             "--batch" => options.batch = value.parse::<usize>()?.max(1),
             "--set" => options.set = serde_json::from_str(&value)?,
             "--out" => options.out = Some(value),
