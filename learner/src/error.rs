@@ -85,7 +85,7 @@ pub enum LearnerError {
         /// What is wrong with it.
         reason: String,
     },
-    /// Every action has been visited or is pending.
+    /// Every action has been visited or is pending; where actions may be repeated, every one is pending.
     #[error("all {actions} actions have been visited or are pending")]
     Exhausted {
         /// Number of actions in the space.

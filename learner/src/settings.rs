@@ -137,7 +137,8 @@ pub struct LearnerSettings {
     pub avoidance: Option<f64>,
     /// Number `n` of actions proposed at a time.
     pub samples_per_iteration: usize,
-    /// Whether LineCoSpar may propose again an action that was tried before the buffered ones, as published.
+    /// Whether LineCoSpar may propose an action again, as published: rather one that is not among the buffered ones,
+    /// but where everything was tried it repeats instead of ending. The other methods never repeat.
     pub repeats: bool,
     /// Number of random lines through the best action on which EUBO looks; 0 looks at the whole grid.
     pub lines: usize,

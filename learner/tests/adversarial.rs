@@ -1,5 +1,5 @@
 //! Data that no reasonable study produces, and must not break one: whatever the log, there is a finite belief and an
-//! untried action to propose, and the same twice.
+//! action to propose, untried unless repeats are allowed, and the same twice.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
@@ -63,7 +63,10 @@ fn exercise(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) 
             assert!(settings.repeats || !tried.contains(&proposal.action), "{settings:?}");
             assert_eq!(propose(space, log, &[], settings, 3).unwrap(), proposal);
         }
-        Err(LearnerError::Exhausted { .. }) => assert_eq!(tried.len() as u64, space.len()),
+        Err(LearnerError::Exhausted { .. }) => {
+            assert_eq!(tried.len() as u64, space.len());
+            assert!(!(settings.repeats && settings.method == Method::LineCoSpar), "must repeat");
+        }
         Err(error) => panic!("{error} {settings:?}"),
     }
 }
