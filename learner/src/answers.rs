@@ -374,7 +374,12 @@ mod tests {
                 let slice = belief.slice(2, 0, a).unwrap();
                 assert_eq!((slice.predictions.len(), slice.predictions[0].len()), (4, 2));
                 assert_eq!(slice.predictions[0][0], belief.predict(a).unwrap());
-                assert!(belief.slice(1, 1, a).is_err() && belief.marginal(3).is_err());
+                assert!(belief.slice(1, 1, a).is_err());
+                for dimension in [3, usize::MAX] {
+                    let unknown = Err(LearnerError::UnknownDimension { dimension, dimensions: 3 });
+                    assert_eq!(belief.marginal(dimension), unknown);
+                    assert!(belief.slice(0, dimension, a).is_err());
+                }
             }
         }
     }

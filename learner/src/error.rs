@@ -39,6 +39,14 @@ pub enum LearnerError {
         /// Number of dimensions of the space.
         expected: usize,
     },
+    /// A dimension's number beyond the last dimension.
+    #[error("dimension {dimension} does not exist, there are {dimensions} (counted from 0)")]
+    UnknownDimension {
+        /// The number given, counted from 0.
+        dimension: usize,
+        /// Number of dimensions of the space.
+        dimensions: usize,
+    },
     /// A level number beyond a dimension's last level.
     #[error("dimension `{dimension}` has {levels} levels, level {level} does not exist")]
     UnknownLevel {

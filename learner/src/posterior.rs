@@ -292,10 +292,10 @@ impl Posterior {
 
     /// A dimension of the space by its number.
     pub(crate) fn dimension(&self, dimension: usize) -> Result<&Dimension> {
-        self.space.dimensions().get(dimension).ok_or_else(|| LearnerError::WrongDimensionCount {
-            given: dimension + 1,
-            expected: self.space.dimensions().len(),
-        })
+        self.space
+            .dimensions()
+            .get(dimension)
+            .ok_or_else(|| LearnerError::UnknownDimension { dimension, dimensions: self.space.dimensions().len() })
     }
 
     /// What joint draws of the utilities of a few distinct actions need.
