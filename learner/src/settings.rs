@@ -70,7 +70,8 @@ pub enum Start {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Partner {
-    /// The last ones tried, as many as the buffer holds: what a person on the device remembers.
+    /// As published: the others of the same batch, and of those before it the last ones tried, as many as the buffer
+    /// holds: what a person on the device remembers.
     Previous,
     /// The best one so far.
     Incumbent,
@@ -135,7 +136,7 @@ pub struct LearnerSettings {
     /// threshold are not proposed while others are left (ROIAL uses -0.45). Mean and deviation are those of the
     /// function that labels are about. It binds every method but `random`. None: nothing is avoided.
     pub avoidance: Option<f64>,
-    /// Number `n` of actions proposed at a time.
+    /// Number `n` of actions proposed at a time: one batch.
     pub samples_per_iteration: usize,
     /// Whether LineCoSpar may propose an action again, as published: rather one that is not among the buffered ones,
     /// but where everything was tried it repeats instead of ending. The other methods never repeat.
@@ -146,7 +147,8 @@ pub struct LearnerSettings {
     pub line_trials: usize,
     /// Which earlier actions a new one is compared with.
     pub partner: Partner,
-    /// Number `b` of earlier actions with which a new one is compared.
+    /// Number `b` of actions tried before a batch with which each of the batch is compared where the partner is
+    /// `previous`. The other partners do not use it.
     pub buffer: usize,
 }
 
