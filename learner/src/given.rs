@@ -109,4 +109,17 @@ mod tests {
             assert_eq!(serde_json::to_string(&read(&text)).unwrap(), text);
         }
     }
+
+    #[test]
+    fn a_complete_document_means_what_it_says_whatever_is_recommended_now() {
+        // As studies have stored it.
+        let stored = r#"{"method":"eubo","inference":"laplace","link":"logistic","signal_variance":1.0,"nugget":1e-5,
+            "lengthscale_factor":1.0,"additive_share":0.0,"pairwise_share":0.0,"broad_lengthscale":1.0,
+            "labels":"in_utility","feasibility_lengthscale_factor":1.0,"feasibility_additive_share":0.0,
+            "start":"random","preference_noise":0.02,"ordinal_noise":0.1,"ordinal_thresholds":[0.0],
+            "coactive_noise":0.02,"tie_noise":0.02,"tie_width":0.02,"learn_every":null,"avoidance":null,
+            "samples_per_iteration":1,"repeats":false,"lines":0,"line_trials":18446744073709551615,
+            "partner":"incumbent","buffer":1}"#;
+        assert_eq!(read(stored), LearnerSettings { method: Method::Eubo, ..LearnerSettings::of(Method::LineCoSpar) });
+    }
 }
