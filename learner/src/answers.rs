@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::acquisition::thompson;
+use crate::belief::Belief;
 use crate::error::{LearnerError, Result};
 use crate::feedback::Feedback;
 use crate::grid::Grid;
@@ -51,15 +52,17 @@ pub struct BestProbability {
 pub struct Agreement {
     /// Preferences and suggestions given.
     pub comparisons: usize,
-    /// Of these, the ones that the posterior means order the same way.
+    /// Of these, the ones that the posterior means order the same way, or, where labels are separate and say that one
+    /// of the two converges and the other does not, that prefer the one that does.
     pub comparisons_agreeing: usize,
     /// Labels given.
     pub labels: usize,
-    /// Of these, the ones in whose category the posterior mean lies.
+    /// Of these, the ones in whose category the posterior mean lies (of the lowest category and the grades above it,
+    /// where labels are separate).
     pub labels_agreeing: usize,
     /// Ties given.
     pub ties: usize,
-    /// Of these, the ones whose posterior means are closer than the tie width.
+    /// Of these, the ones whose posterior means are closer than the tie width, and that separate labels do not decide.
     pub ties_agreeing: usize,
 }
 
@@ -81,12 +84,24 @@ impl Posterior {
     /// When the action is not in the space.
     pub fn category_probabilities(&self, action: ActionIndex) -> Result<Vec<f64>> {
         self.space().check(action)?;
-        let belief = self.feasibility.as_ref().unwrap_or(&self.utility);
-        let view = belief.view(action, self.space().levels(action));
-        let variance = belief.variance(&view);
-        Ok((0..self.settings().categories())
-            .map(|category| self.probability(self.settings().label_interval(category), view.mean, variance))
-            .collect())
+        let settings = self.settings();
+        let moments = |belief: &Belief| {
+            let view = belief.view(action, self.space().levels(action));
+            (view.mean, belief.variance(&view))
+        };
+        let (mean, variance) = moments(&self.utility);
+        let Some(feasibility) = &self.feasibility else {
+            let of = |category| self.probability(settings.label_interval(category), mean, variance);
+            return Ok((0..settings.categories()).map(of).collect());
+        };
+        let (feasibility_mean, feasibility_variance) = moments(feasibility);
+        let of = |category| {
+            let interval = settings.feasibility_interval(category);
+            let grade = settings.grade_interval(category);
+            self.probability(interval, feasibility_mean, feasibility_variance)
+                * grade.map_or(1.0, |interval| self.probability(interval, mean, variance))
+        };
+        Ok((0..settings.categories()).map(of).collect())
     }
 
     /// Probability that an action's label is not the lowest category: that it converges.
@@ -100,6 +115,10 @@ impl Posterior {
 
     /// Probability that `a` is preferred to `b` when asked.
     ///
+    /// Where labels are separate and any was given, an action that converges is preferred to one that does not, neither
+    /// of two that do not, and the utility speaks of two that do; whether one converges is taken as independent of
+    /// whether the other does.
+    ///
     /// # Errors
     /// When an action is not in the space.
     pub fn preference_probability(&self, a: ActionIndex, b: ActionIndex) -> Result<f64> {
@@ -111,7 +130,13 @@ impl Posterior {
         let view = |action| self.utility.view(action, self.space().levels(action));
         let (mean, variance) = self.utility.difference(&view(a), &view(b));
         let better = Interval { low: 0.0, high: f64::INFINITY, noise: self.preference_noise };
-        Ok(self.probability(better, mean, variance))
+        let by_utility = self.probability(better, mean, variance);
+        let labelled = self.feasibility.as_ref().is_some_and(|belief| !belief.model().sites.is_empty());
+        if !labelled {
+            return Ok(by_utility);
+        }
+        let (of_a, of_b) = (self.probability_of_converging(a)?, self.probability_of_converging(b)?);
+        Ok(of_a * (1.0 - of_b) + of_a * of_b * by_utility + 0.5 * (1.0 - of_a) * (1.0 - of_b))
     }
 
     /// For every action tried, the share of joint draws in which it is the best of them, the most likely first.
@@ -219,18 +244,31 @@ impl Posterior {
             match feedback {
                 Feedback::Preference { winner, loser } | Feedback::Suggestion { suggested: winner, over: loser } => {
                     agreement.comparisons += 1;
-                    agreement.comparisons_agreeing += usize::from(mean(winner) > mean(loser));
+                    let agrees = match self.decided_by_labels(winner, loser) {
+                        Some(converges) => converges == winner,
+                        None => mean(winner) > mean(loser),
+                    };
+                    agreement.comparisons_agreeing += usize::from(agrees);
                 }
                 Feedback::Tie { a, b } => {
                     agreement.ties += 1;
-                    agreement.ties_agreeing += usize::from((mean(a) - mean(b)).abs() <= self.settings().tie_width);
+                    let alike = (mean(a) - mean(b)).abs() <= self.settings().tie_width;
+                    agreement.ties_agreeing += usize::from(alike && self.decided_by_labels(a, b).is_none());
                 }
                 Feedback::Label { action, category } => {
-                    let belief = self.feasibility.as_ref().unwrap_or(&self.utility);
-                    let at = belief.mean(action, &self.space().levels(action));
-                    let interval = self.settings().label_interval(category);
+                    let settings = self.settings();
+                    let within = |at: f64, interval: Interval| at >= interval.low && at <= interval.high;
+                    let agrees = match &self.feasibility {
+                        None => within(mean(action), settings.label_interval(category)),
+                        Some(belief) => {
+                            let at = belief.mean(action, &self.space().levels(action));
+                            let grade = settings.grade_interval(category);
+                            within(at, settings.feasibility_interval(category))
+                                && grade.is_none_or(|interval| within(mean(action), interval))
+                        }
+                    };
                     agreement.labels += 1;
-                    agreement.labels_agreeing += usize::from(at >= interval.low && at <= interval.high);
+                    agreement.labels_agreeing += usize::from(agrees);
                 }
             }
         }
@@ -336,7 +374,89 @@ mod tests {
                 let slice = belief.slice(2, 0, a).unwrap();
                 assert_eq!((slice.predictions.len(), slice.predictions[0].len()), (4, 2));
                 assert_eq!(slice.predictions[0][0], belief.predict(a).unwrap());
-                assert!(belief.slice(1, 1, a).is_err() && belief.marginal(3).is_err());
+                assert!(belief.slice(1, 1, a).is_err());
+                for dimension in [3, usize::MAX] {
+                    let unknown = Err(LearnerError::UnknownDimension { dimension, dimensions: 3 });
+                    assert_eq!(belief.marginal(dimension), unknown);
+                    assert!(belief.slice(0, dimension, a).is_err());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn separate_labels_speak_where_they_decide_a_comparison() {
+        let dimension = Dimension { name: "x".into(), values: (0..9).map(f64::from).collect(), lengthscale: 1.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let [fails, far, other, converges] = [0, 1, 4, 8].map(ActionIndex);
+        let mut log = FeedbackLog {
+            visited: vec![fails, converges],
+            feedback: vec![
+                Feedback::Label { action: fails, category: 0 },
+                Feedback::Label { action: converges, category: 1 },
+                Feedback::Preference { winner: converges, loser: fails },
+            ],
+        };
+        let settings = LearnerSettings::of(Method::Eubo);
+        let belief = posterior(&space, &log, &settings).unwrap();
+        assert!(belief.preference_probability(converges, fails).unwrap() > 0.7);
+        assert_eq!((belief.agreement().comparisons, belief.agreement().comparisons_agreeing), (1, 1));
+        // Answers against the labels, and two that both fail.
+        log.feedback.extend([
+            Feedback::Preference { winner: fails, loser: converges },
+            Feedback::Tie { a: fails, b: converges },
+            Feedback::Label { action: far, category: 0 },
+        ]);
+        for _ in 0..5 {
+            for action in [fails, far] {
+                log.feedback.push(Feedback::Label { action, category: 0 });
+            }
+        }
+        let belief = posterior(&space, &log, &settings).unwrap();
+        let agreement = belief.agreement();
+        assert_eq!((agreement.comparisons, agreement.comparisons_agreeing, agreement.ties_agreeing), (2, 1, 0));
+        let p = belief.preference_probability(fails, far).unwrap();
+        assert!((p - 0.5).abs() < 0.1, "{p}");
+        // Without a label, and where both converge, the utility alone speaks.
+        let compared = FeedbackLog {
+            visited: vec![other, converges],
+            feedback: vec![Feedback::Preference { winner: other, loser: converges }; 3],
+        };
+        let belief = posterior(&space, &compared, &settings).unwrap();
+        let labels = [other, converges].map(|action| Feedback::Label { action, category: 1 });
+        let in_utility = LearnerSettings { labels: Labels::InUtility, ..settings.clone() };
+        let unlabelled = posterior(&space, &compared, &in_utility).unwrap();
+        let p = belief.preference_probability(other, converges).unwrap();
+        assert_eq!(p.to_bits(), unlabelled.preference_probability(other, converges).unwrap().to_bits());
+        let both = FeedbackLog { feedback: [&compared.feedback[..], &labels].concat(), ..compared };
+        assert!(posterior(&space, &both, &settings).unwrap().preference_probability(other, converges).unwrap() > 0.7);
+    }
+
+    #[test]
+    fn grades_above_the_lowest_category_reach_the_utility() {
+        let dimension = Dimension { name: "x".into(), values: (0..9).map(f64::from).collect(), lengthscale: 1.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let actions = [0, 2, 4, 6, 8].map(ActionIndex);
+        let feedback = actions
+            .iter()
+            .zip([1, 2, 3, 4, 2])
+            .map(|(&action, category)| Feedback::Label { action, category })
+            .collect();
+        let log = FeedbackLog { visited: actions.to_vec(), feedback };
+        for labels in [Labels::InUtility, Labels::Separate] {
+            for method in [Method::LineCoSpar, Method::Eubo] {
+                let ordinal_thresholds = vec![-0.5, -0.1, 0.3, 0.7];
+                let settings = LearnerSettings { labels, ordinal_thresholds, ..LearnerSettings::of(method) };
+                let belief = posterior(&space, &log, &settings).unwrap();
+                assert_eq!(belief.best(), Some(ActionIndex(6)), "{settings:?}");
+                let agreement = belief.agreement();
+                assert_eq!((agreement.labels, agreement.labels_agreeing), (5, 5), "{settings:?}");
+                let categories = belief.category_probabilities(ActionIndex(6)).unwrap();
+                assert!((categories.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+                assert_eq!(argmax(&categories), 4, "{categories:?}");
+                let p = belief.preference_probability(ActionIndex(6), ActionIndex(0)).unwrap();
+                // Laplace is cautious about whether either converges.
+                assert!(p > 0.7, "{p} {settings:?}");
             }
         }
     }

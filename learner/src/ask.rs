@@ -13,7 +13,7 @@ use crate::space::{ActionIndex, SearchSpace};
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum QuestionReason {
-    /// The other action is one of the last tried.
+    /// The other action is one of the last tried, or of the same batch.
     Previous,
     /// The other action is the best so far.
     Incumbent,
@@ -32,9 +32,11 @@ pub struct Question {
     pub reason: QuestionReason,
 }
 
-/// The earlier actions with which a newly tried one should be compared, most informative first.
+/// The earlier actions with which a newly tried one should be compared, the latest first.
 ///
-/// LineCoSpar compares with the last `buffer` actions tried before it, the other methods with the best one.
+/// As the settings' partner says: the best one, every one, or, as published, those of the same batch and the last
+/// `buffer` ones before that batch. Batches are counted in the log: each `samples_per_iteration` trials are one. Asked
+/// after each of them, this compares every pair in a batch and each of its actions with the buffered ones.
 ///
 /// # Errors
 /// When a setting is out of range or the log does not fit the space.
@@ -45,6 +47,15 @@ pub fn comparisons_to_ask(
     settings: &LearnerSettings,
 ) -> Result<Vec<Question>> {
     Learner::default().comparisons_to_ask(space, log, action, settings)
+}
+
+/// Earlier actions to compare with.
+struct Partners {
+    which: Partner,
+    /// Of the previous ones, how many before the batch.
+    buffer: usize,
+    /// How many trials are one batch.
+    batch: usize,
 }
 
 impl Learner {
@@ -59,7 +70,8 @@ impl Learner {
         action: ActionIndex,
         settings: &LearnerSettings,
     ) -> Result<Vec<Question>> {
-        self.questions(space, log, action, settings, (settings.partner, settings.buffer))
+        let of = Partners { which: settings.partner, buffer: settings.buffer, batch: settings.samples_per_iteration };
+        self.questions(space, log, action, settings, &of)
     }
 
     /// The comparisons with a kind of partners, whatever the settings say of these: no belief depends on that.
@@ -69,7 +81,7 @@ impl Learner {
         log: &FeedbackLog,
         action: ActionIndex,
         settings: &LearnerSettings,
-        (partner, buffer): (Partner, usize),
+        of: &Partners,
     ) -> Result<Vec<Question>> {
         space.check(action)?;
         settings.validate()?;
@@ -87,9 +99,14 @@ impl Learner {
                 questions.push(Question { action, against, reason });
             }
         };
-        match partner {
+        match of.which {
             Partner::Previous => {
-                earlier.iter().rev().take(buffer).for_each(|&a| add(a, QuestionReason::Previous));
+                let of_the_batch = end % of.batch.max(1);
+                earlier
+                    .iter()
+                    .rev()
+                    .take(of_the_batch.saturating_add(of.buffer))
+                    .for_each(|&a| add(a, QuestionReason::Previous));
             }
             Partner::Every => earlier.iter().rev().for_each(|&a| add(a, QuestionReason::Previous)),
             Partner::Incumbent if earlier.is_empty() => {}
@@ -143,8 +160,8 @@ impl Learner {
             })
             .collect();
         let mut questions = self.comparisons_to_ask(space, log, last, settings)?;
-        for partner in [Partner::Previous, Partner::Incumbent] {
-            questions.extend(self.questions(space, log, last, settings, (partner, 1))?);
+        for which in [Partner::Previous, Partner::Incumbent] {
+            questions.extend(self.questions(space, log, last, settings, &Partners { which, buffer: 1, batch: 1 })?);
         }
         if let Some(open) = questions.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
             return Ok(Some(open));
@@ -162,6 +179,7 @@ impl Learner {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Method;
     use crate::space::Dimension;
 
     #[test]
@@ -188,5 +206,35 @@ mod tests {
         assert_eq!(reasons[0], QuestionReason::Incumbent);
         assert!(reasons.contains(&QuestionReason::Previous));
         assert_eq!(reasons.iter().filter(|r| **r == QuestionReason::Consistency).count(), 1, "{reasons:?}");
+    }
+
+    #[test]
+    fn batches_are_compared_as_published() {
+        let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let tried: Vec<ActionIndex> = (0..9).map(|i| ActionIndex(29 - 3 * i)).collect();
+        let published = LearnerSettings::published(Method::LineCoSpar);
+        for (n, b) in [(1, 1), (1, 2), (3, 0), (3, 1), (3, 2), (4, 1)] {
+            let settings = LearnerSettings { samples_per_iteration: n, buffer: b, ..published.clone() };
+            let mut asked = Vec::new();
+            for (end, &action) in tried.iter().enumerate() {
+                let log = FeedbackLog { visited: tried[..end].to_vec(), feedback: Vec::new() };
+                let questions = comparisons_to_ask(&space, &log, action, &settings).unwrap();
+                // The same when the trial is already in the log.
+                let after = FeedbackLog { visited: tried[..=end].to_vec(), feedback: Vec::new() };
+                assert_eq!(comparisons_to_ask(&space, &after, action, &settings).unwrap(), questions);
+                asked.extend(questions.iter().map(|q| (q.against, q.action)));
+            }
+            let mut expected = Vec::new();
+            for (start, batch) in (0..).step_by(n).zip(tried.chunks(n)) {
+                for (i, &action) in batch.iter().enumerate() {
+                    expected.extend(batch[..i].iter().map(|&other| (other, action)));
+                    expected.extend(tried[..start].iter().rev().take(b).map(|&other| (other, action)));
+                }
+            }
+            asked.sort_unstable();
+            expected.sort_unstable();
+            assert_eq!(asked, expected, "n = {n}, b = {b}");
+        }
     }
 }

@@ -39,6 +39,14 @@ pub enum LearnerError {
         /// Number of dimensions of the space.
         expected: usize,
     },
+    /// A dimension's number beyond the last dimension.
+    #[error("dimension {dimension} does not exist, there are {dimensions} (counted from 0)")]
+    UnknownDimension {
+        /// The number given, counted from 0.
+        dimension: usize,
+        /// Number of dimensions of the space.
+        dimensions: usize,
+    },
     /// A level number beyond a dimension's last level.
     #[error("dimension `{dimension}` has {levels} levels, level {level} does not exist")]
     UnknownLevel {
@@ -85,7 +93,7 @@ pub enum LearnerError {
         /// What is wrong with it.
         reason: String,
     },
-    /// Every action has been visited or is pending.
+    /// Every action has been visited or is pending; where actions may be repeated, every one is pending.
     #[error("all {actions} actions have been visited or are pending")]
     Exhausted {
         /// Number of actions in the space.

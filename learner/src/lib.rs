@@ -16,6 +16,7 @@ mod ask;
 mod belief;
 mod error;
 mod feedback;
+mod given;
 mod grid;
 mod hyperparameters;
 mod inference;

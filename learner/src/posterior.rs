@@ -73,21 +73,24 @@ fn answers(
     let mut split = [Vec::new(), Vec::new()];
     for &feedback in &log.feedback {
         let (plus, minus) = feedback.actions();
-        let (about, interval) = match feedback {
-            Feedback::Label { category, .. } => {
-                let about = usize::from(settings.labels == Labels::Separate);
-                (about, settings.label_interval(category))
+        let interval = match feedback {
+            Feedback::Label { category, .. } if settings.labels == Labels::Separate => {
+                split[1].push(Answer { plus, minus, interval: settings.feasibility_interval(category) });
+                let grade = settings.grade_interval(category);
+                split[0].extend(grade.map(|interval| Answer { plus, minus, interval }));
+                continue;
             }
-            Feedback::Preference { .. } => (0, above(preference_noise)),
-            Feedback::Suggestion { .. } => (0, above(settings.coactive_noise)),
+            Feedback::Label { category, .. } => settings.label_interval(category),
+            Feedback::Preference { .. } => above(preference_noise),
+            Feedback::Suggestion { .. } => above(settings.coactive_noise),
             Feedback::Tie { .. } => {
-                (0, Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise })
+                Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise }
             }
         };
         let decided = settings.labels == Labels::Separate
             && minus.is_some_and(|minus| infeasible.contains(&plus) != infeasible.contains(&minus));
         if !decided {
-            split[about].push(Answer { plus, minus, interval });
+            split[0].push(Answer { plus, minus, interval });
         }
     }
     split
@@ -274,6 +277,14 @@ impl Posterior {
         best.map(|(action, _)| action)
     }
 
+    /// Where labels are separate and of two actions only one is in the lowest category: the other one. Its comparison
+    /// is decided by the labels, whatever the utility.
+    pub(crate) fn decided_by_labels(&self, a: ActionIndex, b: ActionIndex) -> Option<ActionIndex> {
+        let fails = |action| self.infeasible.contains(&action);
+        let decided = self.feasibility.is_some() && fails(a) != fails(b);
+        decided.then(|| if fails(a) { b } else { a })
+    }
+
     /// Answers given, in order.
     pub(crate) fn feedback(&self) -> &[Feedback] {
         &self.feedback
@@ -281,10 +292,10 @@ impl Posterior {
 
     /// A dimension of the space by its number.
     pub(crate) fn dimension(&self, dimension: usize) -> Result<&Dimension> {
-        self.space.dimensions().get(dimension).ok_or_else(|| LearnerError::WrongDimensionCount {
-            given: dimension + 1,
-            expected: self.space.dimensions().len(),
-        })
+        self.space
+            .dimensions()
+            .get(dimension)
+            .ok_or_else(|| LearnerError::UnknownDimension { dimension, dimensions: self.space.dimensions().len() })
     }
 
     /// What joint draws of the utilities of a few distinct actions need.

@@ -32,7 +32,8 @@ pub enum ProposalReason {
     JointThompson,
     /// Its answers would tell most about the utility.
     InformationGain,
-    /// No line through the best action held an untried one: a uniformly random untried action.
+    /// No line through the best action held a candidate: a uniformly random untried action, or, where actions may be
+    /// repeated and all were tried, one that is not pending.
     LinesExhausted,
 }
 
@@ -50,10 +51,10 @@ pub struct Proposal {
 /// Lines drawn before a random action is taken instead.
 const MAX_LINES: usize = 200;
 
-/// Proposes one action that was neither tried nor is pending.
+/// Proposes one action that is not pending and, unless the settings let LineCoSpar repeat, was not tried.
 ///
 /// # Errors
-/// When a setting is out of range, the log does not fit the space, or no untried action is left
+/// When a setting is out of range, the log does not fit the space, or no such action is left
 /// ([`LearnerError::Exhausted`]).
 pub fn propose(
     space: &SearchSpace,
@@ -132,7 +133,10 @@ fn propose_from(belief: &Posterior, pending: &[ActionIndex], seed: u64) -> Resul
         space.check(action)?;
     }
     let taken: HashSet<ActionIndex> = belief.visited().iter().chain(pending).copied().collect();
-    if taken.len() as u64 >= space.len() {
+    let settings = belief.settings();
+    let repeats = settings.repeats && settings.method == Method::LineCoSpar;
+    let barred = if repeats { pending.iter().copied().collect::<HashSet<_>>().len() } else { taken.len() };
+    if barred as u64 >= space.len() {
         return Err(LearnerError::Exhausted { actions: space.len() });
     }
     let mut random = Random::new(seed, (belief.visited().len() + pending.len()) as u64);
@@ -387,7 +391,10 @@ fn line_with_repeats(
         }
     }
     let Some(chosen) = chosen else {
-        return Ok((random_untried(space, taken, random), ProposalReason::LinesExhausted));
+        let all_tried = taken.len() as u64 >= space.len();
+        let awaited: HashSet<ActionIndex> = pending.iter().copied().collect();
+        let action = random_untried(space, if all_tried { &awaited } else { taken }, random);
+        return Ok((action, ProposalReason::LinesExhausted));
     };
     Ok((chosen, ProposalReason::ThompsonOnLine))
 }
@@ -484,6 +491,27 @@ mod tests {
                     (0..space.len()).map(ActionIndex).filter(|&a| avoidance.allows(a)).collect();
                 assert!(space.contains(propose(&space, &log, &pending, &settings, 1).unwrap().action));
             }
+        }
+    }
+
+    #[test]
+    fn where_actions_may_be_repeated_only_pending_ones_exhaust_the_space() {
+        let space = grid();
+        let settings = LearnerSettings { samples_per_iteration: 5, ..LearnerSettings::published(Method::LineCoSpar) };
+        let all: Vec<ActionIndex> = (0..space.len()).map(ActionIndex).collect();
+        let better = |pair: &[ActionIndex]| Feedback::Preference { winner: pair[1], loser: pair[0] };
+        for feedback in [Vec::new(), all.windows(2).map(better).collect()] {
+            let log = FeedbackLog { visited: all.clone(), feedback };
+            let batch = propose_batch(&space, &log, &[], &settings, 3).unwrap();
+            let distinct: HashSet<ActionIndex> = batch.iter().map(|p| p.action).collect();
+            assert_eq!(distinct.len(), 5);
+            // One action is left that is not pending, then none.
+            let proposal = propose(&space, &log, &all[1..], &settings, 3).unwrap();
+            assert_eq!(proposal.action, all[0]);
+            assert_eq!(
+                propose(&space, &log, &all, &settings, 3),
+                Err(LearnerError::Exhausted { actions: space.len() })
+            );
         }
     }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
+use crate::given::GivenSettings;
 use crate::likelihood::Interval;
 
 /// How the next action is chosen.
@@ -49,8 +50,9 @@ pub enum Link {
 pub enum Labels {
     /// Labels are about the utility itself, as in the literature.
     InUtility,
-    /// Labels are about a second function of the action; a comparison that the labels alone decide (one action in
-    /// the lowest category, the other not) says nothing more about the utility.
+    /// Whether a label is the lowest category is about a second function of the action; the grades above it, where
+    /// there are several, are about the utility. A comparison that the labels alone decide (one action in the lowest
+    /// category, the other not) says nothing more about the utility.
     Separate,
 }
 
@@ -68,7 +70,8 @@ pub enum Start {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Partner {
-    /// The last ones tried, as many as the buffer holds: what a person on the device remembers.
+    /// As published: the others of the same batch, and of those before it the last ones tried, as many as the buffer
+    /// holds: what a person on the device remembers.
     Previous,
     /// The best one so far.
     Incumbent,
@@ -80,8 +83,11 @@ pub enum Partner {
 ///
 /// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors,
 /// except that it never repeats an action and compares each with the best so far.
+///
+/// In a document every field is optional: one that names a method has [`LearnerSettings::of`] that method in what it
+/// leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(from = "GivenSettings")]
 pub struct LearnerSettings {
     /// How the next action is chosen.
     pub method: Method,
@@ -130,9 +136,10 @@ pub struct LearnerSettings {
     /// threshold are not proposed while others are left (ROIAL uses -0.45). Mean and deviation are those of the
     /// function that labels are about. It binds every method but `random`. None: nothing is avoided.
     pub avoidance: Option<f64>,
-    /// Number `n` of actions proposed at a time.
+    /// Number `n` of actions proposed at a time: one batch.
     pub samples_per_iteration: usize,
-    /// Whether LineCoSpar may propose again an action that was tried before the buffered ones, as published.
+    /// Whether LineCoSpar may propose an action again, as published: rather one that is not among the buffered ones,
+    /// but where everything was tried it repeats instead of ending. The other methods never repeat.
     pub repeats: bool,
     /// Number of random lines through the best action on which EUBO looks; 0 looks at the whole grid.
     pub lines: usize,
@@ -140,7 +147,8 @@ pub struct LearnerSettings {
     pub line_trials: usize,
     /// Which earlier actions a new one is compared with.
     pub partner: Partner,
-    /// Number `b` of earlier actions with which a new one is compared.
+    /// Number `b` of actions tried before a batch with which each of the batch is compared where the partner is
+    /// `previous`. The other partners do not use it.
     pub buffer: usize,
 }
 
@@ -215,6 +223,24 @@ impl LearnerSettings {
         let bounds = &self.ordinal_thresholds;
         let low = category.checked_sub(1).and_then(|below| bounds.get(below)).copied().unwrap_or(f64::NEG_INFINITY);
         Interval { low, high: bounds.get(category).copied().unwrap_or(f64::INFINITY), noise: self.ordinal_noise }
+    }
+
+    /// Where labels are separate, what a category says of feasibility: below the lowest threshold or above it.
+    pub(crate) fn feasibility_interval(&self, category: usize) -> Interval {
+        let lowest = self.label_interval(0);
+        if category == 0 { lowest } else { Interval { low: lowest.high, high: f64::INFINITY, ..lowest } }
+    }
+
+    /// Where labels are separate, what a category says of the utility: of several grades above the lowest category,
+    /// which one. None where it says nothing.
+    pub(crate) fn grade_interval(&self, category: usize) -> Option<Interval> {
+        let interval = self.label_interval(category);
+        match category {
+            0 => None,
+            _ if self.categories() < 3 => None,
+            1 => Some(Interval { low: f64::NEG_INFINITY, ..interval }),
+            _ => Some(interval),
+        }
     }
 
     /// Number of categories of labels.

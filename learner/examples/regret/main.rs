@@ -10,7 +10,7 @@
 //! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having
 //! been answered (`k + 1` actions tried), and prints the quartiles. `--noise S` answers with logistic noise of scale
 //! `S` on the utility. `--batch N` proposes `N` actions before the first of them is answered. `--set` changes settings
-//! of the method. Regret is 1 minus the utility of the recommended action.
+//! of the method. Regret is 1 minus the utility of the recommended action. `--seeds A..B` does not include `B`.
 //!
 //! `--summarise` reads such files: medians with bootstrap intervals and quartiles, and, of every further file against
 //! the first, how many seeds were better and worse with the p-values of the paired sign test and of Wilcoxon's.
@@ -40,6 +40,14 @@ struct Options {
     out: Option<String>,
 }
 
+/// A finite number that is not below the least one that makes sense.
+fn number(name: &str, value: &str, least: f64) -> Result<f64, String> {
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= least => Ok(number),
+        _ => Err(format!("{name} needs a number of at least {least}, not {value}")),
+    }
+}
+
 fn options() -> Result<Options, Box<dyn Error>> {
     let mut options = Options {
         problem: "table1".into(),
@@ -60,11 +68,14 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--seeds" => {
                 let (from, to) = value.split_once("..").ok_or("--seeds needs A..B")?;
                 options.seeds = from.parse()?..to.parse()?;
+                if options.seeds.is_empty() {
+                    return Err(format!("--seeds {value} holds no seed: B is the first one left out").into());
+                }
             }
             "--method" => options.method = value,
             "--comparisons" => options.comparisons = value.parse()?,
-            "--noise" => options.noise = value.parse()?,
-            "--lengthscale" => options.lengthscale = Some(value.parse()?),
+            "--noise" => options.noise = number(&name, &value, 0.0)?,
+            "--lengthscale" => options.lengthscale = Some(number(&name, &value, 1e-6)?),
             "--batch" => options.batch = value.parse::<usize>()?.max(1),
             "--set" => options.set = serde_json::from_str(&value)?,
             "--out" => options.out = Some(value),
@@ -81,12 +92,13 @@ fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
         None => (options.method.as_str(), false),
     };
     let method = serde_json::from_value(name.into())?;
-    let settings = if published { LearnerSettings::published(method) } else { LearnerSettings::of(method) };
-    let serde_json::Value::Object(mut document) = serde_json::to_value(settings)? else {
-        return Err("settings are an object".into());
+    let mut document = if published {
+        serde_json::to_value(LearnerSettings::published(method))?
+    } else {
+        serde_json::json!({ "method": method })
     };
-    document.extend(options.set.clone());
-    Ok(serde_json::from_value(document.into())?)
+    document.as_object_mut().ok_or("settings are an object")?.extend(options.set.clone());
+    Ok(serde_json::from_value(document)?)
 }
 
 /// Somebody who knows the utility and answers with noise.

@@ -47,7 +47,7 @@ pub struct NewStudy {
     #[serde(default)]
     #[schema(value_type = Option<schema::SearchSpace>)]
     pub search_space: Option<SearchSpace>,
-    /// Settings of the learner.
+    /// Settings of the learner; what is left out is what is recommended for the method.
     #[serde(default)]
     #[schema(value_type = Object)]
     pub learner: LearnerSettings,

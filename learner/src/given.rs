@@ -1,0 +1,125 @@
+//! Settings as they are written: what is not given is what is recommended for the method that is.
+
+use serde::{Deserialize, Deserializer};
+
+use crate::settings::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
+
+/// Of a field that is given, its value: null is a value where the field has one.
+fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
+}
+
+macro_rules! settings {
+    ($($field:ident: $type:ty,)*) => {
+        /// The settings given, each of them optional.
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(crate) struct GivenSettings {
+            #[serde(default, deserialize_with = "given")]
+            method: Option<Method>,
+            $(#[serde(default, deserialize_with = "given")]
+            $field: Option<$type>,)*
+        }
+
+        impl From<GivenSettings> for LearnerSettings {
+            fn from(given: GivenSettings) -> Self {
+                let rest = given.method.map_or_else(Self::default, Self::of);
+                Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* }
+            }
+        }
+    };
+}
+
+settings! {
+    inference: Inference,
+    link: Link,
+    signal_variance: f64,
+    nugget: f64,
+    lengthscale_factor: f64,
+    additive_share: f64,
+    pairwise_share: f64,
+    broad_lengthscale: f64,
+    labels: Labels,
+    feasibility_lengthscale_factor: f64,
+    feasibility_additive_share: f64,
+    start: Start,
+    preference_noise: f64,
+    ordinal_noise: f64,
+    ordinal_thresholds: Vec<f64>,
+    coactive_noise: f64,
+    tie_noise: f64,
+    tie_width: f64,
+    learn_every: Option<usize>,
+    avoidance: Option<f64>,
+    samples_per_iteration: usize,
+    repeats: bool,
+    lines: usize,
+    line_trials: usize,
+    partner: Partner,
+    buffer: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> LearnerSettings {
+        serde_json::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn a_method_alone_means_what_is_recommended_for_it() {
+        for method in [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random] {
+            let name = serde_json::to_string(&method).unwrap();
+            assert_eq!(read(&format!("{{\"method\":{name}}}")), LearnerSettings::of(method));
+        }
+        assert_eq!(read("{}"), LearnerSettings::default());
+    }
+
+    #[test]
+    fn a_field_given_changes_that_field_alone() {
+        let eubo = LearnerSettings::of(Method::Eubo);
+        assert_eq!(
+            read(r#"{"preference_noise":0.05,"avoidance":-0.45,"method":"eubo"}"#),
+            LearnerSettings { preference_noise: 0.05, avoidance: Some(-0.45), ..eubo.clone() }
+        );
+        assert_eq!(read(r#"{"method":"eubo","avoidance":null}"#), eubo);
+        assert_eq!(
+            read(r#"{"start":"centre"}"#),
+            LearnerSettings { start: Start::Centre, ..LearnerSettings::default() }
+        );
+        for refused in [r#"{"method":null}"#, r#"{"method":"guess"}"#, r#"{"nose":1}"#, r#"{"buffer":null}"#] {
+            assert!(serde_json::from_str::<LearnerSettings>(refused).is_err(), "{refused}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_as_it_was() {
+        let changed = LearnerSettings {
+            learn_every: Some(7),
+            ordinal_thresholds: vec![-0.5, 0.3],
+            repeats: true,
+            ..LearnerSettings::of(Method::Eubo)
+        };
+        for settings in
+            [changed, LearnerSettings::published(Method::Eubo), LearnerSettings::published(Method::LineCoSpar)]
+        {
+            let text = serde_json::to_string(&settings).unwrap();
+            assert_eq!(read(&text), settings);
+            assert_eq!(serde_json::to_string(&read(&text)).unwrap(), text);
+        }
+    }
+
+    #[test]
+    fn a_complete_document_means_what_it_says_whatever_is_recommended_now() {
+        // As studies have stored it.
+        let stored = r#"{"method":"eubo","inference":"laplace","link":"logistic","signal_variance":1.0,"nugget":1e-5,
+            "lengthscale_factor":1.0,"additive_share":0.0,"pairwise_share":0.0,"broad_lengthscale":1.0,
+            "labels":"in_utility","feasibility_lengthscale_factor":1.0,"feasibility_additive_share":0.0,
+            "start":"random","preference_noise":0.02,"ordinal_noise":0.1,"ordinal_thresholds":[0.0],
+            "coactive_noise":0.02,"tie_noise":0.02,"tie_width":0.02,"learn_every":null,"avoidance":null,
+            "samples_per_iteration":1,"repeats":false,"lines":0,"line_trials":18446744073709551615,
+            "partner":"incumbent","buffer":1}"#;
+        assert_eq!(read(stored), LearnerSettings { method: Method::Eubo, ..LearnerSettings::of(Method::LineCoSpar) });
+    }
+}
