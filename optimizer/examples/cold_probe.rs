@@ -1,9 +1,10 @@
 //! The four default cold starts: figures, every attempt, and the gap to the golden objectives.
 //!
-//! `cargo run --release -p gait-optimizer --example cold_probe -- [-n | -m] [-v] [--threads 2]` (-n: without muscles, -m:
-//! with muscles only, -v: every iteration to stderr).
+//! `cargo run --release -p gait-optimizer --example cold_probe -- [-n | -m] [-v] [--threads 2]
+//! [--reference-problem]` (-n: without muscles, -m: with muscles only, -v: every iteration to stderr; the golden
+//! objectives are those of the reference problem, which has no weight on the activations' bend).
 
-use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, Subject, solve};
+use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
 use std::error::Error;
 
 /// Objectives of an independent implementation (`tests/data/README.md`).
@@ -22,7 +23,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         if has("-n") && muscles || has("-m") && !muscles {
             continue;
         }
-        let problem = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+        let mut problem = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+        if has("--reference-problem") {
+            problem.settings = GaitSettings::reference_problem();
+        }
         let options = SolveOptions { threads, ..SolveOptions::default() };
         let mut observer = |r: &gait_optimizer::IterationRecord| {
             if verbose {

@@ -1,9 +1,9 @@
-//! One cold solve with its figures as JSON: our side of `benches/casadi/race.py`.
+//! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
 //! [--guesses 1]` (one guess, as the other side has one start; the service tries two).
 
-use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, Subject, solve};
+use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -21,7 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             other => return Err(format!("unknown argument {other}").into()),
         }
     }
-    let problem = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+    let settings = GaitSettings::reference_problem();
+    let problem = GaitProblem { settings, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
     let outcome = solve(
         &problem,

@@ -208,6 +208,10 @@ pub struct Regularisation {
     pub activation: f64,
     /// |v_ce/V|²: without it fibre velocities alternate between points and midpoints.
     pub fibre_velocity: f64,
+    /// |s_0 - 2 s_m + s_1|² of the activations at each mesh interval's start, middle and end: damps the alternation between
+    /// points and midpoints that Hermite-Simpson rows leave free (`examples/activation_smoothness.rs`). Absent from
+    /// [`GaitSettings::reference_problem`].
+    pub activation_bend: f64,
 }
 
 impl Default for Regularisation {
@@ -219,6 +223,7 @@ impl Default for Regularisation {
             contact_force: 1e-4,
             activation: 3e-3,
             fibre_velocity: 1e-2,
+            activation_bend: 0.1,
         }
     }
 }
@@ -236,6 +241,7 @@ impl Regularisation {
             ("contact_force", self.contact_force),
             ("activation", self.activation),
             ("fibre_velocity", self.fibre_velocity),
+            ("activation_bend", self.activation_bend),
         ] {
             ModelError::check_range(&format!("regularisation.{field}"), value, 0.0, 10.0)?;
         }
@@ -256,6 +262,12 @@ pub struct GaitSettings {
 }
 
 impl GaitSettings {
+    /// The problem that an independent implementation solved (`tests/data`, `benches/casadi`): the defaults without a
+    /// weight on the activations' bend.
+    pub fn reference_problem() -> Self {
+        Self { regularisation: Regularisation { activation_bend: 0.0, ..Regularisation::default() }, ..Self::default() }
+    }
+
     /// Checks every setting.
     ///
     /// # Errors

@@ -24,7 +24,7 @@ fn programme(muscles: bool) -> GaitProgramme {
         &Device::ampro3().unwrap(),
         &TunedBounds::default(),
         muscles,
-        &GaitSettings::default(),
+        &GaitSettings::reference_problem(),
         &ReferenceGait::builtin().unwrap(),
     )
     .unwrap()

@@ -27,7 +27,7 @@ fn golden(subject: u32, muscles: bool) -> Golden {
         &Device::ampro3().unwrap(),
         &TunedBounds::default(),
         muscles,
-        &GaitSettings::default(),
+        &GaitSettings::reference_problem(),
         &ReferenceGait::builtin().unwrap(),
     )
     .unwrap();

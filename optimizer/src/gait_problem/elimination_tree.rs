@@ -2,7 +2,8 @@
 //!
 //! From the leaves to the root:
 //!
-//! * each muscle at each mesh point (states and force row);
+//! * each muscle at each mesh point (states and force row; its activation higher, with the interval, where the objective
+//!   couples the activations of an interval);
 //! * each mesh point;
 //! * the integration rows of each mesh interval, by bisection of the domain, so that an interval meets few others;
 //! * each domain (Bezier coefficients, phase limits);
@@ -62,7 +63,7 @@ impl Numbering {
 }
 
 /// The tree of a layout with its rows.
-pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable) -> EliminationBlocks {
+pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable, activations_are_coupled: bool) -> EliminationBlocks {
     let mut numbering = Numbering::default();
     let mut domains: Vec<DomainBlocks> = layout.domains.iter().map(|_| DomainBlocks::default()).collect();
     for (domain, blocks) in layout.domains.iter().zip(&mut domains) {
@@ -109,6 +110,7 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable) -> EliminationB
         for k in 0..domain.points {
             let neighbours = [(k / 2).checked_sub(usize::from(k % 2 == 0)), Some(k / 2)];
             let intervals = neighbours.into_iter().flatten().filter_map(|i| blocks.intervals.get(i));
+            let highest = intervals.clone().copied().max();
             let block = blocks.points[k];
             tree.parent[block] = Some(intervals.copied().min().unwrap_or(blocks.own));
             let p = domain.point(k);
@@ -119,6 +121,10 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable) -> EliminationB
                     tree.parent[own] = Some(block);
                     for offset in [domain.fibre_length(), domain.fibre_velocity(), domain.activation()] {
                         tree.block_of_variable[p + offset + muscle] = own;
+                    }
+                    // The higher block of a point between two intervals is above all others that either meets.
+                    if let Some(interval) = highest.filter(|_| activations_are_coupled) {
+                        tree.block_of_variable[p + domain.activation() + muscle] = interval;
                     }
                 }
             }

@@ -1,7 +1,8 @@
 //! The objective: mechanical cost of transport, regularisation, and (in the cold start) tracking of the reference.
 //!
 //! `f = w_cot E / (m g D) + w_track track + reg`, `E = sum_domains T sum_k w_k sum_i (sqrt(P_i^2 + eps^2) - eps)` over the
-//! six joint powers `P_i = u_i qd_(3+i)`, `reg = sum_domains T sum_k w_k (weighted squares)`,
+//! six joint powers `P_i = u_i qd_(3+i)`, `reg = sum_domains T (sum_k w_k (weighted squares) + (1/N) sum_intervals (weighted
+//! squares of bends))`, a bend being `s_0 - 2 s_m + s_1` of an activation at an interval's start, middle and end,
 //! `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`; w_k composite Simpson weights.
 
 use super::entries::Entries;
@@ -44,6 +45,26 @@ fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, 
         }))
 }
 
+/// Coefficients of an activation's bend at an interval's start, middle and end.
+const BEND: [f64; 3] = [1.0, -2.0, 1.0];
+
+/// Variables of each activation's bend, interval by interval, and the weight of its square; nothing without a weight.
+fn bends(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = ([usize; 3], f64)> + '_ {
+    let domain = &programme.layout.domains[d];
+    let intervals = if programme.activations_are_coupled() { domain.intervals } else { 0 };
+    let weight = programme.regularisation.activation_bend / domain.intervals as f64;
+    (0..intervals).flat_map(move |interval| {
+        (0..MUSCLE_COUNT).map(move |m| {
+            let activation = |i| domain.point(2 * interval + i) + domain.activation() + m;
+            ([activation(0), activation(1), activation(2)], weight)
+        })
+    })
+}
+
+fn bend(programme: &GaitProgramme, x: &[f64], variables: [usize; 3]) -> f64 {
+    (0..3).map(|i| BEND[i] * programme.layout.value(x, variables[i])).sum()
+}
+
 /// `sqrt(P^2 + eps^2) - eps` with first and second derivative.
 fn smooth_power(power: f64, smoothing: f64) -> [f64; 3] {
     let root = (power * power + smoothing * smoothing).sqrt();
@@ -72,6 +93,9 @@ pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
                 let error = x[p + Q + 2 + i] - reference;
                 tracking += error * error;
             }
+        }
+        for (variables, c) in bends(programme, d) {
+            regularisation += c * bend(programme, x, variables).powi(2);
         }
         result.energy_j += duration * energy;
         result.regularisation += duration * regularisation;
@@ -123,6 +147,13 @@ pub(super) fn gradient(programme: &GaitProgramme, x: &[f64], out: &mut [f64]) {
                 out[p + Q + 2 + i] += tracking * (x[p + Q + 2 + i] - reference);
             }
         }
+        for (variables, c) in bends(programme, d) {
+            let bend = bend(programme, x, variables);
+            regularisation += c * bend * bend;
+            for (index, coefficient) in variables.into_iter().zip(BEND) {
+                out[index] += 2.0 * duration * c * bend * coefficient * scale[index];
+            }
+        }
         out[domain.duration] += (per_energy * energy + regularisation) * scale[domain.duration];
         total_energy += duration * energy;
     }
@@ -165,6 +196,16 @@ pub(super) fn hessian(programme: &GaitProgramme, x: &[f64], sigma: f64, out: &mu
             let tracking = 2.0 * sigma * programme.weights.tracking / domain.points as f64;
             for i in 0..7 {
                 out.hessian(p + Q + 2 + i, p + Q + 2 + i, tracking);
+            }
+        }
+        for (variables, c) in bends(programme, d) {
+            let slope = 2.0 * sigma * c;
+            let bend = bend(programme, x, variables);
+            for (i, index) in variables.into_iter().enumerate() {
+                out.hessian(index, domain.duration, slope * bend * BEND[i]);
+                for (other, coefficient) in variables.into_iter().zip(BEND).take(i + 1) {
+                    out.hessian(index, other, slope * duration * BEND[i] * coefficient);
+                }
             }
         }
         out.hessian(domain.duration, d_index, -per_energy * energy / stride);

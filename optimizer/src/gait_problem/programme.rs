@@ -325,6 +325,11 @@ impl GaitProgramme {
         &self.settings
     }
 
+    /// Whether the objective couples the activations of a mesh interval.
+    pub(super) fn activations_are_coupled(&self) -> bool {
+        self.layout.muscles && self.regularisation.activation_bend > 0.0
+    }
+
     pub(super) fn contact_point(&self, row: ContactRow) -> &ContactPoint {
         &self.foot_points[super::rows::foot_point_index(row.point, row.side)]
     }
@@ -422,7 +427,11 @@ impl GaitProgramme {
         entries.clear();
         self.write_hessian(&x, 1.0, &vec![1.0; m], &mut Entries::structure(&self.layout.scale, &mut entries));
         let hessian = Compressed::new(n, n, &entries);
-        Structure { jacobian, hessian, blocks: elimination_tree(&self.layout, &self.rows) }
+        Structure {
+            jacobian,
+            hessian,
+            blocks: elimination_tree(&self.layout, &self.rows, self.activations_are_coupled()),
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use crate::{Scalar, domains, muscles, variables};
 use gait_optimizer::gait_problem::rows::Place;
 use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
 use gait_optimizer::nlp::{NonlinearProgram, SparsityPattern};
+use gait_optimizer::settings::Regularisation;
 use gait_optimizer::{Device, GaitSettings, Mesh, ReferenceGait, Subject, TunedBounds};
 use num_dual::{Dual64, HyperDual64};
 use std::collections::{BTreeMap, HashMap};
@@ -30,7 +31,8 @@ const STANDARD: [usize; 4] = [4, 4, 6, 6];
 impl Pair {
     fn new(subject: u32, intervals: [usize; 4], muscles: bool, a5: f64) -> Self {
         let [ds2, ds3, ss2, ss1] = intervals;
-        let settings = GaitSettings { mesh: Mesh { ds2, ds3, ss2, ss1 }, ..GaitSettings::default() };
+        let regularisation = Regularisation { activation_bend: 0.3, ..Regularisation::default() };
+        let settings = GaitSettings { mesh: Mesh { ds2, ds3, ss2, ss1 }, regularisation, ..GaitSettings::default() };
         let person = Subject::builtin(subject).unwrap();
         let bounds = TunedBounds { a5, ..TunedBounds::default() };
         let gait = ReferenceGait::builtin().unwrap();
@@ -58,6 +60,7 @@ impl Pair {
                 force: 1e-4,
                 activation: 3e-3,
                 fibre_velocity: 1e-2,
+                activation_bend: 0.3,
             },
             reference: tracked_angles(&gait.angles_rad, intervals),
             muscles,

@@ -15,6 +15,7 @@ pub(crate) struct Weights {
     pub(crate) force: f64,
     pub(crate) activation: f64,
     pub(crate) fibre_velocity: f64,
+    pub(crate) activation_bend: f64,
 }
 
 /// Composite Simpson weight of point k over N intervals, as a sum over the intervals it belongs to.
@@ -68,6 +69,17 @@ pub(crate) fn value<D: Scalar>(
             for i in 0..7 {
                 let error = point.q[2 + i] - reference[d][k][i];
                 tracking += error * error / domain.points() as f64;
+            }
+        }
+        for interval in variables.points.windows(3).step_by(2) {
+            let [Some([.., first]), Some([.., middle]), Some([.., last])] = [0, 1, 2].map(|i| interval[i].fibres)
+            else {
+                break;
+            };
+            for m in 0..10 {
+                let bend = first[m] - middle[m] * 2.0 + last[m];
+                regularisation +=
+                    bend * bend * variables.duration * (weights.activation_bend / domain.intervals as f64);
             }
         }
     }

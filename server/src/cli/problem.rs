@@ -22,6 +22,10 @@ pub(super) struct ProblemFlags {
     /// Device file (JSON); default: the built-in AMPRO3.
     #[arg(long, value_name = "FILE")]
     device: Option<PathBuf>,
+    /// Settings of the gait problem (JSON, only what differs from the defaults), as in
+    /// {"regularisation": {"activation_bend": 0}, "limits": {"speed_min_m_s": 1.1}}.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
     /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
     #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh, allow_hyphen_values = true)]
     mesh: Option<Mesh>,
@@ -46,7 +50,12 @@ impl ProblemFlags {
             Some(path) => Device::from_json(&read(path)?)?,
             None => Device::ampro3()?,
         };
-        let settings = GaitSettings { mesh: self.mesh.unwrap_or_default(), ..GaitSettings::default() };
+        let mut settings = match &self.settings {
+            Some(path) => serde_json::from_str(&read(path)?)
+                .map_err(|e| Error::Malformed(format!("{}: not settings of the gait problem: {e}", path.display())))?,
+            None => GaitSettings::default(),
+        };
+        settings.mesh = self.mesh.unwrap_or(settings.mesh);
         settings.validate()?;
         let (subject, muscles) = (self.body.subject()?, self.muscles.is_on());
         Ok(GaitProblem { subject, device, bounds, muscles, settings, reference: ReferenceGait::builtin()? })
