@@ -28,8 +28,8 @@ fn vectors_mut<S: Simd>(values: &mut [f64]) -> &mut [S::f64s] {
 
 /// Entries [from, from + length) of column k.
 #[inline(always)]
-fn column<S: Simd>(x: &[f64], stride: usize, k: u32, from: usize, length: usize) -> &[S::f64s] {
-    vectors::<S>(&x[k as usize * stride + from..][..length])
+fn column<S: Simd>(x: &[f64], stride: usize, k: usize, from: usize, length: usize) -> &[S::f64s] {
+    vectors::<S>(&x[k * stride + from..][..length])
 }
 
 /// y -= f a.
@@ -63,7 +63,7 @@ pub(super) fn subtract_two<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64, b
 
 /// y -= sum of f x_k over the terms (k, f), x_k being columns of x.
 #[inline(always)]
-pub(super) fn subtract_columns<S: Simd>(simd: S, y: &mut [f64], x: &[f64], stride: usize, terms: &[(u32, f64)]) {
+pub(super) fn subtract_columns<S: Simd>(simd: S, y: &mut [f64], x: &[f64], stride: usize, terms: &[(usize, f64)]) {
     let length = y.len();
     subtract_columns_within(simd, y, x, stride, terms, 0, length);
 }
@@ -75,7 +75,7 @@ pub(super) fn subtract_columns_within<S: Simd>(
     y: &mut [f64],
     x: &[f64],
     stride: usize,
-    terms: &[(u32, f64)],
+    terms: &[(usize, f64)],
     from: usize,
     to: usize,
 ) {

@@ -119,9 +119,8 @@ impl Front {
         front.reduced = front.row_diagonal + padded(rows);
         front.length = front.reduced + front.wide * size;
         let square = |k: usize| (k * k) as f64;
-        front.flops = square(rows) * (variables + 2 * size) as f64
-            + rows as f64 * square(size)
-            + (0..front.pivot_slots() - front.spare()).map(|k| square(size - k) / 2.0).sum::<f64>();
+        front.flops = 2.0 * (square(rows) * (variables + 2 * size) as f64 + rows as f64 * square(size))
+            + (0..front.pivot_slots() - front.spare()).map(|k| square(size - k)).sum::<f64>();
         front
     }
 
@@ -198,10 +197,5 @@ impl Front {
     pub(super) fn neglected(&self) -> impl Iterator<Item = u32> + '_ {
         let diagonal = self.row_diagonal..self.row_diagonal + self.rows.len();
         self.sources.iter().filter(move |s| diagonal.contains(&(s.1 as usize))).map(|s| s.0)
-    }
-
-    /// Numbers that the factorisation keeps.
-    pub(super) fn entries(&self) -> usize {
-        self.length
     }
 }

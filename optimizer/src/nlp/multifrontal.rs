@@ -22,7 +22,7 @@ use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::status::NlpError;
 
 /// Operations below which starting threads costs more than it saves.
-const WORTH_A_THREAD: f64 = 4e6;
+const WORTH_A_THREAD: f64 = 8e6;
 
 /// Numbers of a front.
 #[derive(Debug, Default)]
@@ -440,7 +440,7 @@ impl KktSolver for Multifrontal {
     }
 
     fn factor_entries(&self) -> usize {
-        self.fronts.iter().map(Front::entries).sum()
+        self.fronts.iter().map(|front| front.length).sum()
     }
 }
 
@@ -454,7 +454,7 @@ struct SolveSpace {
     /// One value per position of the null space.
     first: Vec<f64>,
     second: Vec<f64>,
-    terms: Vec<(u32, f64)>,
+    terms: Vec<(usize, f64)>,
 }
 
 impl SolveSpace {
@@ -520,7 +520,7 @@ fn forward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveSp
         v0.copy_from_slice(h);
         // Hessian products run over the variables in their own order.
         space.terms.clear();
-        space.terms.extend(variables[..rank].iter().zip(&*v0).filter_map(|(i, v)| Some((u32::try_from(*i).ok()?, *v))));
+        space.terms.extend(variables[..rank].iter().copied().zip(v0.iter().copied()));
         h.fill(0.0);
         subtract_columns(simd, h, &factor.numbers[..front.jacobian], tall, &space.terms);
         let coupling = &factor.numbers[front.coupling..front.row_coupling];
@@ -529,7 +529,7 @@ fn forward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveSp
         for e in 0..rank {
             let variable = variables[e];
             let value = x[front.variables[variable]] + h[variable];
-            space.terms.extend(u32::try_from(e).ok().map(|e| (e, value)));
+            space.terms.push((e, value));
             x[front.rows[rows[e]]] = v0[e];
             x[front.variables[variable]] = value;
         }
@@ -623,7 +623,7 @@ fn backward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveS
         let row_coupling = &factor.numbers[front.row_coupling + e * wide..][..wide];
         let change = -dot(row_coupling, slots);
         lambda[e] = x[front.variables[variable]] - dot(coupling, slots);
-        space.terms.extend(u32::try_from(variable).ok().map(|v| (v, change)));
+        space.terms.push((variable, change));
         x[front.variables[variable]] = x[front.rows[rows[e]]] + change;
     }
     product.fill(0.0);

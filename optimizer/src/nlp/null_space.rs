@@ -8,8 +8,9 @@
 //! A - X G^T - G X^T,   G = C - H X / 2
 //! ```
 //!
-//! and [H S^T; S 0] has as many positive as negative eigenvalues whatever H. The diagonal of the rows is left out: it
-//! is the regularisation, many orders below S, and iterative refinement makes up for it.
+//! and [H S^T; S 0] has as many positive as negative eigenvalues whatever H. The diagonal of the eliminated rows, the
+//! regularisation delta_c many orders below S, is left out: S is well conditioned without it. The matrix that is
+//! factorised is then the one without it, and so is the one whose residual is measured (`KktSolver::mark_neglected`).
 
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
 #![allow(clippy::inline_always)]
@@ -43,7 +44,7 @@ pub(super) struct Workspace {
     /// Copy of the transposed Jacobian.
     jacobian: Vec<f64>,
     pivot: Vec<f64>,
-    terms: Vec<(u32, f64)>,
+    terms: Vec<(usize, f64)>,
 }
 
 impl Workspace {
@@ -135,7 +136,7 @@ pub(super) fn eliminate<S: Simd>(
         let column = &mut g[position * wide..(position + 1) * wide];
         column.copy_from_slice(&coupling[variable * wide..(variable + 1) * wide]);
         work.terms.clear();
-        for (k, &other) in (0u32..).zip(&null_space.variables[..rank]) {
+        for (k, &other) in (0..).zip(&null_space.variables[..rank]) {
             let h = hessian[variable * tall + other];
             if h != 0.0 {
                 work.terms.push((k, 0.5 * h));
@@ -228,7 +229,7 @@ fn solve_for_slots<S: Simd>(
     lu: &[f64],
     x: &mut [f64],
     rank: usize,
-    terms: &mut Vec<(u32, f64)>,
+    terms: &mut Vec<(usize, f64)>,
 ) {
     let (tall, wide) = (front.tall, front.wide);
     for t in 0..rank {
@@ -236,7 +237,7 @@ fn solve_for_slots<S: Simd>(
         let (done, rest) = x.split_at_mut(t * wide);
         let column = &mut rest[..wide];
         terms.clear();
-        terms.extend((0u32..).zip(&u[..t]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
+        terms.extend((0..).zip(&u[..t]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
         for &(from, to) in &front.ranges {
             subtract_columns_within(simd, column, done, wide, terms, from, to);
         }
@@ -253,7 +254,7 @@ fn solve_for_slots<S: Simd>(
         let l = &lu[t * tall..(t + 1) * tall];
         let (left, done) = x.split_at_mut((t + 1) * wide);
         terms.clear();
-        terms.extend((0u32..).zip(&l[t + 1..rank]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
+        terms.extend((0..).zip(&l[t + 1..rank]).filter(|(_, v)| **v != 0.0).map(|(k, v)| (k, *v)));
         for &(from, to) in &front.ranges {
             subtract_columns_within(simd, &mut left[t * wide..], done, wide, terms, from, to);
         }

@@ -1,0 +1,183 @@
+//! What a solve tries: a warm start, then cold guesses side by side; and which attempt is the answer.
+
+use super::cold_guesses::ColdGuess;
+use super::run::{Context, Run};
+use super::{Attempt, BasinChoice, IterationRecord, SolveError, SolveStatus, WarmStart};
+use crate::gait::Gait;
+use crate::gait_problem::gait_of;
+use crate::metrics::gait_rmse;
+use crate::nlp::{NlpResult, NonlinearProgram};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+/// Largest scaled violation of a gait that is called converged.
+pub const CONVERGED_VIOLATION: f64 = 1e-6;
+
+/// A result with what choosing needs.
+pub(super) struct Choice {
+    pub(super) result: NlpResult,
+    pub(super) gait: Gait,
+    pub(super) status: SolveStatus,
+    objective: f64,
+    rmse: f64,
+    violation: f64,
+}
+
+impl Choice {
+    /// The residuals of the point that is handed out are measured on that point, after it is moved into its bounds
+    /// (the solver works in bounds widened by 1e-8).
+    pub(super) fn new(context: &Context<'_>, mut result: NlpResult) -> Self {
+        let programme = context.programme;
+        programme.project_into_bounds(&mut result.x);
+        let gait = gait_of(context.problem, programme, &result.x);
+        let violation = programme.violations(&result.x).first().map_or(0.0, |v| v.amount);
+        let mut status = SolveStatus::from(result.status);
+        let met = violation <= CONVERGED_VIOLATION; // false for NaN
+        if status == SolveStatus::Converged && !met {
+            status = SolveStatus::Stalled;
+        }
+        Self {
+            objective: programme.objective(&result.x),
+            rmse: gait_rmse(&gait, &context.problem.reference).total,
+            violation,
+            status,
+            gait,
+            result,
+        }
+    }
+
+    pub(super) fn attempt(&self, strategy: &str, run: &Run<'_>) -> Attempt {
+        Attempt {
+            strategy: strategy.to_owned(),
+            status: self.status,
+            iterations: run.iterations,
+            seconds: run.seconds(),
+            objective: self.objective,
+            gait_rmse_rad: self.rmse,
+            reason: run.reason.clone(),
+            chosen: false,
+        }
+    }
+}
+
+/// A finished attempt.
+pub(super) struct Tried {
+    pub(super) choice: Choice,
+    pub(super) attempt: Attempt,
+    pub(super) evaluation_s: f64,
+    pub(super) linear_algebra_s: f64,
+}
+
+impl Tried {
+    fn new(context: &Context<'_>, result: NlpResult, strategy: &str, run: &Run<'_>) -> Self {
+        let choice = Choice::new(context, result);
+        Self {
+            attempt: choice.attempt(strategy, run),
+            evaluation_s: run.evaluation_s,
+            linear_algebra_s: run.linear_algebra_s,
+            choice,
+        }
+    }
+}
+
+/// Tries a warm start.
+pub(super) fn try_warm(
+    context: &Context<'_>,
+    warm: &WarmStart,
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<Tried, SolveError> {
+    let mut run = Run::new(context, context.options.threads, observer);
+    let result = run.warm(warm)?;
+    Ok(Tried::new(context, result, "warm start", &run))
+}
+
+fn try_guess(
+    context: &Context<'_>,
+    index: usize,
+    guess: &ColdGuess,
+    threads: usize,
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<Tried, SolveError> {
+    let mut run = Run::new(context, threads, observer);
+    run.guess = index;
+    let result = run.cold(guess)?;
+    Ok(Tried::new(context, result, &guess.label(), &run))
+}
+
+/// What the threads tell the calling one.
+#[allow(clippy::large_enum_variant)] // a handful of messages per solve end, each moved once
+enum Message {
+    Iteration(IterationRecord),
+    Done(usize, Result<Tried, SolveError>),
+}
+
+/// Tries every guess, as many at a time as there are threads. Results come in the order of the guesses and do not
+/// depend on the number of threads.
+pub(super) fn try_guesses(
+    context: &Context<'_>,
+    guesses: &[ColdGuess],
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<Vec<Tried>, SolveError> {
+    let threads = context.options.threads;
+    let workers = threads.min(guesses.len());
+    if workers <= 1 {
+        return guesses.iter().enumerate().map(|(i, guess)| try_guess(context, i, guess, threads, observer)).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let mut done: Vec<Option<Result<Tried, SolveError>>> = guesses.iter().map(|_| None).collect();
+    std::thread::scope(|scope| {
+        let (sender, receiver) = mpsc::channel();
+        for _ in 0..workers {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(guess) = guesses.get(index) else { break };
+                    let mut tell = |record: &IterationRecord| {
+                        // Nobody listens any more only when the calling thread is unwinding.
+                        let _ = sender.send(Message::Iteration(*record));
+                    };
+                    let tried = try_guess(context, index, guess, threads / workers, &mut tell);
+                    let _ = sender.send(Message::Done(index, tried));
+                }
+            });
+        }
+        drop(sender);
+        for message in receiver {
+            match message {
+                Message::Iteration(record) => observer(&record),
+                Message::Done(index, tried) => done[index] = Some(tried),
+            }
+        }
+    });
+    done.into_iter().flatten().collect()
+}
+
+/// Index of the answer: a cancelled attempt if there is one (the caller wants no answer), otherwise by `choice` among
+/// the converged, otherwise the one with the smallest violation.
+pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
+    if let Some(cancelled) = tried.iter().position(|t| t.choice.status == SolveStatus::Cancelled) {
+        return cancelled;
+    }
+    let converged = || tried.iter().enumerate().filter(|(_, t)| t.choice.status == SolveStatus::Converged);
+    let least = |key: &dyn Fn(&Choice) -> f64, limit: f64| {
+        converged()
+            .filter(|(_, t)| t.choice.objective <= limit)
+            .min_by(|a, b| key(&a.1.choice).total_cmp(&key(&b.1.choice)))
+            .map(|(index, t)| (index, t.choice.objective))
+    };
+    let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
+        let violation = |t: &Tried| t.choice.violation;
+        return tried
+            .iter()
+            .enumerate()
+            .min_by(|a, b| violation(a.1).total_cmp(&violation(b.1)))
+            .map_or(0, |(index, _)| index);
+    };
+    match choice {
+        BasinChoice::LowestObjective => lowest,
+        BasinChoice::NearestToReference { within_percent } => {
+            least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! What a solve gives back: figures, gait, violations.
+
+use super::attempts::Choice;
+use super::run::Context;
+use super::warm_start::WarmStart;
+use crate::gait::Gait;
+use crate::gait_problem::GaitProgramme;
+use crate::gait_problem::programme::RowViolation;
+use crate::metrics::gait_rmse;
+use crate::nlp::{NlpStatus, NonlinearProgram};
+use serde::{Deserialize, Serialize};
+
+/// How a solve ended. Only `Converged` is a gait that satisfies every constraint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolveStatus {
+    /// First-order optimal and feasible to tolerance.
+    Converged,
+    /// The constraint violation is at a stationary point: locally infeasible.
+    Infeasible,
+    /// No further progress could be made.
+    Stalled,
+    /// Iteration limit reached.
+    IterationLimit,
+    /// Time limit reached.
+    TimeLimit,
+    /// Cancelled through the token.
+    Cancelled,
+}
+
+impl From<NlpStatus> for SolveStatus {
+    fn from(status: NlpStatus) -> Self {
+        match status {
+            NlpStatus::Converged => SolveStatus::Converged,
+            NlpStatus::Infeasible => SolveStatus::Infeasible,
+            NlpStatus::IterationLimit => SolveStatus::IterationLimit,
+            NlpStatus::TimeLimit => SolveStatus::TimeLimit,
+            NlpStatus::Cancelled => SolveStatus::Cancelled,
+            _ => SolveStatus::Stalled,
+        }
+    }
+}
+
+/// What a solve started from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StartedFrom {
+    /// Its own cold start.
+    Cold,
+    /// The warm start that was given.
+    Warm,
+    /// A cold start after the given warm start did not converge.
+    ColdAfterWarm,
+}
+
+/// One thing that a solve tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Attempt {
+    /// What, in words.
+    pub strategy: String,
+    /// How it ended.
+    pub status: SolveStatus,
+    /// Iterations over its phases.
+    pub iterations: usize,
+    /// Wall time, s.
+    pub seconds: f64,
+    /// Objective where it ended.
+    pub objective: f64,
+    /// Gait RMSE where it ended, rad.
+    pub gait_rmse_rad: f64,
+    /// Why it could not be carried through, in words; empty when it could.
+    #[serde(default)]
+    pub reason: String,
+    /// Whether it is the answer.
+    pub chosen: bool,
+}
+
+/// The figures of one solve: a contract for scripts (`gaitwright solve --json`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SolveReport {
+    /// How it ended.
+    pub status: SolveStatus,
+    /// What it started from.
+    pub started_from: StartedFrom,
+    /// Interior-point iterations over all phases.
+    pub iterations: usize,
+    /// Objective: cost of transport plus regularisation.
+    pub objective: f64,
+    /// Mechanical cost of transport, dimensionless.
+    pub cost_of_transport: f64,
+    /// Gait RMSE: sum over the five human coordinates, rad.
+    pub gait_rmse_rad: f64,
+    /// Its parts: torso, hip_L, knee_L, ankle_L, hip_R.
+    pub gait_rmse_parts_rad: [f64; 5],
+    /// Largest violation of any constraint row or bound, in scaled units.
+    pub max_violation: f64,
+    /// Wall time, s.
+    pub seconds_total: f64,
+    /// Of which evaluating functions and derivatives.
+    pub seconds_evaluation: f64,
+    /// Of which factorising and solving.
+    pub seconds_linear_algebra: f64,
+    /// Number of variables.
+    pub variables: usize,
+    /// Number of equality rows.
+    pub equalities: usize,
+    /// Number of inequality rows.
+    pub inequalities: usize,
+    /// Mean walking speed, m/s.
+    pub speed_m_s: f64,
+    /// Stride length, m.
+    pub stride_length_m: f64,
+    /// Durations of the eight domains, s.
+    pub durations_s: [f64; 8],
+    /// v_hip of the four impact-free runs, m/s.
+    pub vhip_m_s: [f64; 4],
+    /// Everything that was tried, in order; the figures above are those of the chosen one, iterations and seconds the
+    /// sum.
+    #[serde(default)]
+    pub attempts: Vec<Attempt>,
+}
+
+/// A constraint row or bound that is not met, in words and numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Violation {
+    /// Name of the row: domain, node, constraint, component.
+    pub row: String,
+    /// By how much, in `unit`.
+    pub amount: f64,
+    /// Unit of `amount`.
+    pub unit: String,
+}
+
+/// What a solve gives back, converged or not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SolveOutcome {
+    /// The figures.
+    pub report: SolveReport,
+    /// The last iterate as a gait. Only a gait to trust when the status is `Converged`.
+    pub gait: Gait,
+    /// For warm-starting another solve.
+    pub warm_start: WarmStart,
+    /// The most violated rows, worst first; empty when converged.
+    pub violations: Vec<Violation>,
+}
+
+/// What all attempts of one solve cost together.
+#[derive(Default)]
+pub(super) struct Tally {
+    pub(super) iterations: usize,
+    pub(super) evaluation_s: f64,
+    pub(super) linear_algebra_s: f64,
+    pub(super) attempts: Vec<Attempt>,
+}
+
+/// Most violations reported.
+const MAX_VIOLATIONS: usize = 20;
+
+/// The outcome of the attempt that was chosen.
+pub(super) fn outcome(context: &Context<'_>, choice: Choice, tally: Tally, started_from: StartedFrom) -> SolveOutcome {
+    let (problem, programme) = (context.problem, context.programme);
+    let Choice { result, gait, status, .. } = choice;
+    let x = &result.x;
+    let rmse = gait_rmse(&gait, &problem.reference);
+    let violations = programme.violations(x);
+    let parts = programme.objective_parts(x);
+    let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
+    let report = SolveReport {
+        status,
+        started_from,
+        iterations: tally.iterations,
+        objective: programme.objective(x),
+        cost_of_transport: parts.cost_of_transport,
+        gait_rmse_rad: rmse.total,
+        gait_rmse_parts_rad: rmse.parts,
+        max_violation: violations.first().map_or(0.0, |v| v.amount),
+        seconds_total: context.started.elapsed().as_secs_f64(),
+        seconds_evaluation: tally.evaluation_s,
+        seconds_linear_algebra: tally.linear_algebra_s,
+        variables: programme.variables(),
+        equalities,
+        inequalities: programme.rows() - equalities,
+        speed_m_s: gait.speed_m_s,
+        stride_length_m: gait.stride_length_m,
+        durations_s: std::array::from_fn(|d| gait.domains[d].duration_s),
+        vhip_m_s: gait.hip_velocity_m_s,
+        attempts: tally.attempts,
+    };
+    let violations = if status == SolveStatus::Converged {
+        Vec::new()
+    } else {
+        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
+    };
+    let warm_start = WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point() };
+    SolveOutcome { report, gait, warm_start, violations }
+}
+
+fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {
+    if let Some(row) = violation.row {
+        let name = &programme.rows.names[row];
+        let (_, unit, scale) = name.kind.description();
+        Violation { row: name.label(), amount: violation.amount * scale, unit: unit.to_owned() }
+    } else {
+        let variable = violation.variable.unwrap_or(0);
+        let (label, unit) = programme.layout.variable_label(variable);
+        Violation { row: label, amount: violation.amount * programme.layout.scale[variable], unit: unit.to_owned() }
+    }
+}
