@@ -1,14 +1,15 @@
 //! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guesses 1]` (one guess, as the other side has one start; the service tries two).
+//! [--guesses 1] [--mesh 4,4,6,6]` (one guess, as the other side has one start; the service tries two).
 
-use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
+use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut subject = 1;
     let mut muscles = false;
+    let mut settings = GaitSettings::reference_problem();
     let mut options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -17,11 +18,15 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--muscles" => muscles = true,
             "--subject" => subject = value()?.parse()?,
             "--guesses" => options.cold_guesses = value()?.parse()?,
+            "--mesh" => {
+                let intervals: Vec<usize> = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?;
+                let [ds2, ds3, ss2, ss1] = intervals[..] else { return Err("--mesh needs four numbers".into()) };
+                settings.mesh = Mesh { ds2, ds3, ss2, ss1 };
+            }
             "--threads" => options.threads = value()?.parse()?,
             other => return Err(format!("unknown argument {other}").into()),
         }
     }
-    let settings = GaitSettings::reference_problem();
     let problem = GaitProblem { settings, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
     let outcome = solve(

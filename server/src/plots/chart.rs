@@ -54,6 +54,9 @@ const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 42.0;
 const BOTTOM: f64 = 60.0;
+/// Names of marks nearer to each other than this would touch: every other one is written this much lower.
+const MARK_DISTANCE: f64 = 24.0;
+const MARK_DROP: f64 = 56.0;
 
 impl Chart {
     /// A chart without lines.
@@ -118,6 +121,7 @@ impl Chart {
             write!(svg, "<path class=\"grid\" d=\"M{at:.1} {bottom}v5\"/>")?;
             write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 22.0, x.text(tick))?;
         }
+        let (mut last, mut drop) = (f64::NEG_INFINITY, 0.0);
         for (value, name) in &self.marks {
             let at = px(*value);
             write!(svg, "<path class=\"mark\" d=\"M{at:.1} {TOP}V{bottom}\"/>")?;
@@ -125,7 +129,9 @@ impl Chart {
                 continue;
             }
             // Down along its line: neighbouring lines may be near.
-            let (x, y) = (at + 4.0, TOP + 4.0);
+            drop = if at - last < MARK_DISTANCE && drop == 0.0 { MARK_DROP } else { 0.0 };
+            last = at;
+            let (x, y) = (at + 4.0, TOP + 4.0 + drop);
             write!(
                 svg,
                 "<text class=\"mark\" transform=\"translate({x:.1} {y:.1}) rotate(90)\">{}</text>",
@@ -221,5 +227,20 @@ mod tests {
         let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (9.0, 2.0)]);
         chart.marks = vec![(3.0, "DS2_R".to_owned())];
         assert!(chart.svg().contains(">DS2_R</text>"));
+    }
+
+    #[test]
+    fn names_of_near_marks_are_at_different_heights() {
+        let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (100.0, 2.0)]);
+        chart.marks = [1.0, 3.0, 5.0, 50.0].map(|at| (at, format!("at {at}"))).to_vec();
+        let svg = chart.svg();
+        let height = |name: &str| {
+            let before = &svg[..svg.find(name).unwrap()];
+            let text = &before[before.rfind("translate(").unwrap()..];
+            text[..text.find(')').unwrap()].split(' ').nth(1).unwrap().parse::<f64>().unwrap()
+        };
+        assert_ne!(height("at 1<"), height("at 3<"));
+        assert_ne!(height("at 3<"), height("at 5<"));
+        assert_eq!(height("at 5<"), height("at 50<"));
     }
 }
