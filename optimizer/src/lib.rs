@@ -8,6 +8,7 @@ pub mod body;
 pub mod bounds;
 pub mod cold_start;
 pub mod device;
+pub mod explanation;
 pub mod gait;
 pub mod gait_problem;
 pub mod metrics;

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
+use gait_optimizer::explanation::explain;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{
     CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
@@ -75,4 +76,38 @@ fn a_warm_start_of_another_mesh_is_refused_in_words() {
     let error = solve(&other, Some(&COLD.warm_start), &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
     let message = error.unwrap_err().to_string();
     assert!(message.contains("its mesh is 3,3,4,4, the problem's is "), "{message}");
+}
+
+#[test]
+fn a_converged_gait_needs_no_explanation() {
+    let explanation = explain(&problem(""), &COLD, &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
+    assert_eq!(explanation.unwrap(), None);
+}
+
+/// The bounds are in conflict; each relaxation that is named gives a gait, each value below it does not.
+#[test]
+fn an_explanation_names_relaxations_that_were_solved() {
+    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
+        println!("skipped: set GAITWRIGHT_LONG_TESTS=1");
+        return;
+    }
+    let bounds = "a2=40,a3=0.5,a4=1.2,a5=0.1,a6=0,a7=15,a8=15";
+    let conflict = problem(bounds);
+    let outcome = solved(&conflict, None, 400);
+    assert_ne!(outcome.report.status, SolveStatus::Converged);
+    let options = SolveOptions { max_iterations: 400, ..SolveOptions::default() };
+    let mut asked = Vec::new();
+    let mut progress = |bound: &str| asked.push(bound.to_owned());
+    let explanation = explain(&conflict, &outcome, &options, &mut progress, &CancelToken::new()).unwrap().unwrap();
+    assert_eq!(explanation.relaxations.len(), explanation.at_limit.len());
+    assert!(asked.iter().eq(explanation.at_limit.iter().map(|a| &a.bound)));
+    assert!(explanation.at_limit.iter().any(|a| a.bound == "a5" && a.domains.iter().all(|d| d.starts_with("SS"))));
+    let helps: Vec<_> = explanation.relaxations.iter().filter_map(|r| r.to.map(|to| (&r.bound, to))).collect();
+    assert!(!helps.is_empty());
+    for (bound, to) in helps {
+        let mut relaxed = conflict.clone();
+        relaxed.bounds.set(bound, to).unwrap();
+        let again = solved(&relaxed, Some(&COLD.warm_start), 400);
+        assert_eq!(again.report.status, SolveStatus::Converged, "{bound} = {to}");
+    }
 }

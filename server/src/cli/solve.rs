@@ -5,8 +5,10 @@ use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal};
 use crate::error::Error;
 use clap::Args;
-use gait_optimizer::{SolveOutcome, SolveStatus, TunedBounds, solve};
+use gait_optimizer::explanation::{self, BoundAtLimit, Explanation, Relaxation};
+use gait_optimizer::{SolveError, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve};
 use indicatif::ProgressBar;
+use serde::Serialize;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -28,6 +30,18 @@ pub(super) struct Solve {
     /// Print the figures as one JSON object.
     #[arg(long)]
     json: bool,
+    /// Where no gait is found: say why, and which bound, relaxed alone, gives one. Solves up to eight times per bound.
+    #[arg(long)]
+    explain: bool,
+}
+
+/// The figures, and why there is no gait where that was asked.
+#[derive(Debug, Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    report: &'a SolveReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    explanation: Option<&'a Explanation>,
 }
 
 impl Solve {
@@ -38,7 +52,8 @@ impl Solve {
         let cancel = cancelled_by_signal();
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
-        let outcome = tokio::task::spawn_blocking(move || {
+        let explain = self.explain;
+        let (outcome, explanation) = tokio::task::spawn_blocking(move || {
             let mut observer = |record: &gait_optimizer::IterationRecord| {
                 shown.set_message(format!(
                     "iteration {}, objective {:.6}, violation {:.1e}, barrier {:.1e}",
@@ -46,16 +61,24 @@ impl Solve {
                 ));
                 shown.tick();
             };
-            solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)
+            let outcome = solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?;
+            let explanation = if explain {
+                let mut progress = |bound: &str| shown.set_message(format!("what if {bound} gave way?"));
+                explanation::explain(&problem, &outcome, &options, &mut progress, &cancel)?
+            } else {
+                None
+            };
+            Ok::<_, SolveError>((outcome, explanation))
         })
         .await
         .map_err(|e| Error::Internal(e.to_string()))??;
         bar.finish_and_clear();
         // The figures first: whatever becomes of the file, they are not lost.
         if self.json {
-            data(&serde_json::to_string_pretty(&outcome.report).map_err(|e| Error::Internal(e.to_string()))?)?;
+            let answer = Answer { report: &outcome.report, explanation: explanation.as_ref() };
+            data(&serde_json::to_string_pretty(&answer).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
-            data(&for_people(&outcome))?;
+            data(&for_people(&outcome, explanation.as_ref()))?;
         }
         match out {
             Some(out) => out.write(&serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?),
@@ -76,7 +99,7 @@ pub(super) fn status_word(status: SolveStatus) -> &'static str {
     }
 }
 
-fn for_people(outcome: &SolveOutcome) -> String {
+fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> String {
     let r = &outcome.report;
     let mut lines = vec![
         format!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total),
@@ -92,5 +115,30 @@ fn for_people(outcome: &SolveOutcome) -> String {
     for violation in outcome.violations.iter().take(10) {
         lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
+    if let Some(explanation) = explanation {
+        lines.extend(in_words(explanation));
+    }
     lines.join("\n")
+}
+
+fn in_words(explanation: &Explanation) -> Vec<String> {
+    let mut lines = vec![match explanation.status {
+        SolveStatus::Infeasible => {
+            "no gait near the last iterate meets every constraint: no step makes the violation smaller".to_owned()
+        }
+        _ => "the solver gave up: nothing is proved about these bounds".to_owned(),
+    }];
+    for at_limit in &explanation.at_limit {
+        let BoundAtLimit { bound, meaning, value, domains } = at_limit;
+        lines.push(format!("  at its limit: {bound} = {value} ({meaning}) in {}", domains.join(", ")));
+    }
+    for Relaxation { bound, meaning, from, to, not_with, .. } in &explanation.relaxations {
+        lines.push(match to {
+            Some(to) => format!(
+                "  with {bound} = {to} instead of {from} alone, a gait converges ({meaning}; not with {not_with})"
+            ),
+            None => format!("  {bound} alone does not help, up to {not_with} ({meaning})"),
+        });
+    }
+    lines
 }
