@@ -100,15 +100,7 @@ fn size(relaxation: &Relaxation) -> f64 {
 impl GaitProblem {
     /// Names of the domains in which `x` is at a limit that `bound` sets.
     fn domains_at_limit(&self, programme: &GaitProgramme, x: &[f64], bound: usize) -> Result<Vec<String>, SolveError> {
-        let relaxed = with_bound(self, bound, loosest(bound))?;
-        let relaxed = GaitProgramme::new(
-            &self.subject,
-            &self.device,
-            &relaxed.bounds,
-            self.muscles,
-            &self.settings,
-            &self.reference,
-        )?;
+        let relaxed = with_bound(self, bound, loosest(bound))?.programme(self.muscles)?;
         let mut values = [vec![0.0; programme.rows()], vec![0.0; programme.rows()]];
         programme.constraints(x, &mut values[0]);
         relaxed.constraints(x, &mut values[1]);
@@ -201,14 +193,7 @@ pub fn explain(
     if matches!(outcome.report.status, SolveStatus::Converged | SolveStatus::Cancelled) {
         return Ok(None);
     }
-    let programme = GaitProgramme::new(
-        &problem.subject,
-        &problem.device,
-        &problem.bounds,
-        problem.muscles,
-        &problem.settings,
-        &problem.reference,
-    )?;
+    let programme = problem.programme(problem.muscles)?;
     let x = &outcome.warm_start.point.x;
     if x.len() != programme.variables() {
         return Err(SolveError::WarmStartShape(format!("{} variables, expected {}", x.len(), programme.variables())));

@@ -20,7 +20,7 @@ pub use cold_guesses::{ColdGuess, ColdRoute, GuessTiming};
 pub use options::{BasinChoice, SolveOptions};
 pub use problem::GaitProblem;
 pub use progress::{CancelToken, IterationRecord, Phase};
-pub use report::{Attempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation};
+pub use report::{Attempt, Optimality, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation};
 use report::{Tally, outcome};
 use run::Context;
 pub use warm_start::WarmStart;

@@ -29,6 +29,8 @@ fn cold_then_warm() {
     let report = &COLD.report;
     assert_eq!((report.status, report.started_from), (SolveStatus::Converged, StartedFrom::Cold));
     assert!(report.max_violation <= 1e-6 && COLD.violations.is_empty());
+    let optimality = report.optimality.unwrap();
+    assert!(optimality.dual_infeasibility <= 1e-6 && optimality.complementarity <= 1e-6, "{optimality:?}");
     assert!(report.cost_of_transport > 0.01 && report.cost_of_transport < 0.2, "{}", report.cost_of_transport);
     assert!(report.gait_rmse_rad > 0.1 && report.gait_rmse_rad < 3.0, "{}", report.gait_rmse_rad);
     assert_eq!(COLD.gait.domains.len(), 8);

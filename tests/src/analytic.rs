@@ -89,6 +89,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             gait_rmse_rad: rmse,
             gait_rmse_parts_rad: [rmse / 5.0; 5],
             max_violation: if status == SolveStatus::Converged { 1e-9 } else { 0.004 },
+            optimality: None,
             seconds_total: 0.01,
             seconds_evaluation: 0.005,
             seconds_linear_algebra: 0.005,

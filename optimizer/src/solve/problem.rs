@@ -43,7 +43,7 @@ impl GaitProblem {
         })
     }
 
-    pub(super) fn programme(&self, muscles: bool) -> Result<GaitProgramme, ModelError> {
+    pub(crate) fn programme(&self, muscles: bool) -> Result<GaitProgramme, ModelError> {
         GaitProgramme::new(&self.subject, &self.device, &self.bounds, muscles, &self.settings, &self.reference)
     }
 }

@@ -75,6 +75,18 @@ pub struct Attempt {
     pub chosen: bool,
 }
 
+/// The first-order conditions of a local optimum, measured anew where the solve ended, as the solver scales them (by the
+/// size of the multipliers, WB06 eq. 5). With `max_violation` they are the certificate of a converged gait.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Optimality {
+    /// Largest entry of the Lagrangian's gradient.
+    pub dual_infeasibility: f64,
+    /// Largest product of a distance to a bound and its multiplier.
+    pub complementarity: f64,
+    /// Last barrier parameter.
+    pub barrier: f64,
+}
+
 /// The figures of one solve: a contract for scripts (`gaitwright solve --json`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolveReport {
@@ -94,6 +106,10 @@ pub struct SolveReport {
     pub gait_rmse_parts_rad: [f64; 5],
     /// Largest violation of any constraint row or bound, in scaled units.
     pub max_violation: f64,
+    /// How well the conditions of a local optimum are met; `None` where that could not be measured, and in records of
+    /// versions that did not say.
+    #[serde(default)]
+    pub optimality: Option<Optimality>,
     /// Wall time, s.
     pub seconds_total: f64,
     /// Of which evaluating functions and derivatives.
@@ -174,6 +190,12 @@ pub(super) fn outcome(context: &Context<'_>, choice: Choice, tally: Tally, start
         gait_rmse_rad: rmse.total,
         gait_rmse_parts_rad: rmse.parts,
         max_violation: violations.first().map_or(0.0, |v| v.amount),
+        optimality: Some(Optimality {
+            dual_infeasibility: result.scaled_residuals.dual_infeasibility,
+            complementarity: result.scaled_residuals.complementarity,
+            barrier: result.mu,
+        })
+        .filter(|o| o.dual_infeasibility.is_finite() && o.complementarity.is_finite()),
         seconds_total: context.started.elapsed().as_secs_f64(),
         seconds_evaluation: tally.evaluation_s,
         seconds_linear_algebra: tally.linear_algebra_s,
