@@ -2,9 +2,10 @@
 //! from mesh point to mesh point with and without each.
 //!
 //! `cargo run --release -p gait-optimizer --example activation_smoothness -- [--subject 1]`. Columns: the
-//! root-mean-square bend (second difference) within mesh intervals, of the activations and of the fibre velocities
-//! (optimal lengths per second); alternations (three steps between neighbouring points that change sign twice, each
-//! above 0.005); the largest step between neighbouring points.
+//! root-mean-square bend (second difference of neighbouring points), of the activations and of the fibre velocities
+//! (optimal lengths per second); the same over the ends of mesh intervals alone; alternations (three steps that change
+//! sign twice, each above 0.005) between neighbouring points and between neighbouring ends of intervals; the largest step
+//! between neighbouring points.
 
 use gait_optimizer::gait::MuscleTrajectory;
 use gait_optimizer::settings::Regularisation;
@@ -18,34 +19,31 @@ fn muscles(gait: &Gait) -> impl Iterator<Item = &MuscleTrajectory> {
     gait.domains.iter().filter_map(|domain| domain.muscles.as_ref())
 }
 
-/// Root mean square of the second differences within mesh intervals.
-fn bend(gait: &Gait, pick: fn(&MuscleTrajectory) -> &Vec<[f64; 10]>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
-    for series in muscles(gait).map(pick) {
-        for interval in series.windows(3).step_by(2) {
-            for m in 0..10 {
-                sum += (interval[0][m] - 2.0 * interval[1][m] + interval[2][m]).powi(2);
-                count += 1;
-            }
-        }
-    }
-    (sum / count.max(1) as f64).sqrt()
+/// Values of one muscle in one domain, at every `stride`-th point.
+fn lines<'a>(
+    gait: &'a Gait,
+    pick: fn(&MuscleTrajectory) -> &Vec<[f64; 10]>,
+    stride: usize,
+) -> impl Iterator<Item = Vec<f64>> + 'a {
+    muscles(gait).flat_map(move |trajectory| {
+        (0..10).map(move |m| pick(trajectory).iter().step_by(stride).map(|values| values[m]).collect())
+    })
 }
 
-/// Alternations and the largest step.
-fn alternations(gait: &Gait) -> (usize, f64) {
-    let (mut count, mut largest) = (0, 0.0f64);
-    for trajectory in muscles(gait) {
-        for m in 0..10 {
-            let steps: Vec<f64> = trajectory.activation.windows(2).map(|w| w[1][m] - w[0][m]).collect();
-            count += steps
-                .windows(3)
-                .filter(|s| s[0] * s[1] < 0.0 && s[1] * s[2] < 0.0 && s.iter().all(|step| step.abs() > STEP))
-                .count();
-            largest = steps.iter().fold(largest, |a, s| a.max(s.abs()));
-        }
-    }
-    (count, largest)
+/// Root mean square of the second differences.
+fn bend(lines: impl Iterator<Item = Vec<f64>>) -> f64 {
+    let squares: Vec<f64> =
+        lines.flat_map(|l| l.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)).collect::<Vec<_>>()).collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+fn steps(line: &[f64]) -> Vec<f64> {
+    line.windows(2).map(|w| w[1] - w[0]).collect()
+}
+
+fn alternations(lines: impl Iterator<Item = Vec<f64>>) -> usize {
+    let alternate = |s: &&[f64]| s[0] * s[1] < 0.0 && s[1] * s[2] < 0.0 && s.iter().all(|step| step.abs() > STEP);
+    lines.map(|line| steps(&line).windows(3).filter(alternate).count()).sum()
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -59,6 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("default", default),
         ("0.3 x bend", Regularisation { activation_bend: 0.3 * default.activation_bend, ..default }),
         ("3 x bend", Regularisation { activation_bend: 3.0 * default.activation_bend, ..default }),
+        ("10 x bend", Regularisation { activation_bend: 10.0 * default.activation_bend, ..default }),
         ("no bend (reference problem)", reference),
         ("no bend, 10 x fibre velocity", Regularisation { fibre_velocity: 0.1, ..reference }),
         ("no bend, no activation", Regularisation { activation: 0.0, ..reference }),
@@ -66,7 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("none", Regularisation { activation: 0.0, fibre_velocity: 0.0, ..reference }),
     ];
     println!(
-        "variant,status,iterations,objective,cost_of_transport,gait_rmse_rad,mean_activation,activation_bend,fibre_velocity_bend,alternations,largest_step"
+        "variant,status,iterations,objective,cost_of_transport,gait_rmse_rad,mean_activation,activation_bend,bend_of_interval_ends,fibre_velocity_bend,alternations,alternations_of_interval_ends,largest_step"
     );
     let mut warm: Option<WarmStart> = None;
     for (name, regularisation) in variants {
@@ -77,17 +76,21 @@ fn main() -> Result<(), Box<dyn Error>> {
         let activations: Vec<f64> =
             muscles(&outcome.gait).flat_map(|trajectory| trajectory.activation.iter().flatten().copied()).collect();
         let mean = activations.iter().sum::<f64>() / activations.len().max(1) as f64;
-        let (alternations, largest_step) = alternations(&outcome.gait);
+        let activation = |stride| lines(&outcome.gait, |m| &m.activation, stride);
+        let largest_step = activation(1).flat_map(|line| steps(&line)).fold(0.0f64, |a, s| a.max(s.abs()));
         let r = &outcome.report;
         println!(
-            "{name},{:?},{},{:.6},{:.6},{:.4},{mean:.4},{:.5},{:.4},{alternations},{largest_step:.3}",
+            "{name},{:?},{},{:.6},{:.6},{:.4},{mean:.4},{:.5},{:.5},{:.4},{},{},{largest_step:.3}",
             r.status,
             r.iterations,
             r.objective,
             r.cost_of_transport,
             r.gait_rmse_rad,
-            bend(&outcome.gait, |m| &m.activation),
-            bend(&outcome.gait, |m| &m.fibre_velocity),
+            bend(activation(1)),
+            bend(activation(2)),
+            bend(lines(&outcome.gait, |m| &m.fibre_velocity, 1)),
+            alternations(activation(1)),
+            alternations(activation(2)),
         );
         warm.get_or_insert(outcome.warm_start);
     }

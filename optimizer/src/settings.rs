@@ -208,9 +208,10 @@ pub struct Regularisation {
     pub activation: f64,
     /// |v_ce/V|²: without it fibre velocities alternate between points and midpoints.
     pub fibre_velocity: f64,
-    /// |s_0 - 2 s_m + s_1|² of the activations at each mesh interval's start, middle and end: damps the alternation between
-    /// points and midpoints that Hermite-Simpson rows leave free (`examples/activation_smoothness.rs`). Absent from
-    /// [`GaitSettings::reference_problem`].
+    /// |s_(k-1) - 2 s_k + s_(k+1)|² of the activations at neighbouring points of a domain: damps their alternation from
+    /// point to point (`examples/activation_smoothness.rs`). Absent from [`GaitSettings::reference_problem`]. 0 where a
+    /// document has other weights but not this one, so that records of versions without it mean what they meant.
+    #[serde(default)]
     pub activation_bend: f64,
 }
 
@@ -223,7 +224,7 @@ impl Default for Regularisation {
             contact_force: 1e-4,
             activation: 3e-3,
             fibre_velocity: 1e-2,
-            activation_bend: 0.1,
+            activation_bend: 0.03,
         }
     }
 }

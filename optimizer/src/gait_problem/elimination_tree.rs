@@ -3,7 +3,7 @@
 //! From the leaves to the root:
 //!
 //! * each muscle at each mesh point (states and force row; its activation higher, with the interval, where the objective
-//!   couples the activations of an interval);
+//!   couples the activations of neighbouring points);
 //! * each mesh point;
 //! * the integration rows of each mesh interval, by bisection of the domain, so that an interval meets few others;
 //! * each domain (Bezier coefficients, phase limits);
@@ -122,7 +122,8 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable, activations_are
                     for offset in [domain.fibre_length(), domain.fibre_velocity(), domain.activation()] {
                         tree.block_of_variable[p + offset + muscle] = own;
                     }
-                    // The higher block of a point between two intervals is above all others that either meets.
+                    // The higher block of a point between two intervals is above all others that either meets, and of
+                    // neighbouring intervals one is above the other.
                     if let Some(interval) = highest.filter(|_| activations_are_coupled) {
                         tree.block_of_variable[p + domain.activation() + muscle] = interval;
                     }

@@ -1,8 +1,8 @@
 //! The objective: mechanical cost of transport, regularisation, and (in the cold start) tracking of the reference.
 //!
 //! `f = w_cot E / (m g D) + w_track track + reg`, `E = sum_domains T sum_k w_k sum_i (sqrt(P_i^2 + eps^2) - eps)` over the
-//! six joint powers `P_i = u_i qd_(3+i)`, `reg = sum_domains T (sum_k w_k (weighted squares) + (1/N) sum_intervals (weighted
-//! squares of bends))`, a bend being `s_0 - 2 s_m + s_1` of an activation at an interval's start, middle and end,
+//! six joint powers `P_i = u_i qd_(3+i)`, `reg = sum_domains T (sum_k w_k (weighted squares) + (1/N) sum (weighted squares
+//! of bends))`, a bend being `s_(k-1) - 2 s_k + s_(k+1)` of an activation at three neighbouring points of a domain,
 //! `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`; w_k composite Simpson weights.
 
 use super::entries::Entries;
@@ -45,17 +45,17 @@ fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, 
         }))
 }
 
-/// Coefficients of an activation's bend at an interval's start, middle and end.
+/// Coefficients of an activation's bend at three neighbouring points.
 const BEND: [f64; 3] = [1.0, -2.0, 1.0];
 
-/// Variables of each activation's bend, interval by interval, and the weight of its square; nothing without a weight.
+/// Variables of each activation's bend, and the weight of its square; nothing without a weight.
 fn bends(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = ([usize; 3], f64)> + '_ {
     let domain = &programme.layout.domains[d];
-    let intervals = if programme.activations_are_coupled() { domain.intervals } else { 0 };
+    let bends = if programme.activations_are_coupled() { domain.points - 2 } else { 0 };
     let weight = programme.regularisation.activation_bend / domain.intervals as f64;
-    (0..intervals).flat_map(move |interval| {
+    (0..bends).flat_map(move |k| {
         (0..MUSCLE_COUNT).map(move |m| {
-            let activation = |i| domain.point(2 * interval + i) + domain.activation() + m;
+            let activation = |i| domain.point(k + i) + domain.activation() + m;
             ([activation(0), activation(1), activation(2)], weight)
         })
     })

@@ -325,7 +325,7 @@ impl GaitProgramme {
         &self.settings
     }
 
-    /// Whether the objective couples the activations of a mesh interval.
+    /// Whether the objective couples the activations of neighbouring points.
     pub(super) fn activations_are_coupled(&self) -> bool {
         self.layout.muscles && self.regularisation.activation_bend > 0.0
     }

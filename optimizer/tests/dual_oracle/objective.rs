@@ -71,8 +71,8 @@ pub(crate) fn value<D: Scalar>(
                 tracking += error * error / domain.points() as f64;
             }
         }
-        for interval in variables.points.windows(3).step_by(2) {
-            let [Some([.., first]), Some([.., middle]), Some([.., last])] = [0, 1, 2].map(|i| interval[i].fibres)
+        for neighbours in variables.points.windows(3) {
+            let [Some([.., first]), Some([.., middle]), Some([.., last])] = [0, 1, 2].map(|i| neighbours[i].fibres)
             else {
                 break;
             };
