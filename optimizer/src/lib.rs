@@ -6,8 +6,10 @@
 
 pub mod body;
 pub mod bounds;
+pub mod certificate;
 pub mod cold_start;
 pub mod device;
+pub mod export;
 pub mod gait;
 pub mod gait_problem;
 pub mod metrics;
