@@ -6,6 +6,9 @@ use crate::settings::GaitSettings;
 use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 
+pub(crate) mod motion;
+mod shape;
+
 /// A gait: eight domains over one stride from right heel strike.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gait {

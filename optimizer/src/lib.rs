@@ -6,9 +6,11 @@
 
 pub mod body;
 pub mod bounds;
+pub mod certificate;
 pub mod cold_start;
 pub mod device;
 pub mod explanation;
+pub mod export;
 pub mod gait;
 pub mod gait_problem;
 pub mod metrics;

@@ -3,6 +3,15 @@
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
+mod matching;
+mod recording;
+mod strides;
+mod table;
+
+pub use matching::{distance, nearest};
+pub use recording::{AngleUnit, Recording};
+pub use strides::{HeelStrikes, STRIDE_RANGE_S, Walker};
+
 /// The built-in reference (citation, licence and processing in its header).
 const BUILTIN_CSV: &str = include_str!("../data/reference_gait.csv");
 /// Rows of a reference: 0, 1, ..., 100 % of the cycle.
@@ -20,6 +29,15 @@ pub struct ReferenceGait {
     pub provenance: String,
     /// 101 rows (0..=100 % of the cycle) of torso, hip_L, knee_L, ankle_L, hip_R in rad.
     pub angles_rad: Vec<[f64; 5]>,
+    /// Standard deviation over strides, where there were several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_deviation_rad: Option<Vec<[f64; 5]>>,
+    /// Height of the person, where it is known, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// Body mass of the person, where it is known, kg.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_mass_kg: Option<f64>,
 }
 
 impl ReferenceGait {
@@ -68,17 +86,40 @@ impl ReferenceGait {
             }
             angles_rad.push(row);
         }
-        let reference = Self { name: name.to_owned(), provenance, angles_rad };
+        let reference = Self {
+            name: name.to_owned(),
+            provenance,
+            angles_rad,
+            standard_deviation_rad: None,
+            height_m: None,
+            body_mass_kg: None,
+        };
         reference.validate()?;
         Ok(reference)
     }
 
-    /// Checks the number of rows.
+    /// Reads a reference as it is written in JSON, and checks it; `what` is the file's name.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column, or the reason.
+    pub fn from_json(what: &str, text: &str) -> Result<Self, ModelError> {
+        let reference: Self = serde_json::from_str(text).map_err(|e| ModelError::Malformed {
+            what: what.to_owned(),
+            reason: format!("not a reference gait: {e}"),
+        })?;
+        reference.validate()?;
+        Ok(reference)
+    }
+
+    /// Checks the numbers of rows.
     ///
     /// # Errors
     /// [`ModelError::Malformed`].
     pub fn validate(&self) -> Result<(), ModelError> {
-        if self.angles_rad.len() == REFERENCE_ROWS && self.angles_rad.iter().flatten().all(|a| a.is_finite()) {
+        let whole = |curves: &[[f64; 5]]| {
+            curves.len() == REFERENCE_ROWS && curves.iter().flatten().all(|angle| angle.is_finite())
+        };
+        if whole(&self.angles_rad) && self.standard_deviation_rad.as_deref().is_none_or(whole) {
             Ok(())
         } else {
             Err(ModelError::Malformed {

@@ -1,0 +1,79 @@
+//! Certificates of the four default gaits: residuals off the mesh, orbit error, multipliers of both methods, pushes.
+//!
+//! `cargo run --release -p gait-optimizer --example certificates [-- --all]` (--all: every check of every gait).
+
+use gait_optimizer::certificate::{Certificate, STRIDES, certify};
+use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, Subject, solve};
+use std::error::Error;
+use std::time::Instant;
+
+/// The checks of the table, by the beginning of their names, with a column title.
+const COLUMNS: [(&str, &str); 6] = [
+    ("C1 equations of motion, forces, between", "C1 off mesh, N"),
+    ("C2 virtual constraints, between", "C2 off mesh, rad"),
+    ("C3 friction cone, between", "friction off mesh, N"),
+    ("C5-C7 fibre and tendon in equilibrium, between", "C5-C7 off mesh, F_max"),
+    ("orbit error, angles", "orbit, rad"),
+    ("orbit error, rates", "orbit, rad/s"),
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let all = std::env::args().any(|argument| argument == "--all");
+    println!("orbit errors over {STRIDES} strides");
+    for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
+        let problem = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+        let options = SolveOptions { threads: 2, ..SolveOptions::default() };
+        let outcome = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new())?;
+        let started = Instant::now();
+        let certificate = certify(&outcome.gait)?;
+        println!(
+            "subject {subject} muscles {muscles}: {:?}, certificate {} ({:.1} s)",
+            outcome.report.status,
+            if certificate.passed { "passed" } else { "FAILED" },
+            started.elapsed().as_secs_f64()
+        );
+        print(&certificate, all);
+    }
+    Ok(())
+}
+
+fn print(certificate: &Certificate, all: bool) {
+    for (name, title) in COLUMNS {
+        if let Some(check) = certificate.checks.iter().find(|c| c.name.starts_with(name)) {
+            println!("   {title}: {} ({})", check.value_in_words(), check.place);
+        }
+    }
+    if let Some(map) = &certificate.return_map {
+        println!(
+            "   multipliers: largest {:.5e} (variational), {:.5e} (differences), relative difference {:.1e}",
+            map.largest,
+            map.largest_by_differences,
+            map.disagreement()
+        );
+        println!("   zero dynamics: {:.3e} (leak {:.1e})", map.zero_dynamics, map.zero_dynamics_leak);
+        println!(
+            "   gait to periodic motion: {:.1e}, residual there {:.1e} rad, rad/s",
+            map.fixed_point_distance, map.fixed_point_residual
+        );
+    }
+    if let Some(pushes) = certificate.pushes {
+        println!(
+            "   pushes recovered: {:.2} m/s forwards, {:.2} m/s backwards",
+            pushes.forwards_m_s, pushes.backwards_m_s
+        );
+    }
+    for objection in &certificate.objections {
+        println!("   objection: {objection}");
+    }
+    if all {
+        for check in &certificate.checks {
+            println!(
+                "      {}: {} ({}), allowed {}",
+                check.name,
+                check.value_in_words(),
+                check.place,
+                check.limit_in_words()
+            );
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The certificate of a gait: what the gait problem promised, examined without its code.
+//!
+//! From the gait as it is handed out (Bezier coefficients, phase limits, hip velocities, mesh points) and the physics of
+//! [`crate::body`], [`crate::muscle`] and [`crate::walking`] alone:
+//!
+//! 1. the residuals of C1-C12 at the mesh points and on a grid ten times finer (`residuals`);
+//! 2. the closed loop of the full hybrid system under feedback linearisation with the gait's own virtual constraints:
+//!    [`STRIDES`] strides, and contacts, friction and torques over a periodic stride (`closed_loop`);
+//! 3. the multipliers of the stride-to-stride map, by variational equations and by differences ([`ReturnMap`]);
+//! 4. the largest pushes that are recovered ([`Pushes`]).
+//!
+//! Muscles are examined in 1; the closed loop drives the joints by torques, as the device and the gait problem do.
+
+mod check;
+mod closed_loop;
+mod contact;
+mod control;
+mod dormand_prince;
+mod guard;
+mod hybrid_walker;
+mod limits;
+mod muscle_residuals;
+mod push;
+mod reset;
+mod residuals;
+mod return_map;
+mod torques;
+mod virtual_constraints;
+
+#[cfg(test)]
+mod simulation_tests;
+
+pub use check::Check;
+pub use closed_loop::STRIDES;
+pub use hybrid_walker::Fall;
+pub use push::{LARGEST_PUSH_M_S, Pushes, RECOVERY_STRIDES};
+pub use return_map::{Multiplier, ReturnMap};
+
+use crate::body::WalkerModel;
+use crate::gait::Gait;
+use crate::subject::ModelError;
+use control::join;
+use hybrid_walker::HybridWalker;
+use serde::{Deserialize, Serialize};
+
+/// Version of [`Certificate`]'s layout and of what it examines.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Version of this layout and of the examination.
+    pub format_version: u32,
+    /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
+    pub passed: bool,
+    /// Why not, in words; empty when passed.
+    pub objections: Vec<String>,
+    /// Every quantity with its worst value and its limit.
+    pub checks: Vec<Check>,
+    /// How the simulated walker fell, where it did; then there is no return map.
+    pub fall: Option<String>,
+    /// The stride-to-stride map.
+    pub return_map: Option<ReturnMap>,
+    /// Pushes that are recovered; only of a stable gait.
+    pub pushes: Option<Pushes>,
+}
+
+/// Both methods must agree on the largest multiplier to this, relative, or absolute below [`RESOLVED_MULTIPLIER`].
+const AGREEMENT: f64 = 1e-3;
+/// Below this size central differences cannot tell multipliers apart: noise of the integration over their step.
+const RESOLVED_MULTIPLIER: f64 = 1e-3;
+
+/// Examines a gait. Deterministic; takes some seconds.
+///
+/// # Errors
+/// [`ModelError`] when the gait is not well-formed.
+pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
+    gait.validate()?;
+    let model = WalkerModel::new(&gait.subject, &gait.device)?;
+    let mut certificate = Certificate {
+        format_version: FORMAT_VERSION,
+        passed: false,
+        objections: Vec::new(),
+        checks: residuals::residuals(&model, gait),
+        fall: None,
+        return_map: None,
+        pushes: None,
+    };
+    if let Err(fall) = simulate(&model, gait, &mut certificate) {
+        certificate.fall = Some(fall.to_string());
+    }
+    certificate.objections = objections(&certificate);
+    certificate.passed = certificate.objections.is_empty();
+    Ok(certificate)
+}
+
+/// Everything that needs the closed loop, as far as it gets.
+fn simulate(model: &WalkerModel, gait: &Gait, certificate: &mut Certificate) -> Result<(), Fall> {
+    let walker = HybridWalker::new(model, gait);
+    let start = join(&gait.domains[0].q[0], &gait.domains[0].qd[0]);
+    let (periodic, map) = return_map::return_map(&walker, &start)?;
+    let stable = map.is_stable();
+    certificate.return_map = Some(map);
+    certificate.checks.extend(closed_loop::periodic_stride(&walker, gait, &periodic)?);
+    certificate.checks.extend(closed_loop::orbit(&walker, &start)?);
+    if stable {
+        certificate.pushes = Some(push::pushes(&walker, &periodic)?);
+    }
+    Ok(())
+}
+
+/// Why a certificate does not pass, in words.
+fn objections(certificate: &Certificate) -> Vec<String> {
+    let mut objections: Vec<String> = certificate
+        .checks
+        .iter()
+        .filter(|check| !check.passed())
+        .map(|c| format!("{}: {} ({}), allowed {}", c.name, c.value_in_words(), c.place, c.limit_in_words()))
+        .collect();
+    if let Some(fall) = &certificate.fall {
+        objections.push(format!("the simulated walker falls: {fall}"));
+    }
+    if let Some(map) = &certificate.return_map {
+        if !map.is_stable() {
+            objections.push(format!("the gait is unstable: its largest multiplier is {:.4}", map.largest));
+        }
+        let difference = (map.largest - map.largest_by_differences).abs();
+        if difference > AGREEMENT * map.largest.max(RESOLVED_MULTIPLIER) {
+            objections.push(format!(
+                "the largest multiplier is {:.6e} by variational equations and {:.6e} by differences",
+                map.largest, map.largest_by_differences
+            ));
+        }
+    }
+    objections
+}

@@ -1,0 +1,108 @@
+//! One question that a certificate answers: the worst value found of a quantity, where, and what is allowed.
+
+use crate::gait::DomainTrajectory;
+use serde::{Deserialize, Serialize};
+
+/// The worst value of a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    /// What was measured, with the constraint's number where it has one.
+    pub name: String,
+    /// Unit of value and limit; empty: dimensionless.
+    pub unit: String,
+    /// Worst value found; none where it could not be determined, which does not pass.
+    pub value: Option<f64>,
+    /// Largest allowed value; none: reported without a judgement.
+    pub limit: Option<f64>,
+    /// Where the worst value is: domain and time of the stride.
+    pub place: String,
+}
+
+impl Check {
+    /// Whether the value is within its limit.
+    pub fn passed(&self) -> bool {
+        self.limit.is_none_or(|limit| self.value.is_some_and(|value| value <= limit))
+    }
+
+    /// The value as text.
+    pub fn value_in_words(&self) -> String {
+        self.value.map_or_else(|| "not determined".to_owned(), |value| format!("{value:.2e} {}", self.unit))
+    }
+
+    /// The limit as text.
+    pub fn limit_in_words(&self) -> String {
+        self.limit.map_or_else(|| "reported only".to_owned(), |limit| format!("{limit:.0e} {}", self.unit))
+    }
+}
+
+/// Where a value was measured.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) domain: &'a str,
+    pub(super) time_s: f64,
+}
+
+impl<'a> Place<'a> {
+    /// In a trajectory, at a share of its duration.
+    pub(super) fn within(trajectory: &'a DomainTrajectory, share: f64) -> Self {
+        let start = trajectory.time_s.first().copied().unwrap_or(0.0);
+        Self { domain: &trajectory.name, time_s: start + share * trajectory.duration_s }
+    }
+}
+
+/// A quantity that is measured in many places.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quantity {
+    pub(super) name: &'static str,
+    pub(super) unit: &'static str,
+    pub(super) limit: Option<f64>,
+}
+
+impl Quantity {
+    /// With a limit.
+    pub(super) const fn judged(name: &'static str, unit: &'static str, limit: f64) -> Self {
+        Self { name, unit, limit: Some(limit) }
+    }
+}
+
+/// The worst value of every quantity so far.
+#[derive(Debug, Default)]
+pub(super) struct Worst {
+    checks: Vec<Check>,
+}
+
+impl Worst {
+    /// Takes a value into account; one that is not finite counts as not determined, the worst of all.
+    pub(super) fn note(&mut self, quantity: Quantity, value: f64, place: Place<'_>) {
+        let value = value.is_finite().then_some(value);
+        let words = || format!("{}, {:.4} s", place.domain, place.time_s);
+        match self.checks.iter_mut().find(|c| c.name == quantity.name) {
+            Some(check) => {
+                let worse = match (value, check.value) {
+                    (Some(value), Some(worst)) => value > worst,
+                    (None, Some(_)) => true,
+                    (_, None) => false,
+                };
+                if worse {
+                    check.value = value;
+                    check.place = words();
+                }
+            }
+            None => self.checks.push(Check {
+                name: quantity.name.to_owned(),
+                unit: quantity.unit.to_owned(),
+                value,
+                limit: quantity.limit,
+                place: words(),
+            }),
+        }
+    }
+
+    /// The checks, their names followed by `where_measured`.
+    pub(super) fn into_checks(mut self, where_measured: &str) -> Vec<Check> {
+        for check in &mut self.checks {
+            check.name.push_str(where_measured);
+        }
+        self.checks
+    }
+}

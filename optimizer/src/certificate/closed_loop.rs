@@ -1,0 +1,89 @@
+//! The gait as the walker under control executes it: strides in a row, and what contacts and torques do meanwhile.
+
+use super::check::{Check, Place, Quantity, Worst};
+use super::control::{State, split};
+use super::hybrid_walker::{Fall, HybridWalker, Passage};
+use super::limits::{Limits, depth_below_ground};
+use crate::body::PointState;
+use crate::gait::Gait;
+use crate::gait::motion::instant;
+use crate::walking::CYCLE;
+
+/// Strides of the simulation.
+pub const STRIDES: usize = 20;
+
+const ORBIT_ANGLE: Quantity = Quantity::judged("orbit error, angles", "rad", 5e-3);
+const ORBIT_RATE: Quantity = Quantity::judged("orbit error, rates", "rad/s", 0.05);
+// Contact may be crossed by what a force plate does not resolve, 3 % of a light walker's weight.
+const NORMAL_FORCE: Quantity = Quantity::judged("unilateral contact", "N", 20.0);
+const FRICTION: Quantity = Quantity::judged("friction cone", "N", 20.0);
+const TORQUE: Quantity = Quantity::judged("torques", "N m", 5.0);
+const ANGLE: Quantity = Quantity::judged("joint angles", "rad", 0.01);
+const SPEED: Quantity = Quantity::judged("velocities", "rad/s", 0.2);
+const DEPTH: Quantity = Quantity::judged("feet above the ground", "m", 1e-3);
+const IMPULSE: Quantity = Quantity::judged("landing impulse pulls", "N s", 0.0);
+
+/// Walks [`STRIDES`] strides from the gait's own first state: largest distance to that state after each stride.
+pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Check>, Fall> {
+    let mut worst = Worst::default();
+    let mut x = *start;
+    for stride in 1..=STRIDES {
+        x = walker.after_stride(&x)?;
+        let distance = x - start;
+        let name = format!("stride {stride}");
+        let place = Place { domain: &name, time_s: 0.0 };
+        worst.note(ORBIT_ANGLE, distance.rows(2, 7).amax(), place);
+        worst.note(ORBIT_RATE, distance.rows(9, 9).amax(), place);
+    }
+    Ok(worst.into_checks(": closed loop"))
+}
+
+/// One periodic stride, instant by instant.
+pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: &State) -> Result<Vec<Check>, Fall> {
+    let mut samples: Vec<(usize, f64, State)> = Vec::new();
+    let passages = walker.stride(periodic, &mut |d, time, x| samples.push((d, time, *x)))?;
+    let starts: Vec<f64> = passages
+        .iter()
+        .scan(0.0, |elapsed, passage: &Passage| {
+            let start = *elapsed;
+            *elapsed += passage.duration;
+            Some(start)
+        })
+        .collect();
+    let limits = Limits::new(gait);
+    let mut worst = Worst::default();
+    for (d, time, x) in &samples {
+        let control = &walker.controls[*d];
+        let place = Place { domain: control.domain.name(), time_s: starts[*d] + time };
+        let (q, qd) = split(x);
+        let phase = control.constraints.phase(&q, &qd, &[0.0; 9]);
+        let plan = instant(&gait.domains[*d], phase.s).u;
+        let qdd = control.acceleration(x).unwrap_or([f64::NAN; 9]);
+        let rows = control.domain.contact_rows();
+        // No effort at all is not-a-number: the worst value of each.
+        let (pulling, sliding, torque) = match control.effort(x, &qdd, &plan, &limits) {
+            Some(effort) => (
+                limits.normal_force(&rows, &effort.forces),
+                limits.friction(&rows, &effort.forces),
+                limits.torque(&effort.u),
+            ),
+            None => (f64::NAN, f64::NAN, f64::NAN),
+        };
+        worst.note(NORMAL_FORCE, pulling, place);
+        worst.note(FRICTION, sliding, place);
+        worst.note(TORQUE, torque, place);
+        let excess = limits.motion(&q, &qd, &qdd);
+        worst.note(ANGLE, excess.angle, place);
+        worst.note(SPEED, excess.speed, place);
+        let state = PointState::new(&q, &qd, &[0.0; 9]);
+        worst.note(DEPTH, depth_below_ground(walker.model, control.domain, &state), place);
+    }
+    for (d, passage) in passages.iter().enumerate() {
+        let opens = CYCLE[(d + 1) % CYCLE.len()];
+        if let (Some(impact), Some(row)) = (&passage.impact, opens.landing_row()) {
+            let place = Place { domain: opens.name(), time_s: starts[d] + passage.duration };
+            worst.note(IMPULSE, -impact.impulse[row], place);
+        }
+    }
+    Ok(worst.into_checks(": closed loop"))
+}

@@ -1,0 +1,221 @@
+//! Dormand and Prince's Runge-Kutta pair of orders 5 and 4 with step-size control and dense output.
+//!
+//! Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19; dense output and error control after Hairer, Norsett & Wanner,
+//! Solving Ordinary Differential Equations I, II.4-II.6.
+
+use nalgebra::SVector;
+use thiserror::Error;
+
+/// Relative and absolute tolerance of one step, in the units of the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tolerance {
+    pub(super) relative: f64,
+    pub(super) absolute: f64,
+}
+
+/// Why an integration could not go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub(super) enum StepError {
+    /// The right-hand side cannot be evaluated.
+    #[error("the equations of motion have no unique solution")]
+    Singular,
+    /// The error cannot be kept below the tolerance.
+    #[error("the integration step became too small")]
+    TooSmall,
+}
+
+/// The time derivative of an autonomous system; `None` where it does not exist.
+pub(super) trait System<const N: usize> {
+    /// dx/dt at x.
+    fn derivative(&self, x: &SVector<f64, N>) -> Option<SVector<f64, N>>;
+}
+
+/// Coefficients of the stages.
+const A: [[f64; 6]; 6] = [
+    [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
+    [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0],
+    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0],
+    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
+    [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
+];
+/// Difference of the two embedded solutions.
+const E: [f64; 7] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+/// Highest coefficient of the dense output.
+const D: [f64; 7] = [
+    -12715105075.0 / 11282082432.0,
+    0.0,
+    87487479700.0 / 32700410799.0,
+    -10690763975.0 / 1880347072.0,
+    701980252875.0 / 199316789632.0,
+    -1453857185.0 / 822651844.0,
+    69997945.0 / 29380423.0,
+];
+
+/// Safety factor, and the range in which a step may change.
+const SAFETY: f64 = 0.9;
+const CHANGE: (f64, f64) = (0.2, 5.0);
+/// Smallest step, s: far below the shortest domain (5 ms) and far above rounding.
+const SMALLEST_STEP_S: f64 = 1e-11;
+
+/// One accepted step, with its continuous extension.
+pub(super) struct Step<const N: usize> {
+    /// Length, s.
+    pub(super) length: f64,
+    /// State at the start.
+    pub(super) start: SVector<f64, N>,
+    /// State at the end.
+    pub(super) end: SVector<f64, N>,
+    stages: [SVector<f64, N>; 7],
+}
+
+impl<const N: usize> Step<N> {
+    /// A step of the given length from `start`, whose derivative is `first`.
+    pub(super) fn take(
+        system: &impl System<N>,
+        start: &SVector<f64, N>,
+        first: &SVector<f64, N>,
+        length: f64,
+    ) -> Result<Self, StepError> {
+        let mut stages = [*first; 7];
+        let mut end = *start;
+        for (stage, row) in A.iter().enumerate() {
+            end = *start;
+            for (k, &a) in stages.iter().zip(row).take(stage + 1) {
+                end.axpy(length * a, k, 1.0);
+            }
+            stages[stage + 1] = system.derivative(&end).ok_or(StepError::Singular)?;
+        }
+        Ok(Self { length, start: *start, end, stages })
+    }
+
+    /// A step of another length from the same start.
+    pub(super) fn retake(&self, system: &impl System<N>, length: f64) -> Result<Self, StepError> {
+        Self::take(system, &self.start, &self.stages[0], length)
+    }
+
+    /// Derivative at the end.
+    pub(super) fn last_derivative(&self) -> &SVector<f64, N> {
+        &self.stages[6]
+    }
+
+    /// Error estimate over tolerance; the step is accurate enough when this is at most 1.
+    fn error(&self, tolerance: Tolerance) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..N {
+            let error: f64 = self.length * self.stages.iter().zip(E).map(|(k, e)| e * k[i]).sum::<f64>();
+            let allowed = tolerance.absolute + tolerance.relative * self.start[i].abs().max(self.end[i].abs());
+            sum += (error / allowed).powi(2);
+        }
+        (sum / N as f64).sqrt()
+    }
+
+    /// State at a share of the step, 0 to 1 (fourth order).
+    pub(super) fn at(&self, share: f64) -> SVector<f64, N> {
+        let rest = 1.0 - share;
+        let difference = self.end - self.start;
+        let first = self.stages[0] * self.length - difference;
+        let second = difference - self.stages[6] * self.length - first;
+        let mut third = SVector::<f64, N>::zeros();
+        for (k, d) in self.stages.iter().zip(D) {
+            third.axpy(self.length * d, k, 1.0);
+        }
+        self.start + (difference + (first + (second + third * rest) * share) * rest) * share
+    }
+}
+
+/// Advances a state step by step.
+pub(super) struct Integrator<'a, const N: usize, S> {
+    system: &'a S,
+    tolerance: Tolerance,
+    state: SVector<f64, N>,
+    derivative: SVector<f64, N>,
+    next_length: f64,
+    longest: f64,
+}
+
+impl<'a, const N: usize, S: System<N>> Integrator<'a, N, S> {
+    /// From a state, with a longest step (s): events are looked for within steps.
+    pub(super) fn new(
+        system: &'a S,
+        state: &SVector<f64, N>,
+        tolerance: Tolerance,
+        longest: f64,
+    ) -> Result<Self, StepError> {
+        let derivative = system.derivative(state).ok_or(StepError::Singular)?;
+        Ok(Self { system, tolerance, state: *state, derivative, next_length: 0.1 * longest, longest })
+    }
+
+    /// The next step that keeps the tolerance.
+    pub(super) fn step(&mut self) -> Result<Step<N>, StepError> {
+        loop {
+            if self.next_length < SMALLEST_STEP_S {
+                return Err(StepError::TooSmall);
+            }
+            let step = Step::take(self.system, &self.state, &self.derivative, self.next_length)?;
+            let error = step.error(self.tolerance);
+            let factor = if error > 0.0 { SAFETY * error.powf(-0.2) } else { CHANGE.1 };
+            let accepted = error <= 1.0;
+            // NaN is not accepted, and shortens the step.
+            let change = if factor.is_nan() { CHANGE.0 } else { factor.clamp(CHANGE.0, CHANGE.1) };
+            self.next_length = (self.next_length * if accepted { change } else { change.min(1.0) }).min(self.longest);
+            if accepted {
+                self.state = step.end;
+                self.derivative = *step.last_derivative();
+                return Ok(step);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pendulum of unit length and unit gravity: (angle, rate).
+    struct Pendulum;
+
+    impl System<2> for Pendulum {
+        fn derivative(&self, x: &SVector<f64, 2>) -> Option<SVector<f64, 2>> {
+            Some(SVector::from([x[1], -x[0].sin()]))
+        }
+    }
+
+    fn energy(x: &SVector<f64, 2>) -> f64 {
+        0.5 * x[1] * x[1] - x[0].cos()
+    }
+
+    #[test]
+    fn a_pendulum_keeps_its_energy() {
+        let start = SVector::from([1.2, 0.0]);
+        let tolerance = Tolerance { relative: 1e-11, absolute: 1e-12 };
+        let mut integrator = Integrator::new(&Pendulum, &start, tolerance, 0.1).unwrap();
+        let mut elapsed = 0.0;
+        while elapsed < 20.0 {
+            let step = integrator.step().unwrap();
+            elapsed += step.length;
+            assert!((energy(&step.end) - energy(&start)).abs() < 1e-9);
+            // The continuous extension meets both ends, and is of fourth order in between.
+            assert_eq!(step.at(0.0), step.start);
+            assert!((step.at(1.0) - step.end).amax() < 1e-15);
+            assert!((energy(&step.at(0.4)) - energy(&start)).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn halving_the_step_divides_the_error_by_two_to_the_fifth() {
+        let start = SVector::from([1.0, 0.3]);
+        let run = |steps: usize| {
+            let mut x = start;
+            for _ in 0..steps {
+                let first = Pendulum.derivative(&x).unwrap();
+                x = Step::take(&Pendulum, &x, &first, 2.0 / steps as f64).unwrap().end;
+            }
+            x
+        };
+        let exact = run(2000);
+        let (coarse, fine) = ((run(20) - exact).norm(), (run(40) - exact).norm());
+        assert!((coarse / fine).log2() > 4.7, "{}", (coarse / fine).log2());
+    }
+}

@@ -1,0 +1,221 @@
+//! The hybrid system under control: eight domains integrated one after the other, each to its guard, with its reset.
+
+use super::control::{Control, State, StateMatrix, Variational, join_variational, split_variational};
+use super::dormand_prince::{Integrator, Step, StepError, System, Tolerance};
+use super::reset::{reset, reset_by_state};
+use crate::body::WalkerModel;
+use crate::gait::Gait;
+use crate::walking::{CYCLE, Impact};
+use nalgebra::SVector;
+use thiserror::Error;
+
+/// Why a simulated walker did not complete a domain.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Fall {
+    /// The event that ends the domain did not come within twice the domain's planned duration.
+    #[error(
+        "{domain}: the event that ends it has not come {elapsed_s:.3} s after its start (planned: {planned_s:.3} s)"
+    )]
+    GuardMissed {
+        /// `DS2_R`, ...
+        domain: &'static str,
+        /// Time in the domain, s.
+        elapsed_s: f64,
+        /// Planned duration, s.
+        planned_s: f64,
+    },
+    /// The domain begins where its end already is.
+    #[error("{domain}: begins beyond the event that ends it (by {amount:.2e})")]
+    BeginsBeyondGuard {
+        /// `DS2_R`, ...
+        domain: &'static str,
+        /// Value of the guard, m, N or phase.
+        amount: f64,
+    },
+    /// The state cannot be integrated further.
+    #[error("{domain}: {reason}")]
+    NotIntegrable {
+        /// `DS2_R`, ...
+        domain: &'static str,
+        /// In words.
+        reason: String,
+    },
+}
+
+/// One completed domain.
+#[derive(Debug, Clone)]
+pub(super) struct Passage {
+    /// s.
+    pub(super) duration: f64,
+    /// State that the next domain begins with.
+    pub(super) after: State,
+    /// The impact that opens the next domain.
+    pub(super) impact: Option<Impact>,
+}
+
+/// A domain may last this many times its planned duration.
+const LONGEST: f64 = 2.0;
+/// Longest integration step, planned durations.
+const LONGEST_STEP: f64 = 0.1;
+/// Places within a step where the guard is looked at.
+const GUARD_LOOKS: usize = 8;
+/// Refinements of an event by a step to it; each squares the error of the one before.
+const EVENT_REFINEMENTS: usize = 4;
+
+/// Tolerance of certified figures: three digits better than any of them is reported.
+pub(super) const FINE: Tolerance = Tolerance { relative: 1e-10, absolute: 1e-11 };
+/// Tolerance of questions with a yes or no.
+pub(super) const COARSE: Tolerance = Tolerance { relative: 1e-6, absolute: 1e-7 };
+
+/// Watches a simulation: domain, time in it (s), state.
+pub(super) type Watch<'a> = &'a mut dyn FnMut(usize, f64, &State);
+
+/// The closed loop of a gait.
+#[derive(Debug, Clone)]
+pub(super) struct HybridWalker<'a> {
+    pub(super) model: &'a WalkerModel,
+    pub(super) controls: Vec<Control<'a>>,
+    pub(super) tolerance: Tolerance,
+}
+
+fn walker_part<const N: usize>(z: &SVector<f64, N>) -> State {
+    State::from_column_slice(&z.as_slice()[..18])
+}
+
+impl<'a> HybridWalker<'a> {
+    /// Of a well-formed gait.
+    pub(super) fn new(model: &'a WalkerModel, gait: &Gait) -> Self {
+        Self { model, controls: (0..CYCLE.len()).map(|d| Control::new(model, gait, d)).collect(), tolerance: FINE }
+    }
+
+    /// The same with another tolerance.
+    pub(super) fn with_tolerance(&self, tolerance: Tolerance) -> Self {
+        Self { tolerance, ..self.clone() }
+    }
+
+    /// One domain from a state to its event and through the reset.
+    pub(super) fn passage(&self, d: usize, start: &State, watch: Watch<'_>) -> Result<Passage, Fall> {
+        let control = &self.controls[d];
+        let (duration, before) = self.to_event(d, control, start, watch)?;
+        self.after_event(d, duration, before)
+    }
+
+    fn after_event(&self, d: usize, duration: f64, before: State) -> Result<Passage, Fall> {
+        let opens = CYCLE[(d + 1) % CYCLE.len()];
+        let (after, impact) =
+            reset(self.model, opens, &before).ok_or_else(|| not_integrable(opens.name(), "dependent contacts"))?;
+        Ok(Passage { duration, after, impact })
+    }
+
+    /// A stride from the start of DS2_R.
+    pub(super) fn stride(&self, start: &State, watch: Watch<'_>) -> Result<Vec<Passage>, Fall> {
+        let mut passages: Vec<Passage> = Vec::with_capacity(CYCLE.len());
+        for d in 0..CYCLE.len() {
+            let from = passages.last().map_or(*start, |p| p.after);
+            passages.push(self.passage(d, &from, watch)?);
+        }
+        Ok(passages)
+    }
+
+    /// The state a stride later.
+    pub(super) fn after_stride(&self, start: &State) -> Result<State, Fall> {
+        let passages = self.stride(start, &mut |_, _, _| {})?;
+        Ok(passages.last().map_or(*start, |p| p.after))
+    }
+
+    /// The state a stride later, and its derivative by the state at the start.
+    ///
+    /// Per domain: the variational flow, then the projection along the motion onto the guard (a state that begins
+    /// elsewhere gets there at another time), then the derivative of the reset. This is the saltation matrix read on
+    /// the sections.
+    pub(super) fn stride_with_derivative(&self, start: &State) -> Result<(State, StateMatrix), Fall> {
+        let (mut x, mut derivative) = (*start, StateMatrix::identity());
+        for (d, control) in self.controls.iter().enumerate() {
+            let name = control.domain.name();
+            let singular = || not_integrable(name, "the motion is not determined at its end");
+            let system = Variational(control);
+            let begin = join_variational(&x, &StateMatrix::identity());
+            let (duration, end) = self.to_event(d, &system, &begin, &mut |_, _, _| {})?;
+            let (before, flow) = split_variational(&end);
+            let motion = control.derivative(&before).ok_or_else(singular)?;
+            let gradient = control.guard.gradient(control, &before).ok_or_else(singular)?;
+            let projection = StateMatrix::identity() - motion * gradient.transpose() / gradient.dot(&motion);
+            let opens = CYCLE[(d + 1) % CYCLE.len()];
+            let jump = reset_by_state(self.model, opens, &before).ok_or_else(singular)?;
+            derivative = jump * projection * flow * derivative;
+            x = self.after_event(d, duration, before)?.after;
+        }
+        Ok((x, derivative))
+    }
+
+    /// Integrates to the guard of domain `d`: time and state there.
+    fn to_event<const N: usize, S: System<N>>(
+        &self,
+        d: usize,
+        system: &S,
+        start: &SVector<f64, N>,
+        watch: Watch<'_>,
+    ) -> Result<(f64, SVector<f64, N>), Fall> {
+        let control = &self.controls[d];
+        let name = control.domain.name();
+        let failed = |e: StepError| not_integrable(name, &e.to_string());
+        let guard = |z: &SVector<f64, N>| {
+            control.guard.value(control, &walker_part(z)).ok_or_else(|| failed(StepError::Singular))
+        };
+        let mut last = guard(start)?;
+        if last <= 0.0 {
+            return Err(Fall::BeginsBeyondGuard { domain: name, amount: -last });
+        }
+        let planned = control.nominal_duration;
+        let mut integrator = Integrator::new(system, start, self.tolerance, LONGEST_STEP * planned).map_err(failed)?;
+        let mut elapsed = 0.0;
+        watch(d, elapsed, &walker_part(start));
+        while elapsed < LONGEST * planned {
+            let step = integrator.step().map_err(failed)?;
+            for look in 1..=GUARD_LOOKS {
+                let share = look as f64 / GUARD_LOOKS as f64;
+                let value = guard(&step.at(share))?;
+                if value <= 0.0 {
+                    let from = share - 1.0 / GUARD_LOOKS as f64;
+                    let guess = from + (share - from) * last / (last - value);
+                    let event = self.refine(control, system, &step, guess * step.length)?;
+                    watch(d, elapsed + event.length, &walker_part(&event.end));
+                    return Ok((elapsed + event.length, event.end));
+                }
+                last = value;
+            }
+            elapsed += step.length;
+            watch(d, elapsed, &walker_part(&step.end));
+        }
+        Err(Fall::GuardMissed { domain: name, elapsed_s: elapsed, planned_s: planned })
+    }
+
+    /// A step from the same start that ends on the guard, by Newton's method on its length.
+    fn refine<const N: usize, S: System<N>>(
+        &self,
+        control: &Control<'_>,
+        system: &S,
+        step: &Step<N>,
+        guess: f64,
+    ) -> Result<Step<N>, Fall> {
+        let name = control.domain.name();
+        let failed = |e: StepError| not_integrable(name, &e.to_string());
+        let singular = || failed(StepError::Singular);
+        let mut length = guess.clamp(0.0, step.length);
+        for _ in 0..EVENT_REFINEMENTS {
+            let x = walker_part(&step.retake(system, length).map_err(failed)?.end);
+            let value = control.guard.value(control, &x).ok_or_else(singular)?;
+            let gradient = control.guard.gradient(control, &x).ok_or_else(singular)?;
+            let rate = gradient.dot(&control.derivative(&x).ok_or_else(singular)?);
+            if rate >= 0.0 {
+                return Err(not_integrable(name, "the event that ends it is only grazed"));
+            }
+            length = (length - value / rate).clamp(0.0, step.length);
+        }
+        step.retake(system, length).map_err(failed)
+    }
+}
+
+fn not_integrable(domain: &'static str, reason: &str) -> Fall {
+    Fall::NotIntegrable { domain, reason: reason.to_owned() }
+}

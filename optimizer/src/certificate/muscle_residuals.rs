@@ -1,0 +1,47 @@
+//! C5-C12 of the gait as it stands.
+
+use super::check::{Place, Quantity, Worst};
+use super::residuals::{Findings, GridPoint, Measured};
+use crate::gait::MuscleTrajectory;
+use crate::gait::motion::MuscleInstant;
+use crate::muscle::{MUSCLES, force_length, force_velocity, tendon_force};
+
+const FORCE: Measured = Measured::new("C5-C7 fibre and tendon in equilibrium", "F_max", 1e-6, None);
+const VELOCITY: Measured = Measured::new("C8 fibre velocity", "l_opt/s", 1e-4, Some(0.5));
+const TORQUE: Measured = Measured::new("C9-C12 joint torques are the muscles'", "N m", 1e-4, None);
+const RANGE: Measured = Measured::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
+const RESET: Quantity = Quantity::judged("C8 continuity of fibre lengths", "l_opt", 1e-6);
+
+/// Measures one grid point.
+pub(super) fn note(point: &GridPoint<'_>, muscles: &MuscleInstant, worst: &mut Findings) {
+    let (mut force_error, mut velocity_error, mut excess) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
+    let mut torque = [0.0; 4];
+    for (m, muscle) in MUSCLES.iter().enumerate() {
+        let (length, velocity) = (muscles.fibre_length[m], muscles.fibre_velocity[m]);
+        let tendon = muscle.unit_length(&point.instant.q) - length * muscle.optimal_length_m;
+        let pulled = tendon_force(tendon / muscle.slack_length_m - 1.0).value;
+        let made =
+            muscles.activation[m] * force_length(length).value * force_velocity(velocity / muscle.max_speed).value;
+        force_error = force_error.max((made - pulled).abs());
+        velocity_error = velocity_error.max((muscles.fibre_length_rate[m] - velocity).abs());
+        let activation = muscles.activation[m];
+        excess = excess.max((-activation).max(activation - 1.0)).max(velocity.abs() / muscle.max_speed - 1.0);
+        for attachment in muscle.attachments.iter().flatten() {
+            let arm = attachment.at(point.instant.q[attachment.coordinate]).arm;
+            torque[attachment.coordinate - 3] += arm * muscle.max_force_n * pulled;
+        }
+    }
+    let torque_error = (0..4).map(|i| (point.instant.u[i] - torque[i]).abs()).fold(0.0, f64::max);
+    worst.note(point, &FORCE, force_error);
+    worst.note(point, &VELOCITY, velocity_error);
+    worst.note(point, &TORQUE, torque_error);
+    worst.note(point, &RANGE, excess);
+}
+
+/// Fibre lengths from a domain's end to the next one's start.
+pub(super) fn note_reset(before: &MuscleTrajectory, after: &MuscleTrajectory, place: Place<'_>, worst: &mut Worst) {
+    if let (Some(last), Some(first)) = (before.fibre_length.last(), after.fibre_length.first()) {
+        let jump = last.iter().zip(first).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        worst.note(RESET, jump, place);
+    }
+}

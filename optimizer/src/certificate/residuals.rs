@@ -1,0 +1,292 @@
+//! C1-C4 of the gait as it stands, at its mesh points and on a grid ten times finer.
+
+use super::check::{Check, Place, Quantity, Worst};
+use super::contact::Contact;
+use super::limits::{Limits, depth_below_ground};
+use super::muscle_residuals;
+use super::virtual_constraints::VirtualConstraints;
+use crate::body::{InverseDynamics, PointState, WalkerModel};
+use crate::gait::motion::{Instant, instant};
+use crate::gait::{Axis, FootPoint, Gait, Side};
+use crate::walking::{CYCLE, Domain, DomainKind};
+
+/// Grid points per gap between mesh points.
+pub(super) const REFINEMENT: usize = 10;
+
+/// A quantity with what is allowed at the mesh points, where the gait problem imposed it, and between them, where it
+/// follows from them as far as the mesh is fine enough. `None`: reported only. Those are the quantities in which the
+/// torques and muscle states between the points occur, a parabola that nobody executes: what a controller applies
+/// there, the closed loop says.
+pub(super) struct Measured {
+    name: &'static str,
+    unit: &'static str,
+    at_points: f64,
+    between: Option<f64>,
+}
+
+impl Measured {
+    pub(super) const fn new(name: &'static str, unit: &'static str, at_points: f64, between: Option<f64>) -> Self {
+        Self { name, unit, at_points, between }
+    }
+}
+
+// At the points: a millionth (the tolerance of a converged gait) of the unit in which the gait problem measures.
+const FORCE: Measured = Measured::new("C1 equations of motion, forces", "N", 1e-4, None);
+const MOMENT: Measured = Measured::new("C1 equations of motion, moments", "N m", 1e-4, None);
+const CONTACT_POSITION: Measured = Measured::new("C1 contact position", "m", 1e-6, Some(1e-3));
+const CONTACT_VELOCITY: Measured = Measured::new("C1 contact velocity", "m/s", 1e-6, Some(0.02));
+const CONTACT_ACCELERATION: Measured = Measured::new("C1 contact acceleration", "m/s²", 1e-5, Some(2.0));
+const OUTPUT: Measured = Measured::new("C2 virtual constraints", "rad", 1e-6, Some(1e-3));
+const OUTPUT_RATE: Measured = Measured::new("C2 virtual constraints, rate", "rad/s", 1e-6, Some(0.05));
+const HIP_POSITION: Measured = Measured::new("C2 hip position", "m", 1e-6, Some(1e-3));
+const HIP_VELOCITY: Measured = Measured::new("C2 hip velocity", "m/s", 1e-6, Some(0.02));
+const NORMAL_FORCE: Measured = Measured::new("C3 unilateral contact", "N", 1e-3, Some(5.0));
+const FRICTION: Measured = Measured::new("C3 friction cone", "N", 1e-3, Some(20.0));
+const DEPTH: Measured = Measured::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
+const CLEARANCE: Measured = Measured::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
+const ANGLE: Measured = Measured::new("C4 joint angles (a6, a7, a8)", "rad", 1e-6, Some(0.01));
+const SPEED: Measured = Measured::new("C4 velocities (a1)", "rad/s", 3e-6, Some(0.1));
+const ACCELERATION: Measured = Measured::new("C4 accelerations (a2)", "rad/s²", 3e-5, Some(5.0));
+const TORQUE: Measured = Measured::new("C4 torques", "N m", 1e-4, Some(2.0));
+const IMPACT: Quantity = Quantity::judged("C2 velocities after impacts", "rad/s", 1e-5);
+const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3e-6);
+const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
+const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "m, s", 1e-6);
+
+/// One grid point.
+pub(super) struct GridPoint<'a> {
+    pub(super) instant: &'a Instant,
+    place: Place<'a>,
+    on_mesh: bool,
+}
+
+/// The worst values at the mesh points, between them, and of everything else.
+#[derive(Default)]
+pub(super) struct Findings {
+    at_points: Worst,
+    between: Worst,
+    pub(super) other: Worst,
+}
+
+impl Findings {
+    pub(super) fn note(&mut self, point: &GridPoint<'_>, measured: &Measured, value: f64) {
+        let (worst, limit) = if point.on_mesh {
+            (&mut self.at_points, Some(measured.at_points))
+        } else {
+            (&mut self.between, measured.between)
+        };
+        worst.note(Quantity { name: measured.name, unit: measured.unit, limit }, value, point.place);
+    }
+
+    fn into_checks(self) -> Vec<Check> {
+        let mut checks = self.at_points.into_checks(", at mesh points");
+        checks.extend(self.between.into_checks(", between mesh points"));
+        checks.extend(self.other.into_checks(""));
+        checks
+    }
+}
+
+/// Largest absolute value.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(f64::abs).fold(0.0, f64::max)
+}
+
+/// Everything measured on a well-formed gait without simulating it.
+pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
+    let limits = Limits::new(gait);
+    let mut worst = Findings::default();
+    for (d, trajectory) in gait.domains.iter().enumerate() {
+        let domain = DomainResiduals {
+            model,
+            gait,
+            d,
+            domain: CYCLE[d],
+            limits: &limits,
+            contacts: Contact::of_domain(model, CYCLE[d]),
+            constraints: VirtualConstraints::new(model, gait, d),
+        };
+        let cells = (trajectory.q.len() - 1) * REFINEMENT;
+        for cell in 0..=cells {
+            let share = cell as f64 / cells as f64;
+            let point = GridPoint {
+                instant: &instant(trajectory, share),
+                place: Place::within(trajectory, share),
+                on_mesh: cell % REFINEMENT == 0,
+            };
+            domain.mechanics(&point, &mut worst);
+            domain.outputs(&point, share, &mut worst);
+            domain.limits(&point, share, &mut worst);
+            if let Some(muscles) = &point.instant.muscles {
+                muscle_residuals::note(&point, muscles, &mut worst);
+            }
+        }
+        domain.reset(&mut worst);
+    }
+    stride(gait, &mut worst);
+    worst.into_checks()
+}
+
+struct DomainResiduals<'a> {
+    model: &'a WalkerModel,
+    gait: &'a Gait,
+    d: usize,
+    domain: Domain,
+    limits: &'a Limits,
+    contacts: Vec<Contact>,
+    constraints: VirtualConstraints,
+}
+
+impl DomainResiduals<'_> {
+    /// Where a contact row's point stands on the ground, m.
+    fn foothold(&self, contact: &Contact) -> f64 {
+        let gait = self.gait;
+        // Right toe at 0; left toe one step ahead, or (trailing, right stance) that step less a stride.
+        let toe = match (contact.row.side, self.domain.stance) {
+            (Side::Right, _) => 0.0,
+            (Side::Left, Side::Left) => gait.right_step_length_m,
+            (Side::Left, Side::Right) => gait.right_step_length_m - gait.stride_length_m,
+        };
+        let leg = self.model.leg(contact.row.side);
+        match (contact.row.axis, contact.row.point) {
+            (Axis::Z, _) => 0.0,
+            (Axis::X, FootPoint::Toe) => toe,
+            (Axis::X, FootPoint::Heel) => toe - leg.heel_behind_m - leg.toe_ahead_m,
+        }
+    }
+
+    fn mechanics(&self, point: &GridPoint<'_>, worst: &mut Findings) {
+        let Instant { q, qd, qdd, u, forces, .. } = point.instant;
+        let state = PointState::new(q, qd, qdd);
+        let mut rest = InverseDynamics::new(self.model).rows(&state);
+        for i in 0..6 {
+            rest[3 + i] -= u[i];
+        }
+        for (contact, force) in self.contacts.iter().zip(forces) {
+            for (i, gradient) in contact.gradient(&state).into_iter().enumerate() {
+                rest[i] -= gradient * force;
+            }
+        }
+        worst.note(point, &FORCE, largest(rest[..2].iter().copied()));
+        worst.note(point, &MOMENT, largest(rest[2..].iter().copied()));
+        let of_contacts = |value: &dyn Fn(&Contact) -> f64| largest(self.contacts.iter().map(value));
+        worst.note(point, &CONTACT_POSITION, of_contacts(&|c| c.position(&state) - self.foothold(c)));
+        worst.note(point, &CONTACT_VELOCITY, of_contacts(&|c| c.velocity(&state)));
+        worst.note(point, &CONTACT_ACCELERATION, of_contacts(&|c| c.acceleration(&state)));
+    }
+
+    fn outputs(&self, point: &GridPoint<'_>, share: f64, worst: &mut Findings) {
+        let Instant { q, qd, qdd, .. } = point.instant;
+        let phase = self.constraints.phase(q, qd, qdd);
+        let errors = |order: usize| {
+            let desired = self.constraints.desired(phase.s);
+            largest(self.constraints.outputs.iter().zip(desired).map(|(&output, y)| match order {
+                0 => q[output] - y[0],
+                _ => qd[output] - y[1] * phase.rate,
+            }))
+        };
+        worst.note(point, &OUTPUT, errors(0));
+        worst.note(point, &OUTPUT_RATE, errors(1));
+        if let Some(wanted) = self.constraints.hip_velocity {
+            let trajectory = &self.gait.domains[self.d];
+            let [position, velocity, _] = self.constraints.hip(q, qd, qdd);
+            let planned = trajectory.phase_start_m + wanted * trajectory.duration_s * share;
+            worst.note(point, &HIP_POSITION, (position - planned).abs());
+            worst.note(point, &HIP_VELOCITY, (velocity - wanted).abs());
+        }
+    }
+
+    fn limits(&self, point: &GridPoint<'_>, share: f64, worst: &mut Findings) {
+        let Instant { q, qd, qdd, u, forces, .. } = point.instant;
+        let rows = self.domain.contact_rows();
+        let state = PointState::new(q, qd, qdd);
+        worst.note(point, &NORMAL_FORCE, self.limits.normal_force(&rows, forces));
+        worst.note(point, &FRICTION, self.limits.friction(&rows, forces));
+        worst.note(point, &DEPTH, depth_below_ground(self.model, self.domain, &state));
+        if let Some(wanted) = self.wanted_clearance(share) {
+            let swing = self.domain.stance.other();
+            let lowest = [FootPoint::Heel, FootPoint::Toe]
+                .map(|foot| state.contact_position(&self.model.contact_point(foot, swing))[1])
+                .into_iter()
+                .fold(f64::INFINITY, f64::min);
+            worst.note(point, &CLEARANCE, wanted - lowest);
+        }
+        let excess = self.limits.motion(q, qd, qdd);
+        worst.note(point, &ANGLE, excess.angle);
+        worst.note(point, &SPEED, excess.speed);
+        worst.note(point, &ACCELERATION, excess.acceleration);
+        worst.note(point, &TORQUE, self.limits.torque(u));
+    }
+
+    /// Height `c (4 w (1 - w))^2` that the swing foot keeps, w the share of the swing, m.
+    fn wanted_clearance(&self, share: f64) -> Option<f64> {
+        let duration = |d: usize| self.gait.domains[d].duration_s;
+        let (before, swing) = match self.domain.kind {
+            DomainKind::Ss2 => (0.0, duration(self.d) + duration(self.d + 1)),
+            DomainKind::Ss1 => (duration(self.d - 1), duration(self.d - 1) + duration(self.d)),
+            DomainKind::Ds2 | DomainKind::Ds3 => return None,
+        };
+        let w = (before + share * duration(self.d)) / swing;
+        let clearance = self.gait.bounds.a5.max(self.gait.settings.limits.clearance_min_m);
+        Some(clearance * (4.0 * w * (1.0 - w)).powi(2))
+    }
+
+    /// The jump from this domain's last point to the next one's first.
+    fn reset(&self, worst: &mut Findings) {
+        let next = (self.d + 1) % CYCLE.len();
+        let (from, to) = (&self.gait.domains[self.d], &self.gait.domains[next]);
+        let place = Place::within(from, 1.0);
+        let (Some(q), Some(qd)) = (from.q.last(), from.qd.last()) else { return };
+        let mut position_jump: [f64; 9] = std::array::from_fn(|i| to.q[0][i] - q[i]);
+        if next == 0 {
+            position_jump[0] += self.gait.stride_length_m;
+        }
+        worst.other.note(RESET, largest(position_jump.into_iter()), place);
+        let expected = if CYCLE[next].opens_with_impact() {
+            crate::walking::impact(self.model, CYCLE[next], q, qd).map(|impact| impact.velocity_after)
+        } else {
+            Some(*qd)
+        };
+        let error = expected.map_or(f64::NAN, |after| largest((0..9).map(|i| to.qd[0][i] - after[i])));
+        worst.other.note(IMPACT, error, place);
+        let landing = match self.domain.kind {
+            DomainKind::Ds2 => Some((FootPoint::Toe, self.domain.stance, self.gait.settings.limits.toe_touchdown_m_s)),
+            DomainKind::Ss1 => {
+                Some((FootPoint::Heel, self.domain.stance.other(), self.gait.settings.limits.heel_touchdown_m_s))
+            }
+            DomainKind::Ds3 | DomainKind::Ss2 => None,
+        };
+        if let Some((point, side, slowest)) = landing {
+            let state = PointState::new(q, qd, &[0.0; 9]);
+            let velocity = state.contact_velocity(&self.model.contact_point(point, side))[1];
+            worst.other.note(TOUCHDOWN, velocity + slowest, place);
+        }
+        if let (Some(before), Some(after)) = (&from.muscles, &to.muscles) {
+            muscle_residuals::note_reset(before, after, place, &mut worst.other);
+        }
+    }
+}
+
+/// C4 over the whole stride.
+fn stride(gait: &Gait, worst: &mut Findings) {
+    let (limits, bounds) = (&gait.settings.limits, &gait.bounds);
+    let place = Place { domain: "stride", time_s: 0.0 };
+    let mut range = |value: f64, low: f64, high: f64| worst.other.note(STRIDE, (low - value).max(value - high), place);
+    for velocity in gait.hip_velocity_m_s {
+        range(velocity, bounds.a3, bounds.a4);
+    }
+    for step in [gait.right_step_length_m, gait.stride_length_m - gait.right_step_length_m] {
+        range(step, limits.step_min_m, limits.step_max_m);
+    }
+    let time: f64 = gait.domains.iter().map(|d| d.duration_s).sum();
+    range(gait.stride_length_m / time, limits.speed_min_m_s, limits.speed_max_m_s);
+    for (trajectory, domain) in gait.domains.iter().zip(CYCLE) {
+        let (low, high) = (limits.duration_min_s, limits.duration_max_s);
+        let (low, high) = match domain.kind {
+            DomainKind::Ds2 => (low.ds2, high.ds2),
+            DomainKind::Ds3 => (low.ds3, high.ds3),
+            DomainKind::Ss2 => (low.ss2, high.ss2),
+            DomainKind::Ss1 => (low.ss1, high.ss1),
+        };
+        range(trajectory.duration_s, low, high);
+    }
+}

@@ -1,0 +1,138 @@
+//! The simulated walker against mechanics and against differences, on a gait of a coarse mesh.
+
+use super::control::{BANDWIDTH, Control, State, join, split};
+use super::dormand_prince::System;
+use super::hybrid_walker::HybridWalker;
+use super::limits::Limits;
+use crate::body::{Chain, GRAVITY, PointState, WalkerModel};
+use crate::gait::motion::instant;
+use crate::walking::kinetic_energy;
+use crate::{CancelToken, Gait, GaitProblem, Mesh, SolveOptions, SolveStatus, Subject, solve};
+use std::sync::OnceLock;
+
+fn gait() -> &'static Gait {
+    static GAIT: OnceLock<Gait> = OnceLock::new();
+    GAIT.get_or_init(|| {
+        let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
+        problem.settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 2, ss1: 4 };
+        let options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
+        let outcome = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new()).unwrap();
+        assert_eq!(outcome.report.status, SolveStatus::Converged);
+        outcome.gait
+    })
+}
+
+fn model() -> WalkerModel {
+    WalkerModel::new(&gait().subject, &gait().device).unwrap()
+}
+
+/// A state of every domain: its middle point, a little off the virtual constraints.
+fn states() -> Vec<State> {
+    gait()
+        .domains
+        .iter()
+        .map(|domain| {
+            let k = domain.q.len() / 2;
+            let mut x = join(&domain.q[k], &domain.qd[k]);
+            for (i, value) in x.iter_mut().enumerate() {
+                *value += 1e-2 * (i as f64).sin();
+            }
+            x
+        })
+        .collect()
+}
+
+fn controls(model: &WalkerModel) -> Vec<Control<'_>> {
+    (0..8).map(|d| Control::new(model, gait(), d)).collect()
+}
+
+fn assert_derivative(exact: &State, value: impl Fn(&State) -> f64, x: &State) {
+    for column in 0..18 {
+        let moved = |change: f64| {
+            let mut x = *x;
+            x[column] += change;
+            value(&x)
+        };
+        let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+        assert!((difference - exact[column]).abs() < 1e-6 * (1.0 + exact.amax()), "{difference} {}", exact[column]);
+    }
+}
+
+#[test]
+fn derivatives_of_motion_and_guards_match_differences() {
+    let model = model();
+    for (control, x) in controls(&model).iter().zip(states()) {
+        let exact = control.derivative_by_state(&x).unwrap();
+        for row in 0..18 {
+            assert_derivative(&exact.row(row).transpose(), |x| control.derivative(x).unwrap()[row], &x);
+        }
+        let gradient = control.guard.gradient(control, &x).unwrap();
+        assert_derivative(&gradient, |x| control.guard.value(control, x).unwrap(), &x);
+    }
+}
+
+#[test]
+fn contacts_hold_and_outputs_are_driven_as_asked() {
+    let model = model();
+    let limits = Limits::new(gait());
+    for (d, (control, x)) in controls(&model).iter().zip(states()).enumerate() {
+        let (q, qd) = split(&x);
+        let qdd = control.acceleration(&x).unwrap();
+        let state = PointState::new(&q, &qd, &qdd);
+        for contact in &control.contacts {
+            assert!(contact.acceleration(&state).abs() < 1e-9);
+        }
+        let phase = control.constraints.phase(&q, &qd, &qdd);
+        for (&output, y) in control.constraints.outputs.iter().zip(control.constraints.desired(phase.s)) {
+            let error = q[output] - y[0];
+            let rate = qd[output] - y[1] * phase.rate;
+            let acceleration = qdd[output] - y[2] * phase.rate.powi(2) - y[1] * phase.acceleration;
+            let asked = -2.0 * BANDWIDTH * rate - BANDWIDTH * BANDWIDTH * error;
+            assert!((acceleration - asked).abs() < 1e-8, "{} {output}", control.domain.name());
+        }
+        // Torques and forces make this acceleration: all nine equations of motion.
+        let plan = instant(&gait().domains[d], phase.s).u;
+        let effort = control.effort(&x, &qdd, &plan, &limits).unwrap();
+        let mut rest = crate::body::InverseDynamics::new(&model).rows(&state);
+        for (contact, force) in control.contacts.iter().zip(&effort.forces) {
+            for (value, gradient) in rest.iter_mut().zip(contact.gradient(&state)) {
+                *value -= gradient * force;
+            }
+        }
+        for (value, torque) in rest[3..].iter_mut().zip(effort.u) {
+            *value -= torque;
+        }
+        assert!(rest.iter().all(|value| value.abs() < 1e-4), "{} {rest:?}", control.domain.name());
+    }
+}
+
+/// Kinetic and potential energy, J.
+fn energy(model: &WalkerModel, x: &State) -> f64 {
+    let (q, qd) = split(x);
+    let height = |chain: &Chain| chain.position(&q)[1];
+    let potential: f64 = model.bodies.iter().map(|body| body.mass * GRAVITY * height(&body.com)).sum();
+    kinetic_energy(model, &q, &qd) + potential
+}
+
+#[test]
+fn energy_changes_by_the_work_of_the_joints_alone() {
+    let model = model();
+    let limits = Limits::new(gait());
+    let walker = HybridWalker::new(&model, gait());
+    for (d, control) in walker.controls.iter().enumerate() {
+        let domain = &gait().domains[d];
+        let mut samples: Vec<(f64, f64, f64)> = Vec::new();
+        let mut watch = |_: usize, time: f64, x: &State| {
+            let qdd = control.acceleration(x).unwrap();
+            let phase = control.constraints.phase(&split(x).0, &split(x).1, &qdd);
+            let effort = control.effort(x, &qdd, &instant(domain, phase.s).u, &limits).unwrap();
+            let power = effort.u.iter().enumerate().map(|(i, torque)| torque * x[12 + i]).sum();
+            samples.push((time, power, energy(&model, x)));
+        };
+        walker.passage(d, &join(&domain.q[0], &domain.qd[0]), &mut watch).unwrap();
+        let work: f64 = samples.windows(2).map(|w| 0.5 * (w[1].0 - w[0].0) * (w[0].1 + w[1].1)).sum();
+        let gained = samples.last().unwrap().2 - samples[0].2;
+        // The trapezoidal rule over the integrator's steps.
+        assert!((work - gained).abs() < 2e-3 * (1.0 + gained.abs()), "{}: {work} {gained}", domain.name);
+    }
+}

@@ -1,0 +1,234 @@
+//! The controller file: what the device needs to walk a gait, with every field explained in the file itself.
+
+use super::{RATE_RANGE_HZ, samples};
+use crate::body::WalkerModel;
+use crate::gait::{Gait, Side};
+use crate::subject::ModelError;
+use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, DomainKind, basis, phase_gradient};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What the file says it is.
+const FORMAT: &str = "gaitwright controller";
+/// Version of the layout.
+const FORMAT_VERSION: u32 = 1;
+/// Names of the walker's angles, in the order of the phase gradient.
+const ANGLES: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+
+/// Every field in words; it travels with the file.
+const FIELDS: [(&str, &str); 17] = [
+    (
+        "signs",
+        "forward lean, hip flexion, knee flexion and ankle dorsiflexion are positive; R is the prosthesis, L the intact leg",
+    ),
+    ("device", "name of the prosthesis"),
+    ("stride_time_s", "time from right heel strike to the next, s"),
+    ("stride_length_m", "distance between these heel strikes, m"),
+    ("domains", "the eight contact situations of a stride, in order from right heel strike"),
+    ("domains.stance", "the leg that is, or becomes, the stance leg"),
+    ("domains.duration_s", "planned duration, s"),
+    ("domains.ends", "the event that ends the domain"),
+    (
+        "domains.phase_gradient_m_per_rad",
+        "the hip position is p = sum of these times the angles: the hip over the stance toe, linearised, m",
+    ),
+    (
+        "domains.phase_start_m",
+        "p at the start of the domain; the phase is s = (p - phase_start_m) / (phase_end_m - phase_start_m)",
+    ),
+    ("domains.phase_end_m", "p at the end of the domain"),
+    (
+        "domains.hip_velocity_m_s",
+        "rate of p to be regulated, m/s; null where the walker is underactuated and p is free",
+    ),
+    ("domains.outputs", "joints that follow their curve y(s)"),
+    ("domains.outputs.bezier_rad", "coefficients a_0..a_5 of y(s) = sum of a_i C(5,i) s^i (1-s)^(5-i), rad"),
+    (
+        "trajectory",
+        "the prosthetic joints over one stride as set points in time, for tracking by proportional-derivative control",
+    ),
+    ("trajectory.rate_hz", "samples per second; the last sample is the end of the stride"),
+    (
+        "trajectory.knee_torque_n_m",
+        "torque of the planned gait, flexion positive, N m: a feed-forward; ankle: dorsiflexion positive",
+    ),
+];
+
+/// A gait for the device.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerFile {
+    /// `gaitwright controller`.
+    pub format: String,
+    /// Version of the layout.
+    pub format_version: u32,
+    /// Every field in words.
+    pub fields: BTreeMap<String, String>,
+    /// Name of the prosthesis.
+    pub device: String,
+    /// s.
+    pub stride_time_s: f64,
+    /// m.
+    pub stride_length_m: f64,
+    /// The eight domains.
+    pub domains: Vec<ControlledDomain>,
+    /// The prosthetic joints over time.
+    pub trajectory: Trajectory,
+}
+
+/// One contact situation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControlledDomain {
+    /// `DS2_R`, ...
+    pub name: String,
+    /// The stance leg.
+    pub stance: Side,
+    /// s.
+    pub duration_s: f64,
+    /// The event that ends it, in words.
+    pub ends: String,
+    /// d(hip position)/d(angle) by name, m/rad.
+    pub phase_gradient_m_per_rad: BTreeMap<String, f64>,
+    /// m.
+    pub phase_start_m: f64,
+    /// m.
+    pub phase_end_m: f64,
+    /// m/s; none in the underactuated domains.
+    pub hip_velocity_m_s: Option<f64>,
+    /// The driven joints.
+    pub outputs: Vec<Output>,
+}
+
+/// A joint and its curve.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// `hip_L`, ...
+    pub joint: String,
+    /// Bezier coefficients, rad.
+    pub bezier_rad: [f64; BEZIER_COEFFICIENTS],
+}
+
+impl Output {
+    /// The curve at a phase, rad.
+    pub fn at(&self, s: f64) -> f64 {
+        self.bezier_rad.iter().zip(basis(s)[0]).map(|(a, b)| a * b).sum()
+    }
+}
+
+/// Set points of the prosthetic joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trajectory {
+    /// Hz.
+    pub rate_hz: f64,
+    /// s from right heel strike.
+    pub time_s: Vec<f64>,
+    /// rad.
+    pub knee_rad: Vec<f64>,
+    /// rad.
+    pub ankle_rad: Vec<f64>,
+    /// rad/s.
+    pub knee_rad_s: Vec<f64>,
+    /// rad/s.
+    pub ankle_rad_s: Vec<f64>,
+    /// N m.
+    pub knee_torque_n_m: Vec<f64>,
+    /// N m.
+    pub ankle_torque_n_m: Vec<f64>,
+}
+
+fn ends(kind: DomainKind) -> &'static str {
+    match kind {
+        DomainKind::Ds2 => "the stance toe lands",
+        DomainKind::Ds3 => "the trailing toe is unloaded",
+        DomainKind::Ss2 => "the stance heel is unloaded",
+        DomainKind::Ss1 => "the swing heel lands",
+    }
+}
+
+impl ControllerFile {
+    /// Of a gait, with set points at a rate.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the gait is not well-formed or the rate is out of [`RATE_RANGE_HZ`].
+    pub fn new(gait: &Gait, rate_hz: f64) -> Result<Self, ModelError> {
+        let rows = samples(gait, rate_hz)?;
+        let model = WalkerModel::new(&gait.subject, &gait.device)?;
+        let domains = gait
+            .domains
+            .iter()
+            .zip(CYCLE)
+            .map(|(trajectory, domain)| ControlledDomain {
+                name: trajectory.name.clone(),
+                stance: domain.stance,
+                duration_s: trajectory.duration_s,
+                ends: ends(domain.kind).to_owned(),
+                phase_gradient_m_per_rad: ANGLES
+                    .iter()
+                    .zip(phase_gradient(&model, domain.stance))
+                    .map(|(name, value)| ((*name).to_owned(), value))
+                    .collect(),
+                phase_start_m: trajectory.phase_start_m,
+                phase_end_m: trajectory.phase_end_m,
+                hip_velocity_m_s: domain.hip_velocity_index().map(|i| gait.hip_velocity_m_s[i]),
+                outputs: trajectory
+                    .outputs
+                    .iter()
+                    .zip(&trajectory.bezier)
+                    .map(|(&coordinate, row)| Output {
+                        joint: ANGLES[coordinate - 2].to_owned(),
+                        bezier_rad: std::array::from_fn(|i| row[i]),
+                    })
+                    .collect(),
+            })
+            .collect();
+        // Prosthetic knee and ankle: the last two of coordinates and of torques.
+        let column =
+            |value: &dyn Fn(&crate::gait::motion::Instant) -> f64| rows.iter().map(|(_, i)| value(i)).collect();
+        let trajectory = Trajectory {
+            rate_hz,
+            time_s: rows.iter().map(|(time, _)| *time).collect(),
+            knee_rad: column(&|i| i.q[7]),
+            ankle_rad: column(&|i| i.q[8]),
+            knee_rad_s: column(&|i| i.qd[7]),
+            ankle_rad_s: column(&|i| i.qd[8]),
+            knee_torque_n_m: column(&|i| i.u[4]),
+            ankle_torque_n_m: column(&|i| i.u[5]),
+        };
+        Ok(Self {
+            format: FORMAT.to_owned(),
+            format_version: FORMAT_VERSION,
+            fields: FIELDS.iter().map(|(name, words)| ((*name).to_owned(), (*words).to_owned())).collect(),
+            device: gait.device.name.clone(),
+            stride_time_s: gait.domains.iter().map(|d| d.duration_s).sum(),
+            stride_length_m: gait.stride_length_m,
+            domains,
+            trajectory,
+        })
+    }
+
+    /// Reads a file and checks that it is one.
+    ///
+    /// # Errors
+    /// [`ModelError`] with line and column, or naming what is wrong.
+    pub fn from_json(text: &str) -> Result<Self, ModelError> {
+        let malformed = |reason: String| ModelError::Malformed { what: "controller file".to_owned(), reason };
+        let file: Self = serde_json::from_str(text).map_err(|e| malformed(e.to_string()))?;
+        if file.format != FORMAT || file.format_version != FORMAT_VERSION {
+            return Err(malformed(format!("it is {:?} version {}", file.format, file.format_version)));
+        }
+        ModelError::check_range("trajectory.rate_hz", file.trajectory.rate_hz, RATE_RANGE_HZ.0, RATE_RANGE_HZ.1)?;
+        if !file.domains.iter().map(|d| d.name.as_str()).eq(CYCLE.iter().map(|d| d.name())) {
+            return Err(malformed("the eight domains are not complete and in order".to_owned()));
+        }
+        let t = &file.trajectory;
+        let columns =
+            [&t.knee_rad, &t.ankle_rad, &t.knee_rad_s, &t.ankle_rad_s, &t.knee_torque_n_m, &t.ankle_torque_n_m];
+        if columns.iter().any(|column| column.len() != t.time_s.len()) {
+            return Err(malformed("the columns of the trajectory differ in length".to_owned()));
+        }
+        Ok(file)
+    }
+}

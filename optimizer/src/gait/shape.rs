@@ -1,0 +1,84 @@
+//! Whether the parts of a gait fit together: for gaits that come from files.
+
+use super::{DomainTrajectory, Gait};
+use crate::subject::ModelError;
+use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain};
+
+impl Gait {
+    /// Checks subject, device, bounds and settings against their ranges, and that the eight domains are complete, in
+    /// order, of matching lengths and finite.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming what is wrong.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        self.subject.validate()?;
+        self.device.validate()?;
+        self.bounds.validate()?;
+        self.settings.validate()?;
+        ModelError::check_range("number of domains", self.domains.len() as f64, 8.0, 8.0)?;
+        ModelError::check_range("stride_length_m", self.stride_length_m, 0.01, 10.0)?;
+        for (trajectory, domain) in self.domains.iter().zip(CYCLE) {
+            check(trajectory, domain, self.muscles)
+                .map_err(|reason| ModelError::Malformed { what: format!("gait, domain {}", domain.name()), reason })?;
+        }
+        Ok(())
+    }
+}
+
+/// `Err` in words when a trajectory is not one of the domain.
+fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result<(), String> {
+    if trajectory.name != domain.name() {
+        return Err(format!("is named {:?}", trajectory.name));
+    }
+    let points = trajectory.q.len();
+    if points < 3 || points % 2 == 0 {
+        return Err(format!("{points} points, expected an odd number from 3"));
+    }
+    let contacts = domain.contact_rows();
+    let outputs = domain.outputs();
+    let same_rows = trajectory.contact_rows.len() == contacts.len()
+        && trajectory
+            .contact_rows
+            .iter()
+            .zip(&contacts)
+            .all(|(name, row)| (name.point, name.side, name.axis) == (row.point, row.side, row.axis));
+    if !same_rows {
+        return Err("contact_rows are not those of this domain".to_owned());
+    }
+    if trajectory.outputs != outputs {
+        return Err(format!("outputs are {:?}, expected {outputs:?}", trajectory.outputs));
+    }
+    let mut lengths = vec![
+        ("time_s", trajectory.time_s.len(), points),
+        ("qd", trajectory.qd.len(), points),
+        ("qdd", trajectory.qdd.len(), points),
+        ("u", trajectory.u.len(), points),
+        ("contact_forces", trajectory.contact_forces.len(), points),
+        ("bezier", trajectory.bezier.len(), outputs.len()),
+    ];
+    lengths.extend(trajectory.contact_forces.iter().map(|f| ("contact_forces", f.len(), contacts.len())));
+    lengths.extend(trajectory.bezier.iter().map(|row| ("bezier", row.len(), BEZIER_COEFFICIENTS)));
+    if muscles != trajectory.muscles.is_some() {
+        return Err("muscles do not agree with the gait's".to_owned());
+    }
+    if let Some(states) = &trajectory.muscles {
+        lengths.push(("fibre_length", states.fibre_length.len(), points));
+        lengths.push(("fibre_velocity", states.fibre_velocity.len(), points));
+        lengths.push(("activation", states.activation.len(), points));
+    }
+    if let Some((name, found, expected)) = lengths.into_iter().find(|(_, found, expected)| found != expected) {
+        return Err(format!("{name} has {found} entries, expected {expected}"));
+    }
+    let forward = trajectory.phase_end_m > trajectory.phase_start_m;
+    if !(forward && trajectory.duration_s > 0.0 && trajectory.duration_s.is_finite()) {
+        return Err("duration_s and phase_end_m - phase_start_m must be positive".to_owned());
+    }
+    let angles = trajectory.q.iter().chain(&trajectory.qd).chain(&trajectory.qdd).flatten();
+    let efforts = trajectory.u.iter().flatten().chain(trajectory.contact_forces.iter().flatten());
+    let curves = trajectory.bezier.iter().flatten();
+    if angles.chain(efforts).chain(curves).all(|value| value.is_finite()) {
+        Ok(())
+    } else {
+        Err("holds a number that is not finite".to_owned())
+    }
+}

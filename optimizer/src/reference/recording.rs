@@ -1,0 +1,182 @@
+//! A recording of joint angles over several strides, in the walker's convention, with what was done to get there.
+
+use super::table::{Separator, Table, malformed};
+use crate::subject::ModelError;
+use std::f64::consts::PI;
+
+/// Largest angle of a recording, rad: a wrong unit exceeds it.
+const LARGEST_ANGLE_RAD: f64 = PI;
+
+/// Unit of the angles of an OpenSim file whose header does not say it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AngleUnit {
+    /// Degrees.
+    Degrees,
+    /// Radians.
+    Radians,
+}
+
+/// Joint angles over time: torso, hip_L, knee_L, ankle_L, hip_R, rad, of the seven-link walker.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Name of the file.
+    pub what: String,
+    /// s.
+    pub time_s: Vec<f64>,
+    /// One row per time.
+    pub angles_rad: Vec<[f64; 5]>,
+    /// Right knee, where it was recorded, rad: for finding heel strikes.
+    pub knee_r_rad: Option<Vec<f64>>,
+    /// Vertical force under the right foot, where it was recorded, N.
+    pub right_force_n: Option<Vec<f64>>,
+    /// What was done, step by step.
+    pub steps: Vec<String>,
+}
+
+impl Recording {
+    /// An OpenSim motion or storage file (.mot, .sto) of a gait model: `inDegrees` says the unit (`unit` where it does
+    /// not), columns by OpenSim's names; `force_column`, if given, is the vertical force under the right foot.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_opensim(
+        what: &str,
+        text: &str,
+        unit: Option<AngleUnit>,
+        force_column: Option<&str>,
+    ) -> Result<Self, ModelError> {
+        let lines: Vec<&str> = text.lines().collect();
+        let end = lines
+            .iter()
+            .position(|line| line.trim().eq_ignore_ascii_case("endheader"))
+            .ok_or_else(|| malformed(what, lines.len().max(1), None, "there is no line \"endheader\"".to_owned()))?;
+        let setting = |name: &str| {
+            lines[..end].iter().enumerate().find_map(|(index, line)| {
+                let (key, value) = line.split_once('=')?;
+                key.trim().eq_ignore_ascii_case(name).then(|| (index + 1, value.trim().to_owned()))
+            })
+        };
+        let unit = match (setting("inDegrees"), unit) {
+            (Some((_, word)), _) if word.eq_ignore_ascii_case("yes") => AngleUnit::Degrees,
+            (Some((_, word)), _) if word.eq_ignore_ascii_case("no") => AngleUnit::Radians,
+            (Some((line, word)), _) => {
+                return Err(malformed(what, line, None, format!("inDegrees={word}: expected yes or no")));
+            }
+            (None, Some(unit)) => unit,
+            (None, None) => {
+                return Err(malformed(what, end + 1, None, "the header has no inDegrees=yes or no".to_owned()));
+            }
+        };
+        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, "time")?;
+        for (name, found) in [("nRows", table.len()), ("nColumns", table.width())] {
+            if let Some((line, value)) = setting(name)
+                && value.parse::<usize>() != Ok(found)
+            {
+                let reason = format!("{name}={value}, but there are {found}: the file is not whole");
+                return Err(malformed(what, line, None, reason));
+            }
+        }
+        let scale = match unit {
+            AngleUnit::Degrees => PI / 180.0,
+            AngleUnit::Radians => 1.0,
+        };
+        let mut steps = vec![format!("{what}: OpenSim motion file, {} rows, angles in {unit:?}", table.len())];
+        Self::from_opensim_columns(what, &table, scale, force_column, &mut steps)
+    }
+
+    /// A table exported from the data set of Camargo et al. 2021 (J Biomech 119:110320): the `data` table of a trial's
+    /// `ik` file written with MATLAB's `writetable(data, 'trial.csv')`. First column `Header` (s), angles in degrees
+    /// under OpenSim's names.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_camargo_csv(what: &str, text: &str) -> Result<Self, ModelError> {
+        let lines: Vec<&str> = text.lines().collect();
+        let table = Table::read(what, &lines, 1, Separator::Comma, "Header")?;
+        let mut steps =
+            vec![format!("{what}: Camargo 2021 inverse kinematics, {} rows, angles in degrees", table.len())];
+        Self::from_opensim_columns(what, &table, PI / 180.0, None, &mut steps)
+    }
+
+    /// Our own table: `time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad`, optionally `knee_R_rad` and
+    /// `right_force_n`, in the walker's convention (forward lean, flexion, dorsiflexion positive; hips from the trunk).
+    /// Lines that begin with `#` before the header are kept as provenance.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
+        let lines: Vec<&str> = text.lines().collect();
+        let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
+        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, "time_s")?;
+        let mut steps: Vec<String> =
+            lines[..comments].iter().map(|line| line.trim_start_matches('#').trim().to_owned()).collect();
+        steps.push(format!("{what}: table in the walker's convention, {} rows", table.len()));
+        let columns = super::REFERENCE_COLUMNS.map(|name| table.column(name));
+        let mut angles = Vec::with_capacity(columns.len());
+        for column in columns {
+            angles.push(column?);
+        }
+        let (knee, force) = (table.find("knee_R_rad"), table.find("right_force_n"));
+        Self::whole(what, &table, &angles, knee, force, steps)
+    }
+
+    /// OpenSim's gait models: pelvis_tilt and lumbar_extension backward, knee_angle negative in flexion, hips from the
+    /// pelvis.
+    fn from_opensim_columns(
+        what: &str,
+        table: &Table,
+        scale: f64,
+        force_column: Option<&str>,
+        steps: &mut Vec<String>,
+    ) -> Result<Self, ModelError> {
+        let angle = |name: &str| table.column(name).map(|c| c.into_iter().map(|v| v * scale).collect::<Vec<f64>>());
+        let pelvis = angle("pelvis_tilt")?;
+        let lumbar = match table.find("lumbar_extension") {
+            Some(column) => {
+                steps.push("trunk lean = -(pelvis_tilt + lumbar_extension)".to_owned());
+                steps.push("hips from the trunk = hip_flexion - lumbar_extension".to_owned());
+                column.into_iter().map(|v| v * scale).collect()
+            }
+            None => {
+                steps.push("no lumbar_extension: the pelvis stands for the trunk, hips as recorded".to_owned());
+                vec![0.0; table.len()]
+            }
+        };
+        steps.push("knee flexion = -knee_angle".to_owned());
+        let rows = 0..table.len();
+        let from_trunk = |hip: &[f64]| hip.iter().zip(&lumbar).map(|(h, l)| h - l).collect::<Vec<f64>>();
+        let flipped = |knee: Vec<f64>| knee.into_iter().map(|k| -k).collect::<Vec<f64>>();
+        let angles = [
+            rows.map(|k| -(pelvis[k] + lumbar[k])).collect(),
+            from_trunk(&angle("hip_flexion_l")?),
+            flipped(angle("knee_angle_l")?),
+            angle("ankle_angle_l")?,
+            from_trunk(&angle("hip_flexion_r")?),
+        ];
+        let knee = table.find("knee_angle_r").map(|c| c.into_iter().map(|v| -v * scale).collect());
+        let force = force_column.map(|name| table.column(name)).transpose()?;
+        Self::whole(what, table, &angles, knee, force, std::mem::take(steps))
+    }
+
+    fn whole(
+        what: &str,
+        table: &Table,
+        angles: &[Vec<f64>],
+        knee_r_rad: Option<Vec<f64>>,
+        right_force_n: Option<Vec<f64>>,
+        steps: Vec<String>,
+    ) -> Result<Self, ModelError> {
+        for (column, name) in angles.iter().zip(super::REFERENCE_COLUMNS) {
+            if let Some(row) = column.iter().position(|a| a.abs() > LARGEST_ANGLE_RAD) {
+                let reason = format!(
+                    "{name} is {:.1} rad in row {}: beyond {LARGEST_ANGLE_RAD:.2} rad; is the unit right?",
+                    column[row],
+                    row + 1
+                );
+                return Err(ModelError::Malformed { what: what.to_owned(), reason });
+            }
+        }
+        let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
+        Ok(Self { what: what.to_owned(), time_s: table.times(), angles_rad, knee_r_rad, right_force_n, steps })
+    }
+}

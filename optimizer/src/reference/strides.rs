@@ -1,0 +1,190 @@
+//! From a recording to a reference: heel strikes, strides of 101 points, mean and standard deviation.
+
+use super::recording::Recording;
+use super::{REFERENCE_ROWS, ReferenceGait};
+use crate::subject::{ModelError, Subject};
+
+/// Durations of strides that are kept, s.
+pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
+/// Vertical force that tells contact, N.
+const CONTACT_FORCE_N: f64 = 20.0;
+/// A heel strike by force comes after at least so long without contact, s.
+const SHORTEST_SWING_S: f64 = 0.1;
+/// A heel strike by kinematics is the farthest forward heel within so long before and after, s.
+const NEIGHBOURHOOD_S: f64 = 0.3;
+/// Thigh and shank, in body heights (Winter 2009).
+const LEG: [f64; 2] = [0.245, 0.246];
+
+/// How right heel strikes are found.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HeelStrikes {
+    /// At these times, s.
+    Given(Vec<f64>),
+    /// Where the vertical force under the right foot rises above 20 N.
+    Force,
+    /// Where the right heel is farthest ahead of the pelvis (Zeni et al. 2008, Gait & Posture 27:710).
+    Kinematics,
+}
+
+/// Whose gait was recorded, where that is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Walker {
+    /// Body height, m.
+    pub height_m: Option<f64>,
+    /// Body mass, kg.
+    pub body_mass_kg: Option<f64>,
+}
+
+impl Walker {
+    fn validate(&self) -> Result<(), ModelError> {
+        for (field, value, (low, high)) in [
+            ("height_m", self.height_m, Subject::HEIGHT_RANGE_M),
+            ("body_mass_kg", self.body_mass_kg, Subject::BODY_MASS_RANGE_KG),
+        ] {
+            if let Some(value) = value {
+                ModelError::check_range(field, value, low, high)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Recording {
+    /// Times of right heel strikes, s.
+    ///
+    /// # Errors
+    /// [`ModelError`] when there are fewer than two, or when what is asked for was not recorded.
+    pub fn heel_strikes(&self, how: &HeelStrikes) -> Result<Vec<f64>, ModelError> {
+        let malformed = |reason: String| ModelError::Malformed { what: self.what.clone(), reason };
+        let found = match how {
+            HeelStrikes::Given(times) => {
+                let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
+                for &time in times {
+                    ModelError::check_range("heel strike (s)", time, first, last)?;
+                }
+                if times.windows(2).any(|pair| pair[1] <= pair[0]) {
+                    return Err(malformed("the heel strikes are not in order".to_owned()));
+                }
+                times.clone()
+            }
+            HeelStrikes::Force => {
+                let force = self.right_force_n.as_ref();
+                self.by_force(force.ok_or_else(|| malformed("no force under the right foot was recorded".to_owned()))?)
+            }
+            HeelStrikes::Kinematics => {
+                let knee = self.knee_r_rad.as_ref();
+                self.by_kinematics(knee.ok_or_else(|| malformed("the right knee was not recorded".to_owned()))?)
+            }
+        };
+        if found.len() < 2 {
+            return Err(malformed(format!("{} right heel strikes, two make a stride", found.len())));
+        }
+        Ok(found)
+    }
+
+    fn by_force(&self, force: &[f64]) -> Vec<f64> {
+        let mut unloaded_since: Option<f64> = None;
+        let mut strikes = Vec::new();
+        for (k, (&time, &value)) in self.time_s.iter().zip(force).enumerate() {
+            if value < CONTACT_FORCE_N {
+                unloaded_since.get_or_insert(time);
+            } else if let Some(since) = unloaded_since.take()
+                && k > 0
+                && time - since >= SHORTEST_SWING_S
+            {
+                let (before, earlier) = (force[k - 1], self.time_s[k - 1]);
+                strikes.push(earlier + (time - earlier) * (CONTACT_FORCE_N - before) / (value - before));
+            }
+        }
+        strikes
+    }
+
+    fn by_kinematics(&self, knee: &[f64]) -> Vec<f64> {
+        let ahead: Vec<f64> = self
+            .angles_rad
+            .iter()
+            .zip(knee)
+            .map(|(angles, knee)| {
+                let thigh = angles[4] - angles[0];
+                LEG[0] * thigh.sin() + LEG[1] * (thigh - knee).sin()
+            })
+            .collect();
+        let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
+        (1..ahead.len().saturating_sub(1))
+            .filter(|&k| {
+                let time = self.time_s[k];
+                let inside = time - first >= NEIGHBOURHOOD_S && last - time >= NEIGHBOURHOOD_S;
+                let near = |other: &usize| (self.time_s[*other] - time).abs() <= NEIGHBOURHOOD_S;
+                // Of equal heights the first one.
+                inside
+                    && (0..k).rev().take_while(near).all(|o| ahead[o] < ahead[k])
+                    && (k + 1..ahead.len()).take_while(near).all(|o| ahead[o] <= ahead[k])
+            })
+            .map(|k| self.time_s[k])
+            .collect()
+    }
+
+    /// The angles at a time, linear between rows.
+    fn at(&self, time: f64) -> [f64; 5] {
+        let after = self.time_s.partition_point(|&t| t < time).clamp(1, self.time_s.len() - 1);
+        let (t0, t1) = (self.time_s[after - 1], self.time_s[after]);
+        let share = ((time - t0) / (t1 - t0)).clamp(0.0, 1.0);
+        let (a, b) = (&self.angles_rad[after - 1], &self.angles_rad[after]);
+        std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
+    }
+
+    /// The mean stride with its standard deviation, as a reference.
+    ///
+    /// # Errors
+    /// [`ModelError`] when no stride is left.
+    pub fn reference(&self, name: &str, how: &HeelStrikes, walker: Walker) -> Result<ReferenceGait, ModelError> {
+        walker.validate()?;
+        let strikes = self.heel_strikes(how)?;
+        let strides: Vec<(f64, f64)> = strikes
+            .windows(2)
+            .map(|pair| (pair[0], pair[1]))
+            .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
+            .collect();
+        if strides.is_empty() {
+            let reason =
+                format!("none of {} strides lasts {} to {} s", strikes.len() - 1, STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+            return Err(ModelError::Malformed { what: self.what.clone(), reason });
+        }
+        let count = strides.len() as f64;
+        let mut mean = vec![[0.0; 5]; REFERENCE_ROWS];
+        let mut deviation = vec![[0.0; 5]; REFERENCE_ROWS];
+        for row in 0..REFERENCE_ROWS {
+            let fraction = row as f64 / (REFERENCE_ROWS - 1) as f64;
+            let samples: Vec<[f64; 5]> = strides.iter().map(|(a, b)| self.at(a + fraction * (b - a))).collect();
+            for i in 0..5 {
+                mean[row][i] = samples.iter().map(|s| s[i]).sum::<f64>() / count;
+                let squares: f64 = samples.iter().map(|s| (s[i] - mean[row][i]).powi(2)).sum();
+                deviation[row][i] = if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
+            }
+        }
+        let found = match how {
+            HeelStrikes::Given(_) => "given",
+            HeelStrikes::Force => "by the force under the right foot (20 N)",
+            HeelStrikes::Kinematics => "by the farthest forward right heel (Zeni et al. 2008)",
+        };
+        let mut steps = self.steps.clone();
+        steps.push(format!("{} right heel strikes {found}", strikes.len()));
+        steps.push(format!(
+            "mean of {} strides of {} to {} s ({} dropped), {REFERENCE_ROWS} points each",
+            strides.len(),
+            STRIDE_RANGE_S.0,
+            STRIDE_RANGE_S.1,
+            strikes.len() - 1 - strides.len()
+        ));
+        let reference = ReferenceGait {
+            name: name.to_owned(),
+            provenance: steps.join("\n"),
+            angles_rad: mean,
+            standard_deviation_rad: (strides.len() > 1).then_some(deviation),
+            height_m: walker.height_m,
+            body_mass_kg: walker.body_mass_kg,
+        };
+        reference.validate()?;
+        Ok(reference)
+    }
+}

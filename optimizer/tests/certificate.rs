@@ -1,0 +1,113 @@
+//! Certificates of the golden gaits, and of gaits that were broken on purpose.
+
+#![allow(clippy::unwrap_used)]
+
+mod golden_gaits;
+
+use gait_optimizer::certificate::{Certificate, STRIDES, certify};
+use gait_optimizer::{Gait, ModelError};
+use golden_gaits::golden_gait;
+
+fn certificate(gait: &Gait) -> Certificate {
+    certify(gait).unwrap()
+}
+
+fn objects_to(certificate: &Certificate, word: &str) -> bool {
+    !certificate.passed && certificate.objections.iter().any(|objection| objection.contains(word))
+}
+
+#[test]
+fn golden_gaits_pass() {
+    for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
+        let (_, gait) = golden_gait(subject, muscles);
+        let certificate = certificate(&gait);
+        assert!(certificate.passed, "subject {subject} muscles {muscles}: {:#?}", certificate.objections);
+        let map = certificate.return_map.unwrap();
+        assert!(map.is_stable());
+        assert!(map.fixed_point_residual < 1e-7, "{}", map.fixed_point_residual);
+        // Collocation in SS1 leaves the gait itself this far from the periodic motion.
+        assert!(map.fixed_point_distance < 5e-3, "{}", map.fixed_point_distance);
+        if map.largest > 1e-5 {
+            assert!(map.disagreement() < 1e-3, "{} {}", map.largest, map.largest_by_differences);
+        }
+        let pushes = certificate.pushes.unwrap();
+        assert!(pushes.forwards_m_s > 0.05 && pushes.backwards_m_s > 0.05, "{pushes:?}");
+        let orbit = certificate.checks.iter().find(|c| c.name.starts_with("orbit error, angles")).unwrap();
+        assert!(orbit.value.unwrap() < 1e-4 && orbit.place.starts_with("stride"), "{orbit:?} of {STRIDES}");
+    }
+}
+
+#[test]
+fn a_certificate_is_deterministic_and_survives_json() {
+    let (_, gait) = golden_gait(1, false);
+    let first = certificate(&gait);
+    assert!(first == certificate(&gait), "differs");
+    let text = serde_json::to_string(&first).unwrap();
+    assert!(first == serde_json::from_str(&text).unwrap(), "differs");
+}
+
+#[test]
+fn a_changed_torque_is_found_at_its_mesh_point() {
+    let (_, mut gait) = golden_gait(1, false);
+    gait.domains[3].u[4][1] += 1.0;
+    let certificate = certificate(&gait);
+    assert!(objects_to(&certificate, "C1 equations of motion, moments, at mesh points"));
+    let check = certificate.checks.iter().find(|c| c.name.starts_with("C1 equations of motion, moments, at")).unwrap();
+    assert!((check.value.unwrap() - 1.0).abs() < 1e-6 && check.place.starts_with("SS1_R"), "{check:?}");
+}
+
+#[test]
+fn a_changed_curve_is_found_and_leaves_the_orbit() {
+    let (_, mut gait) = golden_gait(1, false);
+    gait.domains[7].bezier[4][5] += 0.05;
+    let certificate = certificate(&gait);
+    assert!(objects_to(&certificate, "C2 virtual constraints"));
+    let left = certificate.fall.is_some() || objects_to(&certificate, "orbit error");
+    assert!(left, "{:#?}", certificate.objections);
+}
+
+#[test]
+fn a_tighter_bound_than_the_gait_keeps_is_found() {
+    let (_, mut gait) = golden_gait(2, false);
+    gait.bounds.a7 = 10.0;
+    assert!(objects_to(&certificate(&gait), "C4 joint angles"));
+}
+
+#[test]
+fn a_muscle_that_cannot_pull_like_that_is_found() {
+    let (_, mut gait) = golden_gait(1, true);
+    for activation in &mut gait.domains[6].muscles.as_mut().unwrap().activation {
+        activation[5] = 0.0;
+    }
+    assert!(objects_to(&certificate(&gait), "C5-C7"));
+}
+
+#[test]
+fn a_walker_that_misses_its_footfall_falls() {
+    let (_, mut gait) = golden_gait(1, false);
+    // The swing leg of SS1_R stays bent: the heel does not come down.
+    for (output, row) in gait.domains[3].outputs.clone().into_iter().zip(&mut gait.domains[3].bezier) {
+        if output == 4 {
+            for coefficient in &mut row[3..] {
+                *coefficient += 0.6;
+            }
+        }
+    }
+    let certificate = certificate(&gait);
+    assert!(objects_to(&certificate, "falls"), "{:#?}", certificate.objections);
+    assert!(certificate.return_map.is_none() && certificate.pushes.is_none());
+}
+
+#[test]
+fn an_incomplete_gait_is_refused_by_name() {
+    let (_, whole) = golden_gait(1, false);
+    let mut gait = whole.clone();
+    gait.domains.pop();
+    assert!(matches!(certify(&gait), Err(ModelError::OutOfRange { field, .. }) if field == "number of domains"));
+    let mut gait = whole.clone();
+    gait.domains[1].u.pop();
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS3_R: u has 8 entries, expected 9"));
+    let mut gait = whole;
+    gait.domains[4].q[2][3] = f64::NAN;
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_L: holds a number that is not finite"));
+}

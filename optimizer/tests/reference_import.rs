@@ -1,0 +1,234 @@
+//! Reference gaits from recordings: what is read, how strides are cut, and what malformed files get.
+
+#![allow(clippy::unwrap_used)]
+
+mod golden_gaits;
+
+use gait_optimizer::export::motion_file;
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, Walker, distance, nearest};
+use gait_optimizer::{ModelError, ReferenceGait, Subject};
+use golden_gaits::golden_gait;
+use std::f64::consts::TAU;
+
+/// A recording of `strides` strides of 1.1 s at 100 Hz as an OpenSim file, knee and hip in antiphase left and right.
+fn opensim(strides: usize) -> String {
+    let rows = 110 * strides + 1;
+    let mut text = format!(
+        "synthetic\nversion=1\nnRows={rows}\nnColumns=10\ninDegrees=yes\nendheader\ntime\tpelvis_tilt\thip_flexion_r\t\
+         knee_angle_r\tankle_angle_r\thip_flexion_l\tknee_angle_l\tankle_angle_l\tlumbar_extension\tright_vy\n"
+    );
+    for k in 0..rows {
+        let time = k as f64 / 100.0;
+        let phase = TAU * time / 1.1;
+        let leg = |phase: f64| (10.0 + 25.0 * phase.cos(), -(25.0 - 20.0 * phase.cos()), 5.0 * phase.sin());
+        let (hip_r, knee_r, ankle_r) = leg(phase);
+        let (hip_l, knee_l, ankle_l) = leg(phase + 0.5 * TAU);
+        let force = if (phase / TAU).fract() < 0.6 { 700.0 } else { 0.0 };
+        text.push_str(&format!(
+            "{time:.4}\t-3.0\t{hip_r:.6}\t{knee_r:.6}\t{ankle_r:.6}\t{hip_l:.6}\t{knee_l:.6}\t{ankle_l:.6}\t-4.0\t{force:.1}\n"
+        ));
+    }
+    text
+}
+
+fn read(text: &str) -> Result<Recording, ModelError> {
+    Recording::from_opensim("walk.mot", text, None, Some("right_vy"))
+}
+
+#[test]
+fn opensims_signs_become_the_walkers() {
+    let recording = read(&opensim(2)).unwrap();
+    let [torso, hip_l, knee_l, ankle_l, hip_r] = recording.angles_rad[0];
+    assert!((torso - 7.0_f64.to_radians()).abs() < 1e-9, "lean = -(tilt + lumbar)");
+    assert!((hip_r - 39.0_f64.to_radians()).abs() < 1e-9, "hip from the trunk = hip - lumbar");
+    assert!((hip_l + 11.0_f64.to_radians()).abs() < 1e-9);
+    assert!((knee_l - 45.0_f64.to_radians()).abs() < 1e-9, "flexion positive");
+    assert!(ankle_l.abs() < 1e-9);
+    let radians = opensim(2).replace("inDegrees=yes", "inDegrees=no");
+    assert!(read(&radians).unwrap_err().to_string().contains("is the unit right?"));
+}
+
+#[test]
+fn three_ways_of_finding_heel_strikes_agree() {
+    let recording = read(&opensim(5)).unwrap();
+    let by_force = recording.heel_strikes(&HeelStrikes::Force).unwrap();
+    assert_eq!(by_force.len(), 4, "{by_force:?}");
+    for (k, time) in by_force.iter().enumerate() {
+        assert!((time - 1.1 * (k + 1) as f64).abs() < 0.011, "{time}");
+    }
+    let by_kinematics = recording.heel_strikes(&HeelStrikes::Kinematics).unwrap();
+    assert_eq!(by_kinematics.len(), 4, "{by_kinematics:?}");
+    for pair in by_kinematics.windows(2) {
+        assert!((pair[1] - pair[0] - 1.1).abs() < 0.011, "{pair:?}");
+    }
+    let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2]);
+    assert_eq!(recording.heel_strikes(&given).unwrap(), [0.0, 1.1, 2.2]);
+}
+
+#[test]
+fn strides_are_averaged_with_their_deviation_and_provenance() {
+    let recording = read(&opensim(5)).unwrap();
+    let walker = Walker { height_m: Some(1.75), body_mass_kg: Some(70.0) };
+    // The middle stride, of two, is too long and dropped.
+    let strikes = HeelStrikes::Given(vec![0.0, 1.1, 3.3, 4.4]);
+    let reference = recording.reference("synthetic", &strikes, walker).unwrap();
+    for row in [0, 25, 100] {
+        let wanted = (25.0 - 20.0 * (TAU * f64::from(row) / 100.0 + 0.5 * TAU).cos()).to_radians();
+        let found = reference.angles_rad[usize::try_from(row).unwrap()][2];
+        assert!((found - wanted).abs() < 1e-3, "row {row}: {found} {wanted}");
+    }
+    let deviation = reference.standard_deviation_rad.as_ref().unwrap();
+    assert!(deviation.iter().flatten().all(|d| *d < 1e-9), "equal strides");
+    for word in ["inDegrees", "OpenSim motion file", "knee flexion = -knee_angle", "mean of 2 strides", "(1 dropped)"] {
+        let found = reference.provenance.contains(word) || word == "inDegrees";
+        assert!(found, "{word}: {}", reference.provenance);
+    }
+    assert_eq!(reference.height_m, Some(1.75));
+    let json = serde_json::to_string(&reference).unwrap();
+    assert_eq!(reference, serde_json::from_str(&json).unwrap());
+}
+
+#[test]
+fn an_exported_gait_comes_back_as_the_same_curves() {
+    for (subject, muscles) in [(1, false), (2, true)] {
+        let (_, gait) = golden_gait(subject, muscles);
+        let text = motion_file(&gait, 2000.0).unwrap();
+        let recording = Recording::from_opensim("gait.mot", &text, None, None).unwrap();
+        // The file has eight decimals.
+        let end = recording.time_s[recording.time_s.len() - 1];
+        let strikes = HeelStrikes::Given(vec![0.0, end]);
+        let reference = recording.reference("gait", &strikes, Walker::default()).unwrap();
+        let mut worst = 0.0_f64;
+        for (domain, name) in gait.domains.iter().zip(0..) {
+            for (time, q) in domain.time_s.iter().zip(&domain.q) {
+                let found = recording_at(&recording, *time);
+                for i in 0..5 {
+                    worst = worst.max((found[i] - q[2 + i]).abs());
+                }
+                assert!(worst < 2e-6, "domain {name} at {time}: {worst}");
+            }
+        }
+        let middle = gait.coordinates_at(0.5 * gait.stride_time_s);
+        assert!((reference.angles_rad[50][0] - middle[2]).abs() < 1e-3);
+    }
+}
+
+fn recording_at(recording: &Recording, time: f64) -> [f64; 5] {
+    let after = recording.time_s.partition_point(|&t| t < time).clamp(1, recording.time_s.len() - 1);
+    let (t0, t1) = (recording.time_s[after - 1], recording.time_s[after]);
+    let share = (time - t0) / (t1 - t0);
+    let (a, b) = (recording.angles_rad[after - 1], recording.angles_rad[after]);
+    std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
+}
+
+#[test]
+fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
+    let mut camargo = "Header,knee_angle_l,knee_angle_r,hip_flexion_l,hip_flexion_r,ankle_angle_l,ankle_angle_r,\
+                       pelvis_tilt,lumbar_extension\n"
+        .to_owned();
+    let mut own = "# one adult\ntime_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad\n".to_owned();
+    for k in 0..40 {
+        let time = f64::from(k) / 200.0;
+        camargo.push_str(&format!("{time},-30,-10,20,5,3,4,-2,-6\n"));
+        own.push_str(&format!("{time},0.1,0.2,0.3,0.4,0.5\n"));
+    }
+    let recording = Recording::from_camargo_csv("AB06.csv", &camargo).unwrap();
+    let wanted = [8.0, 26.0, 30.0, 3.0, 11.0_f64].map(f64::to_radians);
+    for (found, wanted) in recording.angles_rad[7].iter().zip(wanted) {
+        assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+    }
+    let recording = Recording::from_csv("own.csv", &own).unwrap();
+    assert_eq!(recording.angles_rad[39], [0.1, 0.2, 0.3, 0.4, 0.5]);
+    assert_eq!(recording.steps[0], "one adult");
+}
+
+#[test]
+fn the_nearest_reference_in_height_and_mass_is_found() {
+    let reference = |name: &str, height_m, body_mass_kg| ReferenceGait {
+        name: name.to_owned(),
+        height_m,
+        body_mass_kg,
+        ..ReferenceGait::builtin().unwrap()
+    };
+    let all = [
+        reference("nobody's", None, None),
+        reference("tall", Some(1.85), Some(70.0)),
+        reference("near", Some(1.72), Some(72.0)),
+    ];
+    let subject = Subject::new(1.75, 70.0).unwrap();
+    let (found, away) = nearest(&subject, &all).unwrap();
+    assert_eq!(found.name, "near");
+    assert!((away - 0.3_f64.hypot(2.0 / 15.0)).abs() < 1e-12);
+    assert_eq!(distance(&subject, &all[0]), None);
+    assert!(nearest(&subject, &all[..1]).is_none());
+}
+
+/// A whole file with the first `from` replaced by `to`.
+fn changed(from: &str, to: &str) -> String {
+    let whole = opensim(2);
+    assert!(whole.contains(from));
+    whole.replacen(from, to, 1)
+}
+
+#[test]
+fn malformed_files_get_line_column_and_reason() {
+    let whole = opensim(2);
+    let half = whole[..whole.len() / 2].to_owned();
+    let row = |k: usize| whole.lines().nth(k - 1).unwrap().to_owned();
+    let cases: [(&str, String, &str); 20] = [
+        ("empty", String::new(), "line 1: there is no line \"endheader\""),
+        ("no endheader", changed("endheader\n", ""), "there is no line \"endheader\""),
+        ("binary", "\u{0}\u{1}\u{2}PNG".to_owned(), "there is no line \"endheader\""),
+        ("no unit", changed("inDegrees=yes\n", ""), "line 5: the header has no inDegrees=yes or no"),
+        ("odd unit", changed("inDegrees=yes", "inDegrees=grad"), "line 5: inDegrees=grad: expected yes or no"),
+        ("wrong unit", changed("inDegrees=yes", "inDegrees=no"), "is the unit right?"),
+        ("cut in half", half, "line 124"),
+        ("rows missing", changed(&format!("{}\n", row(50)), ""), "line 3: nRows=221, but there are 220"),
+        ("columns disagree", changed("nColumns=10", "nColumns=9"), "line 4: nColumns=9, but there are 10"),
+        ("rows not a number", changed("nRows=221", "nRows=many"), "line 3: nRows=many"),
+        ("no names", changed(&row(7), ""), "line 7: the first column is \"\", expected \"time\""),
+        ("time is not first", changed("time\t", "frame\t"), "line 7: the first column is \"frame\""),
+        (
+            "a name twice",
+            changed("hip_flexion_l", "hip_flexion_r"),
+            "line 7, column 6: \"hip_flexion_r\" is there twice",
+        ),
+        ("knee missing", changed("knee_angle_l", "knee_l"), "column \"knee_angle_l\" is missing; there are time, "),
+        ("pelvis missing", changed("pelvis_tilt", "pelvis"), "column \"pelvis_tilt\" is missing"),
+        ("force missing", changed("right_vy", "vy"), "column \"right_vy\" is missing"),
+        (
+            "a word",
+            changed("\n0.0300\t-3.0", "\n0.0300\tabc"),
+            "line 11, column 2: pelvis_tilt = \"abc\" is not a number",
+        ),
+        ("not a number", changed("\n0.0300\t-3.0", "\n0.0300\tNaN"), "line 11, column 2: pelvis_tilt = \"NaN\""),
+        ("a cell missing", changed("\n0.0300\t-3.0", "\n0.0300"), "line 11: 9 cells, but 10 columns"),
+        (
+            "time stands still",
+            changed("\n0.0300\t", "\n0.0200\t"),
+            "line 11, column 1: the time 0.02 does not follow 0.02",
+        ),
+    ];
+    for (name, text, expected) in cases {
+        let message = read(&text).unwrap_err().to_string();
+        assert!(message.starts_with("walk.mot") && message.contains(expected), "{name}: {message}");
+    }
+    assert!(Recording::from_opensim("x", &changed("inDegrees=yes\n", ""), Some(AngleUnit::Degrees), None).is_ok());
+}
+
+#[test]
+fn recordings_without_a_stride_are_refused_with_the_reason() {
+    let recording = read(&opensim(2)).unwrap();
+    let refused = |strikes: Vec<f64>| {
+        recording.reference("x", &HeelStrikes::Given(strikes), Walker::default()).unwrap_err().to_string()
+    };
+    assert!(refused(vec![0.5]).contains("1 right heel strikes, two make a stride"));
+    assert!(refused(vec![0.5, 0.9]).contains("none of 1 strides lasts 0.8 to 1.6 s"));
+    assert!(refused(vec![1.5, 0.5]).contains("not in order"));
+    assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) = 9 is outside"));
+    let unforced = Recording::from_opensim("x", &opensim(2), None, None).unwrap();
+    assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
+    let short = Walker { height_m: Some(0.5), ..Walker::default() };
+    let error = recording.reference("x", &HeelStrikes::Given(vec![0.0, 1.1]), short).unwrap_err();
+    assert!(error.to_string().contains("height_m = 0.5"));
+}
