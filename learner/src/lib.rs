@@ -16,7 +16,6 @@ mod ask;
 mod belief;
 mod error;
 mod feedback;
-mod given;
 mod grid;
 mod hyperparameters;
 mod inference;

@@ -3,8 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
-use crate::given::GivenSettings;
 use crate::likelihood::Interval;
+
+mod written;
+
+use written::WrittenSettings;
 
 /// How the next action is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -87,7 +90,7 @@ pub enum Partner {
 /// In a document every field is optional: one that names a method has [`LearnerSettings::of`] that method in what it
 /// leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(from = "GivenSettings")]
+#[serde(from = "WrittenSettings")]
 pub struct LearnerSettings {
     /// How the next action is chosen.
     pub method: Method,
