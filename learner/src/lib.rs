@@ -32,7 +32,7 @@ mod space;
 mod state;
 
 pub use answers::{Agreement, BestProbability, Marginal, Slice};
-pub use ask::{Question, QuestionReason, comparisons_to_ask, what_to_ask};
+pub use ask::{Question, QuestionReason, comparisons_to_ask, comparisons_to_ask_among, what_to_ask};
 pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
 pub use posterior::{Learner, Posterior, Prediction, posterior};
