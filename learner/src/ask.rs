@@ -240,7 +240,7 @@ mod tests {
     fn nothing_is_asked_about_an_action_that_did_not_converge() {
         let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
         let space = SearchSpace::new(vec![dimension]).unwrap();
-        let fails = |action: ActionIndex| action.0 % 3 == 0;
+        let fails = |action: ActionIndex| action.0.is_multiple_of(3);
         for partner in [Partner::Previous, Partner::Incumbent, Partner::Every] {
             for method in [Method::LineCoSpar, Method::Eubo] {
                 let settings = LearnerSettings { partner, ..LearnerSettings::of(method) };

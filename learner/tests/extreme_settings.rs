@@ -65,7 +65,9 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
         let [preference_noise, ordinal_noise, coactive_noise, tie_noise, tie_width] = noises.map(|noise| noise * sd);
         ordinal_thresholds.sort_by(f64::total_cmp);
         ordinal_thresholds.dedup_by(|b, a| *b - *a < 2e-3);
-        ordinal_thresholds.iter_mut().for_each(|threshold| *threshold *= sd);
+        for threshold in &mut ordinal_thresholds {
+            *threshold *= sd;
+        }
         let within = |value: f64, low: f64, high: f64| value.clamp(low * sd, high * sd);
         LearnerSettings {
             inference,
