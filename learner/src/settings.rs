@@ -167,7 +167,6 @@ impl LearnerSettings {
         match method {
             Method::Eubo => Self {
                 labels: Labels::Separate,
-                lengthscale_factor: 1.5,
                 lines: 20,
                 line_trials: 10,
                 start: Start::Centre,
@@ -175,6 +174,12 @@ impl LearnerSettings {
             },
             _ => Self { repeats: false, partner: Partner::Incumbent, ..Self::published(method) },
         }
+    }
+
+    /// EUBO for answers that may be wrong: it assumes much noise and a smooth utility, so that it leans on many answers
+    /// rather than on the last one, and never leaves the neighbourhood of the best.
+    pub fn for_uncertain_answers() -> Self {
+        Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: usize::MAX, ..Self::of(Method::Eubo) }
     }
 
     /// The settings of a method as the literature has them: LineCoSpar may repeat actions and compares with the last

@@ -22,9 +22,20 @@ fn space(shape: &[usize]) -> SearchSpace {
     SearchSpace::new(dimensions).unwrap()
 }
 
+/// Every way to choose an action with every way to approximate the posterior.
+fn methods_and_inferences() -> Vec<LearnerSettings> {
+    let approximations = [(Inference::Laplace, Link::Logistic), (Inference::ExpectationPropagation, Link::Probit)];
+    [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random]
+        .into_iter()
+        .flat_map(|method| {
+            approximations.map(|(inference, link)| LearnerSettings { inference, link, ..LearnerSettings::of(method) })
+        })
+        .collect()
+}
+
 fn all_settings() -> Vec<LearnerSettings> {
-    let methods = [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random];
-    let mut settings: Vec<LearnerSettings> = methods.map(LearnerSettings::of).to_vec();
+    let mut settings = methods_and_inferences();
+    settings.push(LearnerSettings::for_uncertain_answers());
     settings.push(LearnerSettings::published(Method::LineCoSpar));
     settings.push(LearnerSettings::published(Method::Eubo));
     settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::default() });
@@ -105,7 +116,7 @@ fn a_thousand_answers_against_every_order() {
     let feedback =
         (0..1000).map(|i| Feedback::Preference { winner: ring[i % 40], loser: ring[(i + 1) % 40] }).collect();
     let log = FeedbackLog { visited: ring, feedback };
-    for settings in [LearnerSettings::default(), LearnerSettings::of(Method::Eubo)] {
+    for settings in methods_and_inferences() {
         exercise(&space, &log, &settings);
     }
 }

@@ -7,10 +7,11 @@
 //! ```
 //!
 //! NAME is `random` (the winner stays), a method (`linecospar`, `eubo`, `thompson`, `information_gain`) with its
-//! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having
-//! been answered (`k + 1` actions tried), and prints the quartiles. `--noise S` answers with logistic noise of scale
-//! `S` on the utility. `--batch N` proposes `N` actions before the first of them is answered. `--set` changes settings
-//! of the method. Regret is 1 minus the utility of the recommended action. `--seeds A..B` does not include `B`.
+//! recommended settings, a method with `_published` settings, or `eubo_uncertain` (EUBO for answers that may be wrong).
+//! Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the quartiles.
+//! `--noise S` answers with logistic noise of scale `S` on the utility. `--batch N` proposes `N` actions before the first
+//! of them is answered. `--set` changes settings of the method. Regret is 1 minus the utility of the recommended action.
+//! `--seeds A..B` does not include `B`.
 //!
 //! `--summarise` reads such files: medians with bootstrap intervals and quartiles, and, of every further file against
 //! the first, how many seeds were better and worse with the p-values of the paired sign test and of Wilcoxon's.
@@ -89,15 +90,12 @@ fn options() -> Result<Options, Box<dyn Error>> {
 
 /// The settings of a method with the changes asked for.
 fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
-    let (name, published) = match options.method.strip_suffix("_published") {
-        Some(name) => (name, true),
-        None => (options.method.as_str(), false),
-    };
-    let method = serde_json::from_value(name.into())?;
-    let mut document = if published {
-        serde_json::to_value(LearnerSettings::published(method))?
+    let mut document = if options.method == "eubo_uncertain" {
+        serde_json::to_value(LearnerSettings::for_uncertain_answers())?
+    } else if let Some(name) = options.method.strip_suffix("_published") {
+        serde_json::to_value(LearnerSettings::published(serde_json::from_value(name.into())?))?
     } else {
-        serde_json::json!({ "method": method })
+        serde_json::json!({ "method": options.method })
     };
     document.as_object_mut().ok_or("settings are an object")?.extend(options.set.clone());
     Ok(serde_json::from_value(document)?)
