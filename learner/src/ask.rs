@@ -152,9 +152,9 @@ const ANSWERS_PER_REPEAT: usize = 8;
 /// The next comparison worth asking about the actions already tried, if any.
 ///
 /// Nothing is asked about an action whose last label is the lowest category: nobody can compare what did not converge.
-/// Of the others, first the last action against its partners of [`comparisons_to_ask`], then against the action tried before it and
-/// the best one, where not answered yet. When all are, one pair in eight is asked again, the oldest that was asked only
-/// once: what people answer the second time says how far their answers can be trusted.
+/// Of the others, first the last action against its partners of [`comparisons_to_ask`], then against the action tried
+/// before it and the best one, where not answered yet. When all are, one pair in eight is asked again, the oldest that
+/// was asked only once: what people answer the second time says how far their answers can be trusted.
 ///
 /// # Errors
 /// When a setting is out of range or the log does not fit the space.

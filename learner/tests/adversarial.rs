@@ -392,8 +392,8 @@ proptest! {
                     log.feedback.remove(at.index(log.feedback.len()));
                 }
                 2 => {
-                    let reduced = FeedbackLog { feedback: with_categories_of(&other, log.feedback.clone()), ..log.clone() };
-                    learner.posterior(&space, &reduced, &other).unwrap();
+                    let feedback = with_categories_of(&other, log.feedback.clone());
+                    learner.posterior(&space, &FeedbackLog { feedback, ..log.clone() }, &other).unwrap();
                 }
                 _ => log.feedback.extend(with_categories_of(&settings, vec![feedback])),
             }
