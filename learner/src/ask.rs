@@ -49,13 +49,38 @@ pub fn comparisons_to_ask(
     Learner::default().comparisons_to_ask(space, log, action, settings)
 }
 
+/// As [`comparisons_to_ask`] where some actions cannot be compared, because there is nothing to show of them.
+///
+/// They count in their batches; in the buffer, and as the best one, stand the others.
+///
+/// # Errors
+/// As [`comparisons_to_ask`].
+pub fn comparisons_to_ask_among(
+    space: &SearchSpace,
+    log: &FeedbackLog,
+    action: ActionIndex,
+    settings: &LearnerSettings,
+    comparable: impl Fn(ActionIndex) -> bool,
+) -> Result<Vec<Question>> {
+    let of = Partners::of(settings, &comparable);
+    Learner::default().questions(space, log, action, settings, &of)
+}
+
 /// Earlier actions to compare with.
-struct Partners {
+struct Partners<'a> {
     which: Partner,
     /// Of the previous ones, how many before the batch.
     buffer: usize,
     /// How many trials are one batch.
     batch: usize,
+    /// Whether an action can be compared at all.
+    comparable: &'a dyn Fn(ActionIndex) -> bool,
+}
+
+impl<'a> Partners<'a> {
+    fn of(settings: &LearnerSettings, comparable: &'a dyn Fn(ActionIndex) -> bool) -> Self {
+        Self { which: settings.partner, buffer: settings.buffer, batch: settings.samples_per_iteration, comparable }
+    }
 }
 
 impl Learner {
@@ -70,8 +95,7 @@ impl Learner {
         action: ActionIndex,
         settings: &LearnerSettings,
     ) -> Result<Vec<Question>> {
-        let of = Partners { which: settings.partner, buffer: settings.buffer, batch: settings.samples_per_iteration };
-        self.questions(space, log, action, settings, &of)
+        self.questions(space, log, action, settings, &Partners::of(settings, &|_| true))
     }
 
     /// The comparisons with a kind of partners, whatever the settings say of these: no belief depends on that.
@@ -81,7 +105,7 @@ impl Learner {
         log: &FeedbackLog,
         action: ActionIndex,
         settings: &LearnerSettings,
-        of: &Partners,
+        of: &Partners<'_>,
     ) -> Result<Vec<Question>> {
         space.check(action)?;
         settings.validate()?;
@@ -95,24 +119,24 @@ impl Learner {
         let earlier = &log.visited[..end];
         let mut questions: Vec<Question> = Vec::new();
         let mut add = |against, reason| {
-            if against != action && !questions.iter().any(|q: &Question| q.against == against) {
+            if against != action
+                && (of.comparable)(against)
+                && !questions.iter().any(|q: &Question| q.against == against)
+            {
                 questions.push(Question { action, against, reason });
             }
         };
         match of.which {
             Partner::Previous => {
-                let of_the_batch = end % of.batch.max(1);
-                earlier
-                    .iter()
-                    .rev()
-                    .take(of_the_batch.saturating_add(of.buffer))
-                    .for_each(|&a| add(a, QuestionReason::Previous));
+                let (before, batch) = earlier.split_at(end - end % of.batch.max(1));
+                let buffered = before.iter().rev().filter(|a| (of.comparable)(**a)).take(of.buffer);
+                batch.iter().rev().chain(buffered).for_each(|&a| add(a, QuestionReason::Previous));
             }
             Partner::Every => earlier.iter().rev().for_each(|&a| add(a, QuestionReason::Previous)),
             Partner::Incumbent if earlier.is_empty() => {}
             Partner::Incumbent => {
                 let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
-                let best = self.posterior(space, &before, settings)?.best();
+                let best = self.posterior(space, &before, settings)?.best_of(of.comparable);
                 if let Some(best) = best {
                     add(best, QuestionReason::Incumbent);
                 }
@@ -127,9 +151,10 @@ const ANSWERS_PER_REPEAT: usize = 8;
 
 /// The next comparison worth asking about the actions already tried, if any.
 ///
-/// First the last action against its partners of [`comparisons_to_ask`], then against the action tried before it and
-/// the best one, where not answered yet. When all are, one pair in eight is asked again, the oldest that was asked only
-/// once: what people answer the second time says how far their answers can be trusted.
+/// Nothing is asked about an action whose last label is the lowest category: nobody can compare what did not converge.
+/// Of the others, first the last action against its partners of [`comparisons_to_ask`], then against the action tried
+/// before it and the best one, where not answered yet. When all are, one pair in eight is asked again, the oldest that
+/// was asked only once: what people answer the second time says how far their answers can be trusted.
 ///
 /// # Errors
 /// When a setting is out of range or the log does not fit the space.
@@ -148,7 +173,9 @@ impl Learner {
         log: &FeedbackLog,
         settings: &LearnerSettings,
     ) -> Result<Option<Question>> {
-        let Some(&last) = log.visited.last() else { return Ok(None) };
+        let failed = log.in_lowest_category(settings.categories());
+        let comparable = |action: ActionIndex| !failed.contains(&action);
+        let Some(&last) = log.visited.iter().rev().find(|a| comparable(**a)) else { return Ok(None) };
         let pair = |a: ActionIndex, b: ActionIndex| (a.min(b), a.max(b));
         let answered: Vec<(ActionIndex, ActionIndex)> = log
             .feedback
@@ -159,9 +186,10 @@ impl Learner {
                 Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
             })
             .collect();
-        let mut questions = self.comparisons_to_ask(space, log, last, settings)?;
+        let mut questions = self.questions(space, log, last, settings, &Partners::of(settings, &comparable))?;
         for which in [Partner::Previous, Partner::Incumbent] {
-            questions.extend(self.questions(space, log, last, settings, &Partners { which, buffer: 1, batch: 1 })?);
+            let of = Partners { which, buffer: 1, batch: 1, comparable: &comparable };
+            questions.extend(self.questions(space, log, last, settings, &of)?);
         }
         if let Some(open) = questions.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
             return Ok(Some(open));
@@ -171,7 +199,7 @@ impl Learner {
         if answered.len() < ANSWERS_PER_REPEAT * (again + 1) {
             return Ok(None);
         }
-        let once = answered.iter().find(|asked| times(asked) == 1);
+        let once = answered.iter().find(|asked| times(asked) == 1 && comparable(asked.0) && comparable(asked.1));
         Ok(once.map(|&(action, against)| Question { action, against, reason: QuestionReason::Consistency }))
     }
 }
@@ -206,6 +234,60 @@ mod tests {
         assert_eq!(reasons[0], QuestionReason::Incumbent);
         assert!(reasons.contains(&QuestionReason::Previous));
         assert_eq!(reasons.iter().filter(|r| **r == QuestionReason::Consistency).count(), 1, "{reasons:?}");
+    }
+
+    #[test]
+    fn nothing_is_asked_about_an_action_that_did_not_converge() {
+        let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let fails = |action: ActionIndex| action.0.is_multiple_of(3);
+        for partner in [Partner::Previous, Partner::Incumbent, Partner::Every] {
+            for method in [Method::LineCoSpar, Method::Eubo] {
+                let settings = LearnerSettings { partner, ..LearnerSettings::of(method) };
+                let mut log = FeedbackLog::default();
+                let mut asked = 0;
+                for action in [3, 4, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18].map(ActionIndex) {
+                    log.visited.push(action);
+                    log.feedback.push(Feedback::Label { action, category: usize::from(!fails(action)) });
+                    while let Some(question) = what_to_ask(&space, &log, &settings).unwrap() {
+                        assert!(!fails(question.action) && !fails(question.against), "{question:?}");
+                        log.feedback.push(Feedback::Preference { winner: question.action, loser: question.against });
+                        asked += 1;
+                        assert!(asked < 100, "asks for ever");
+                    }
+                }
+                assert!(asked >= 6, "{asked}");
+            }
+        }
+        // A label that was corrected counts, not the one before it.
+        let [a, b] = [1, 2].map(ActionIndex);
+        let labels = [0, 1].map(|category| Feedback::Label { action: a, category });
+        let log = FeedbackLog { visited: vec![a, b], feedback: labels.to_vec() };
+        let settings = LearnerSettings::default();
+        let question = what_to_ask(&space, &log, &settings).unwrap().unwrap();
+        assert_eq!((question.action, question.against), (b, a));
+        let corrected = FeedbackLog { feedback: labels.into_iter().rev().collect(), ..log };
+        assert_eq!(what_to_ask(&space, &corrected, &settings).unwrap(), None);
+    }
+
+    #[test]
+    fn what_cannot_be_compared_counts_in_its_batch() {
+        let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
+        let space = SearchSpace::new(vec![dimension]).unwrap();
+        let (partner, repeats) = (Partner::Previous, false);
+        let settings =
+            LearnerSettings { samples_per_iteration: 3, buffer: 2, partner, repeats, ..LearnerSettings::default() };
+        // Batches 0 1 2, 3 4 5, 6 7: of the first two, 1, 4 and 5 cannot be compared.
+        let log = FeedbackLog { visited: (0..8).map(ActionIndex).collect(), feedback: Vec::new() };
+        let comparable = |action: ActionIndex| ![1, 4, 5].contains(&action.0);
+        let against = |action: u64| -> Vec<u64> {
+            let asked = comparisons_to_ask_among(&space, &log, ActionIndex(action), &settings, comparable).unwrap();
+            asked.iter().map(|question| question.against.0).collect()
+        };
+        assert_eq!(against(2), [0]);
+        assert_eq!(against(3), [2, 0]);
+        assert_eq!(against(6), [3, 2]);
+        assert_eq!(against(7), [6, 3, 2]);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What people (or a computed figure of merit) say about actions, and the log of it.
 
+use std::collections::HashSet;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
@@ -61,6 +63,21 @@ pub struct FeedbackLog {
 }
 
 impl FeedbackLog {
+    /// The actions whose last label is the lowest of several categories.
+    pub(crate) fn in_lowest_category(&self, categories: usize) -> HashSet<ActionIndex> {
+        let mut lowest = HashSet::new();
+        for &feedback in &self.feedback {
+            if let Feedback::Label { action, category } = feedback {
+                if category == 0 && categories > 1 {
+                    lowest.insert(action);
+                } else {
+                    lowest.remove(&action);
+                }
+            }
+        }
+        lowest
+    }
+
     /// Checks that the log speaks of this space and of existing categories only.
     ///
     /// # Errors

@@ -16,7 +16,6 @@ mod ask;
 mod belief;
 mod error;
 mod feedback;
-mod given;
 mod grid;
 mod hyperparameters;
 mod inference;
@@ -33,7 +32,7 @@ mod space;
 mod state;
 
 pub use answers::{Agreement, BestProbability, Marginal, Slice};
-pub use ask::{Question, QuestionReason, comparisons_to_ask, what_to_ask};
+pub use ask::{Question, QuestionReason, comparisons_to_ask, comparisons_to_ask_among, what_to_ask};
 pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
 pub use posterior::{Learner, Posterior, Prediction, posterior};

@@ -141,16 +141,7 @@ impl Learner {
         if !self.of.as_ref().is_some_and(|(s, t)| s == space && t == settings) {
             *self = Self { of: Some((space.clone(), settings.clone())), ..Self::default() };
         }
-        let mut infeasible = HashSet::new();
-        for &feedback in &log.feedback {
-            if let Feedback::Label { action, category } = feedback {
-                if category == 0 && settings.categories() > 1 {
-                    infeasible.insert(action);
-                } else {
-                    infeasible.remove(&action);
-                }
-            }
-        }
+        let infeasible = log.in_lowest_category(settings.categories());
         let method: &dyn Approximate = match settings.inference {
             Inference::Laplace => &Laplace,
             Inference::ExpectationPropagation => &ExpectationPropagation::default(),
@@ -265,9 +256,14 @@ impl Posterior {
     ///
     /// When labels are about a function of their own, actions in the lowest category come last.
     pub fn best(&self) -> Option<ActionIndex> {
+        self.best_of(|_| true)
+    }
+
+    /// The recommendation among some of the actions.
+    pub(crate) fn best_of(&self, among: impl Fn(ActionIndex) -> bool) -> Option<ActionIndex> {
         let separate = self.feasibility.is_some();
         let mut best: Option<(ActionIndex, (bool, f64))> = None;
-        for &action in &self.visited {
+        for &action in self.visited.iter().filter(|action| among(**action)) {
             let feasible = !(separate && self.infeasible.contains(&action));
             let rank = (feasible, self.utility.mean(action, &self.space.levels(action)));
             if best.is_none_or(|(_, highest)| rank > highest) {

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use serde::{Deserialize, Serialize};
 
 use crate::acquisition::avoidance::Avoidance;
-use crate::acquisition::information::InformationGain;
+use crate::acquisition::information::{InformationGain, Pair};
 use crate::acquisition::{eubo, line, thompson};
 use crate::error::{LearnerError, Result};
 use crate::feedback::FeedbackLog;
@@ -269,16 +269,23 @@ fn informative(
     let utility = &belief.utility;
     let other = utility.view(partner, space.levels(partner));
     let other_variance = utility.variance(&other);
+    // A partner in the lowest category loses to whatever is not: that tells nothing of the utility.
+    let compared = belief.feasibility.is_none() || !belief.infeasible.contains(&partner);
     let mut top: Option<((bool, f64), ActionIndex)> = None;
     for _ in 0..INFORMATION_CANDIDATES {
         let action = random_untried(space, taken, random);
         let view = utility.view(action, space.levels(action));
-        let variance = utility.variance(&view);
-        let covariance = utility.covariance(&view, &other);
-        let rank = (
-            avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(action)),
-            gain.of([view.mean, other.mean], [variance, other_variance], covariance),
-        );
+        let pair = Pair {
+            mean: [view.mean, other.mean],
+            variance: [utility.variance(&view), other_variance],
+            covariance: utility.covariance(&view, &other),
+            compared,
+        };
+        let feasibility = belief.feasibility.as_ref().map(|belief| {
+            let view = belief.view(action, space.levels(action));
+            (view.mean, belief.variance(&view))
+        });
+        let rank = (avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(action)), gain.of(&pair, feasibility));
         if top.is_none_or(|(highest, _)| rank > highest) {
             top = Some((rank, action));
         }

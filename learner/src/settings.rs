@@ -3,8 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
-use crate::given::GivenSettings;
 use crate::likelihood::Interval;
+
+mod written;
+
+use written::WrittenSettings;
 
 /// How the next action is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -87,7 +90,7 @@ pub enum Partner {
 /// In a document every field is optional: one that names a method has [`LearnerSettings::of`] that method in what it
 /// leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(from = "GivenSettings")]
+#[serde(from = "WrittenSettings")]
 pub struct LearnerSettings {
     /// How the next action is chosen.
     pub method: Method,
@@ -164,7 +167,6 @@ impl LearnerSettings {
         match method {
             Method::Eubo => Self {
                 labels: Labels::Separate,
-                lengthscale_factor: 1.5,
                 lines: 20,
                 line_trials: 10,
                 start: Start::Centre,
@@ -172,6 +174,12 @@ impl LearnerSettings {
             },
             _ => Self { repeats: false, partner: Partner::Incumbent, ..Self::published(method) },
         }
+    }
+
+    /// EUBO for answers that may be wrong: it assumes much noise and a smooth utility, so that it leans on many answers
+    /// rather than on the last one, and never leaves the neighbourhood of the best.
+    pub fn for_uncertain_answers() -> Self {
+        Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: usize::MAX, ..Self::of(Method::Eubo) }
     }
 
     /// The settings of a method as the literature has them: LineCoSpar may repeat actions and compares with the last
@@ -254,23 +262,34 @@ impl LearnerSettings {
     /// At the first setting outside its range.
     pub fn validate(&self) -> Result<()> {
         let refuse = |setting, reason: String| Err(LearnerError::InvalidSetting { setting, reason });
+        let outside = |value: f64, low: f64, high: f64| format!("{value} is not between {low} and {high}");
         for (setting, value, low, high) in [
-            ("signal_variance", self.signal_variance, 1e-8, 1e8),
+            ("signal_variance", self.signal_variance, 1e-6, 1e6),
             ("nugget", self.nugget, 1e-10 * self.signal_variance, self.signal_variance),
-            ("lengthscale_factor", self.lengthscale_factor, 1e-3, 1e3),
+            ("lengthscale_factor", self.lengthscale_factor, 1e-2, 1e2),
             ("additive_share", self.additive_share, 0.0, 1.0),
             ("pairwise_share", self.pairwise_share, 0.0, 1.0),
             ("broad_lengthscale", self.broad_lengthscale, 1e-2, 1e3),
-            ("feasibility_lengthscale_factor", self.feasibility_lengthscale_factor, 1e-3, 1e3),
+            ("feasibility_lengthscale_factor", self.feasibility_lengthscale_factor, 1e-2, 1e2),
             ("feasibility_additive_share", self.feasibility_additive_share, 0.0, 1.0),
-            ("preference_noise", self.preference_noise, 1e-4, 1e4),
-            ("ordinal_noise", self.ordinal_noise, 1e-4, 1e4),
-            ("coactive_noise", self.coactive_noise, 1e-4, 1e4),
-            ("tie_noise", self.tie_noise, 1e-4, 1e4),
-            ("tie_width", self.tie_width, 1e-4, 1e4),
         ] {
             if !(value >= low && value <= high) {
-                return refuse(setting, format!("{value} is not between {low} and {high}"));
+                return refuse(setting, outside(value, low, high));
+            }
+        }
+        // Beyond these ratios an answer says everything or nothing, and double precision cannot tell.
+        let deviation = self.signal_variance.sqrt();
+        let (low, high) = (1e-3 * deviation, 1e3 * deviation);
+        for (setting, value) in [
+            ("preference_noise", self.preference_noise),
+            ("ordinal_noise", self.ordinal_noise),
+            ("coactive_noise", self.coactive_noise),
+            ("tie_noise", self.tie_noise),
+            ("tie_width", self.tie_width),
+        ] {
+            if !(value >= low && value <= high) {
+                let reason = outside(value, low, high) + ", 1e-3 and 1e3 times the root of signal_variance";
+                return refuse(setting, reason);
             }
         }
         if self.learn_every == Some(0) {
@@ -287,11 +306,15 @@ impl LearnerSettings {
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
             return refuse("link", "expectation propagation needs the probit link".into());
         }
-        if self.ordinal_thresholds.iter().any(|t| t.is_nan() || t.abs() > 1e4) {
-            return refuse("ordinal_thresholds", "thresholds must be numbers between -10000 and 10000".into());
+        let farthest = 10.0 * deviation;
+        if let Some(&threshold) = self.ordinal_thresholds.iter().find(|t| t.is_nan() || t.abs() > farthest) {
+            let reason = outside(threshold, -farthest, farthest) + ", ten times the root of signal_variance";
+            return refuse("ordinal_thresholds", reason);
         }
-        if self.ordinal_thresholds.windows(2).any(|pair| pair[1] - pair[0] < 1e-4) {
-            return refuse("ordinal_thresholds", "thresholds must increase by at least 0.0001".into());
+        let narrowest = 1e-3 * deviation;
+        if let Some([below, above]) = self.ordinal_thresholds.array_windows().find(|[a, b]| b - a < narrowest) {
+            let reason = format!("{above} after {below} does not increase by {narrowest} or more");
+            return refuse("ordinal_thresholds", reason);
         }
         if self.ordinal_thresholds.len() > 100 {
             return refuse("ordinal_thresholds", "at most 100 thresholds are accepted".into());

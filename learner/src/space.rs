@@ -14,6 +14,14 @@ const MAX_ENUMERATED: usize = 1 << 20;
 const MAX_LEVELS: usize = 10_000;
 /// Largest number of dimensions.
 const MAX_DIMENSIONS: usize = 256;
+/// Largest size of a level: squares of distances stay finite.
+const MAX_LEVEL: f64 = 1e15;
+/// Smallest distance of two levels.
+const MIN_STEP: f64 = 1e-15;
+/// Shortest lengthscale in units of the smallest step: below it no action tells anything of another.
+const SHORTEST_LENGTHSCALE: f64 = 1e-2;
+/// Longest lengthscale in units of the range: above it all levels are the same to double precision.
+const LONGEST_LENGTHSCALE: f64 = 1e4;
 
 /// One tuned quantity and the values it may take.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,14 +43,23 @@ impl Dimension {
         if self.values.len() > MAX_LEVELS {
             return refuse(format!("it has {} levels, at most {MAX_LEVELS} are accepted", self.values.len()));
         }
-        if let Some(value) = self.values.iter().find(|v| !v.is_finite()) {
-            return refuse(format!("level {value} is not a finite number"));
+        if let Some(value) = self.values.iter().find(|v| v.is_nan() || v.abs() > MAX_LEVEL) {
+            return refuse(format!("level {value} is not between {:e} and {MAX_LEVEL:e}", -MAX_LEVEL));
         }
         if let Some([low, high]) = self.values.array_windows().find(|[low, high]| low >= high) {
             return refuse(format!("levels must increase strictly, but {low} is followed by {high}"));
         }
-        if !(self.lengthscale.is_finite() && self.lengthscale > 0.0) {
-            return refuse(format!("lengthscale {} is not a positive number", self.lengthscale));
+        let steps = self.values.array_windows().map(|[low, high]| high - low);
+        let nearest = steps.reduce(f64::min).unwrap_or(1.0);
+        if nearest < MIN_STEP {
+            return refuse(format!("levels {nearest:e} apart are nearer than {MIN_STEP:e}"));
+        }
+        let (shortest, longest) = match self.values.len() {
+            1 => (MIN_STEP, MAX_LEVEL),
+            _ => (SHORTEST_LENGTHSCALE * nearest, LONGEST_LENGTHSCALE * self.range()),
+        };
+        if !(self.lengthscale >= shortest && self.lengthscale <= longest) {
+            return refuse(format!("lengthscale {} is not between {shortest:e} and {longest:e}", self.lengthscale));
         }
         Ok(())
     }
@@ -105,8 +122,8 @@ impl SearchSpace {
     /// The grid of all combinations of the dimensions' levels.
     ///
     /// # Errors
-    /// When there is no dimension, a dimension has no level, unordered or non-finite levels or a lengthscale that is
-    /// not positive, two dimensions have one name, or the grid is too large to be counted.
+    /// When there is no dimension, a dimension has no level, unordered levels, levels or a lengthscale out of range, two
+    /// dimensions have one name, or the grid is too large to be counted.
     pub fn new(dimensions: Vec<Dimension>) -> Result<Self> {
         if dimensions.is_empty() {
             return Err(LearnerError::NoDimension);
@@ -264,7 +281,13 @@ mod tests {
             vec![dimension("a", &[2.0, 1.0])],
             vec![dimension("a", &[f64::NAN])],
             vec![dimension("a", &[1.0, f64::INFINITY])],
+            vec![dimension("a", &[-1e308, 1e308])],
+            vec![dimension("a", &[0.0, 5e-324])],
             vec![Dimension { lengthscale: 0.0, ..dimension("a", &[1.0]) }],
+            vec![Dimension { lengthscale: 1e300, ..dimension("a", &[1.0]) }],
+            vec![Dimension { lengthscale: f64::NAN, ..dimension("a", &[0.0, 1.0]) }],
+            vec![Dimension { lengthscale: 0.009, ..dimension("a", &[0.0, 1.0, 3.0]) }],
+            vec![Dimension { lengthscale: 30_001.0, ..dimension("a", &[0.0, 1.0, 3.0]) }],
             vec![dimension("a", &[1.0]), dimension("a", &[1.0])],
             (0..54).map(|i| dimension(&i.to_string(), &[0.0, 1.0])).collect(),
         ] {

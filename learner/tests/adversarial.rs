@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use gait_learner::{
-    ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, Learner, LearnerError, LearnerSettings, Link,
-    Method, SearchSpace, posterior, propose, propose_batch, what_to_ask,
+    ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, Learner, LearnerError, LearnerSettings,
+    LearnerState, Link, Method, SearchSpace, comparisons_to_ask, posterior, propose, propose_batch, what_to_ask,
 };
 use proptest::prelude::*;
 
@@ -22,12 +22,24 @@ fn space(shape: &[usize]) -> SearchSpace {
     SearchSpace::new(dimensions).unwrap()
 }
 
+/// Every way to choose an action with every way to approximate the posterior.
+fn methods_and_inferences() -> Vec<LearnerSettings> {
+    let approximations = [(Inference::Laplace, Link::Logistic), (Inference::ExpectationPropagation, Link::Probit)];
+    [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random]
+        .into_iter()
+        .flat_map(|method| {
+            approximations.map(|(inference, link)| LearnerSettings { inference, link, ..LearnerSettings::of(method) })
+        })
+        .collect()
+}
+
 fn all_settings() -> Vec<LearnerSettings> {
-    let methods = [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random];
-    let mut settings: Vec<LearnerSettings> = methods.map(LearnerSettings::of).to_vec();
+    let mut settings = methods_and_inferences();
+    settings.push(LearnerSettings::for_uncertain_answers());
     settings.push(LearnerSettings::published(Method::LineCoSpar));
     settings.push(LearnerSettings::published(Method::Eubo));
     settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::default() });
+    settings.push(LearnerSettings { labels: Labels::Separate, ..LearnerSettings::of(Method::InformationGain) });
     settings.push(LearnerSettings { learn_every: Some(5), ..LearnerSettings::published(Method::Eubo) });
     for method in [Method::Eubo, Method::Thompson, Method::InformationGain] {
         settings.push(LearnerSettings { avoidance: Some(-0.45), ..LearnerSettings::of(method) });
@@ -104,7 +116,7 @@ fn a_thousand_answers_against_every_order() {
     let feedback =
         (0..1000).map(|i| Feedback::Preference { winner: ring[i % 40], loser: ring[(i + 1) % 40] }).collect();
     let log = FeedbackLog { visited: ring, feedback };
-    for settings in [LearnerSettings::default(), LearnerSettings::of(Method::Eubo)] {
+    for settings in methods_and_inferences() {
         exercise(&space, &log, &settings);
     }
 }
@@ -354,25 +366,66 @@ proptest! {
             learner.posterior(&space, &corrected, &settings).unwrap();
             learner.posterior(&space, &log_to(stop), &settings).unwrap();
         }
-        let log = log_to(feedback.len());
-        let (fresh, cached) =
-            (posterior(&space, &log, &settings).unwrap(), learner.posterior(&space, &log, &settings).unwrap());
-        for action in (0..36).map(ActionIndex) {
-            let (a, b) = (fresh.predict(action).unwrap(), cached.predict(action).unwrap());
-            prop_assert_eq!(a.mean.to_bits(), b.mean.to_bits());
-            prop_assert_eq!(a.standard_deviation.to_bits(), b.standard_deviation.to_bits());
+        agrees_with_a_new_one(&mut learner, &space, &log_to(feedback.len()), &settings);
+    }
+
+    #[test]
+    fn a_study_of_any_history_goes_on_as_a_new_one(
+        settings in any_settings(),
+        steps in prop::collection::vec((0_usize..4, any_feedback(36, 5), any::<prop::sample::Index>()), 1..40),
+        other in any_settings(),
+    ) {
+        // What a service does: proposals, results, answers, answers taken back, settings looked at and left again.
+        let space = space(&[3, 4, 3]);
+        let mut learner = Learner::default();
+        let mut log = FeedbackLog::default();
+        for (step, feedback, at) in steps {
+            match step {
+                0 => {
+                    if let Ok(proposal) = learner.propose(&space, &log, &[ActionIndex(4)], &settings, 7) {
+                        learner.comparisons_to_ask(&space, &log, proposal.action, &settings).unwrap();
+                        log.visited.push(proposal.action);
+                        log.feedback.push(Feedback::Label { action: proposal.action, category: 1 });
+                    }
+                }
+                1 if !log.feedback.is_empty() => {
+                    log.feedback.remove(at.index(log.feedback.len()));
+                }
+                2 => {
+                    let feedback = with_categories_of(&other, log.feedback.clone());
+                    learner.posterior(&space, &FeedbackLog { feedback, ..log.clone() }, &other).unwrap();
+                }
+                _ => log.feedback.extend(with_categories_of(&settings, vec![feedback])),
+            }
         }
-        prop_assert_eq!(
-            propose(&space, &log, &[], &settings, 5).ok(),
-            learner.propose(&space, &log, &[], &settings, 5).ok()
-        );
-        prop_assert_eq!(
-            propose_batch(&space, &log, &[ActionIndex(2)], &settings, 5).ok(),
-            learner.propose_batch(&space, &log, &[ActionIndex(2)], &settings, 5).ok()
-        );
-        prop_assert_eq!(
-            what_to_ask(&space, &log, &settings).unwrap(),
-            learner.what_to_ask(&space, &log, &settings).unwrap()
+        agrees_with_a_new_one(&mut learner, &space, &log, &settings);
+        // Written down and read again it is the same study.
+        let mut state = LearnerState::new(space.clone(), settings.clone(), 9, log.clone()).unwrap();
+        let mut again: LearnerState = serde_json::from_str(&serde_json::to_string(&state).unwrap()).unwrap();
+        prop_assert_eq!(state.propose(&[]).ok(), again.propose(&[]).ok());
+        prop_assert_eq!(state.propose(&[]).ok(), learner.propose(&space, &log, &[], &settings, 9).ok());
+    }
+}
+
+/// Whatever a learner has seen before, it believes, proposes and asks bit for bit what one without a past does.
+fn agrees_with_a_new_one(learner: &mut Learner, space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) {
+    let fresh = posterior(space, log, settings).unwrap();
+    let cached = learner.posterior(space, log, settings).unwrap();
+    for action in (0..space.len()).map(ActionIndex) {
+        let (a, b) = (fresh.predict(action).unwrap(), cached.predict(action).unwrap());
+        assert_eq!(a.mean.to_bits(), b.mean.to_bits());
+        assert_eq!(a.standard_deviation.to_bits(), b.standard_deviation.to_bits());
+    }
+    assert_eq!(propose(space, log, &[], settings, 5).ok(), learner.propose(space, log, &[], settings, 5).ok());
+    assert_eq!(
+        propose_batch(space, log, &[ActionIndex(2)], settings, 5).ok(),
+        learner.propose_batch(space, log, &[ActionIndex(2)], settings, 5).ok()
+    );
+    assert_eq!(what_to_ask(space, log, settings).unwrap(), learner.what_to_ask(space, log, settings).unwrap());
+    for action in [0, 7, 14].map(ActionIndex) {
+        assert_eq!(
+            comparisons_to_ask(space, log, action, settings).unwrap(),
+            learner.comparisons_to_ask(space, log, action, settings).unwrap()
         );
     }
 }

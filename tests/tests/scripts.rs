@@ -4,11 +4,14 @@
 
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
+use gait_learner::Partner;
 use gaitwright::store::StudyId;
+use gaitwright::store::feedback::Said;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
+use std::collections::HashMap;
 use tempfile::TempDir;
 
 async fn service() -> (TempDir, Service) {
@@ -196,5 +199,40 @@ async fn people_compare_what_a_script_walked() {
     );
     service.wait_for(study, &[StudyState::Running]).await;
     assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::OK);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_trial_that_did_not_converge_counts_in_its_batch_and_is_compared_with_nothing() {
+    let (_folder, service) = service().await;
+    // Batches of three, each action compared with the others of its batch and the newest before it.
+    let study = service
+        .study(|new| {
+            (new.evaluation, new.trial_budget) = (Evaluation::Script, 5);
+            (new.learner.partner, new.learner.buffer, new.learner.samples_per_iteration) = (Partner::Previous, 1, 3);
+        })
+        .await;
+    for number in 1..=5 {
+        let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
+        let told = match number {
+            2 | 4 => json!({"outcome": "not_converged", "reason": "the foot scuffed"}),
+            _ => json!({"outcome": "converged", "gait_rmse_rad": 1.0 / f64::from(number)}),
+        };
+        let tell = format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap());
+        assert_eq!(service.post(&tell, &told).await.status, StatusCode::OK);
+    }
+    let numbers: HashMap<_, _> =
+        service.trials(study).await.into_iter().map(|trial| (trial.id, trial.number)).collect();
+    let compared: Vec<(u32, u32)> = service
+        .feedback(study)
+        .await
+        .iter()
+        .filter_map(|row| match row.said {
+            Said::Preference { winner, loser } => Some((numbers[&winner], numbers[&loser])),
+            _ => None,
+        })
+        .collect();
+    // Trials 1 to 3 are a batch; 4 and 5 begin the next, before which 3 is the newest with a gait.
+    assert_eq!(compared, [(3, 1), (5, 3)]);
     service.stop().await;
 }

@@ -7,10 +7,11 @@
 //! ```
 //!
 //! NAME is `random` (the winner stays), a method (`linecospar`, `eubo`, `thompson`, `information_gain`) with its
-//! recommended settings, or a method with `_published` settings. Writes `method,seed,k,regret`, `k` comparisons having
-//! been answered (`k + 1` actions tried), and prints the quartiles. `--noise S` answers with logistic noise of scale
-//! `S` on the utility. `--batch N` proposes `N` actions before the first of them is answered. `--set` changes settings
-//! of the method. Regret is 1 minus the utility of the recommended action. `--seeds A..B` does not include `B`.
+//! recommended settings, a method with `_published` settings, or `eubo_uncertain` (EUBO for answers that may be wrong).
+//! Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the quartiles.
+//! `--noise S` answers with logistic noise of scale `S` on the utility. `--batch N` proposes `N` actions before the first
+//! of them is answered. `--set` changes settings of the method. Regret is 1 minus the utility of the recommended action.
+//! `--seeds A..B` does not include `B`.
 //!
 //! `--summarise` reads such files: medians with bootstrap intervals and quartiles, and, of every further file against
 //! the first, how many seeds were better and worse with the p-values of the paired sign test and of Wilcoxon's.
@@ -18,14 +19,16 @@
 #![allow(clippy::expect_used, unreachable_pub, missing_docs)]
 
 mod problems;
+mod simulation;
 mod summary;
 
 use std::error::Error;
 use std::io::Write;
 use std::time::Instant;
 
-use gait_learner::{ActionIndex, Feedback, FeedbackLog, Learner, LearnerSettings};
-use problems::{Problem, SplitMix64};
+use gait_learner::LearnerSettings;
+use problems::Problem;
+use simulation::{Person, champion, run};
 use summary::{Curves, quantile, report};
 
 struct Options {
@@ -87,90 +90,15 @@ fn options() -> Result<Options, Box<dyn Error>> {
 
 /// The settings of a method with the changes asked for.
 fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
-    let (name, published) = match options.method.strip_suffix("_published") {
-        Some(name) => (name, true),
-        None => (options.method.as_str(), false),
-    };
-    let method = serde_json::from_value(name.into())?;
-    let mut document = if published {
-        serde_json::to_value(LearnerSettings::published(method))?
+    let mut document = if options.method == "eubo_uncertain" {
+        serde_json::to_value(LearnerSettings::for_uncertain_answers())?
+    } else if let Some(name) = options.method.strip_suffix("_published") {
+        serde_json::to_value(LearnerSettings::published(serde_json::from_value(name.into())?))?
     } else {
-        serde_json::json!({ "method": method })
+        serde_json::json!({ "method": options.method })
     };
     document.as_object_mut().ok_or("settings are an object")?.extend(options.set.clone());
     Ok(serde_json::from_value(document)?)
-}
-
-/// Somebody who knows the utility and answers with noise.
-struct Person<'a> {
-    problem: &'a Problem,
-    noise: f64,
-    random: SplitMix64,
-}
-
-impl Person<'_> {
-    /// Which of two is better; nothing when neither converges or they are equal.
-    fn compare(&mut self, a: ActionIndex, b: ActionIndex) -> Option<Feedback> {
-        let ((ua, ca), (ub, cb)) = (self.problem.of(a), self.problem.of(b));
-        let first = match (ca, cb) {
-            (false, false) => return None,
-            (true, false) => true,
-            (false, true) => false,
-            (true, true) if self.noise > 0.0 => self.random.unit() < 1.0 / (1.0 + (-(ua - ub) / self.noise).exp()),
-            (true, true) if ua == ub => return None,
-            (true, true) => ua > ub,
-        };
-        let (winner, loser) = if first { (a, b) } else { (b, a) };
-        Some(Feedback::Preference { winner, loser })
-    }
-}
-
-/// Regret after 0, 1, ... comparisons.
-fn run(options: &Options, settings: Option<&LearnerSettings>, seed: u64) -> Result<Vec<f64>, Box<dyn Error>> {
-    let problem = Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?;
-    let mut person = Person { problem: &problem, noise: options.noise, random: SplitMix64(seed ^ 0x005E_ED0F_A17E) };
-    let Some(settings) = settings else { return Ok(champion(&problem, &mut person, options.comparisons, seed)) };
-    let labelled = problem.converged.iter().any(|c| !c);
-    let mut learner = Learner::default();
-    let mut log = FeedbackLog::default();
-    let mut regrets = Vec::new();
-    while regrets.len() <= options.comparisons {
-        // Everything in a batch is proposed before anything in it is answered.
-        let mut batch: Vec<ActionIndex> = Vec::new();
-        while batch.len() < options.batch {
-            batch.push(learner.propose(&problem.space, &log, &batch, settings, seed)?.action);
-        }
-        for action in batch {
-            let questions = learner.comparisons_to_ask(&problem.space, &log, action, settings)?;
-            if labelled {
-                log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
-            }
-            log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
-            log.visited.push(action);
-            let best = learner.posterior(&problem.space, &log, settings)?.best().ok_or("nothing was tried")?;
-            regrets.push(1.0 - problem.of(best).0);
-        }
-    }
-    regrets.truncate(options.comparisons + 1);
-    Ok(regrets)
-}
-
-/// Random search: the winner stays.
-fn champion(problem: &Problem, person: &mut Person<'_>, comparisons: usize, seed: u64) -> Vec<f64> {
-    let mut random = SplitMix64(seed.wrapping_mul(31).wrapping_add(7));
-    let mut draw = || ActionIndex(random.below(problem.utility.len()) as u64);
-    let mut champion = draw();
-    let mut regrets = vec![1.0 - problem.of(champion).0];
-    for _ in 0..comparisons {
-        let challenger = draw();
-        match person.compare(challenger, champion) {
-            Some(Feedback::Preference { winner, .. }) => champion = winner,
-            _ if !problem.of(champion).1 => champion = challenger,
-            _ => {}
-        }
-        regrets.push(1.0 - problem.of(champion).0);
-    }
-    regrets
 }
 
 /// Prints the summary of files.
@@ -202,7 +130,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let mut curves = Vec::new();
     for seed in options.seeds.clone() {
-        let regrets = run(&options, settings.as_ref(), seed)?;
+        let problem = Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?;
+        let person = Person::new(&problem, options.noise, seed);
+        let regrets = match &settings {
+            Some(settings) => run(person, settings, options.comparisons, options.batch)?,
+            None => champion(person, options.comparisons),
+        };
         if let Some(out) = &mut out {
             for (k, regret) in regrets.iter().enumerate() {
                 writeln!(out, "{},{seed},{k},{regret:.6}", options.method)?;

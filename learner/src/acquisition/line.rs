@@ -57,11 +57,11 @@ mod tests {
         let dimensions = [2, 3, 3, 3, 4, 6, 3, 3]
             .iter()
             .enumerate()
-            .map(|(d, &n)| Dimension {
-                name: format!("a{}", d + 1),
+            .map(|(d, &n)| {
                 // units as different as those of Table I
-                values: (0..n).map(|i| f64::from(i) * 10_f64.powi(1 - i32::try_from(d).unwrap())).collect(),
-                lengthscale: 1.0,
+                let step = 10_f64.powi(1 - i32::try_from(d).unwrap());
+                let values = (0..n).map(|i| f64::from(i) * step).collect();
+                Dimension { name: format!("a{}", d + 1), values, lengthscale: step }
             })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();

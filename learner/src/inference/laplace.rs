@@ -20,6 +20,8 @@ pub(crate) struct Laplace;
 const MAX_STEPS: usize = 200;
 /// Squared Newton decrement (the squared distance to the mode in posterior standard deviations) that is accepted.
 const DECREMENT: f64 = 1e-10;
+/// The same as a share of the objective, whose rounding hides smaller steps.
+const RELATIVE_DECREMENT: f64 = 1e-13;
 /// Change of a factor, in posterior standard deviations and relative variances, that is left undone.
 const TOLERANCE: f64 = 1e-3;
 /// Passes over the answers before Newton's method takes over.
@@ -117,9 +119,10 @@ fn newton(model: &Model, link: Link, previous: Option<&Approximation>) -> Result
         let mut step = gradient.clone();
         precision.solve(&mut step);
         let decrement = dot(&gradient, &step);
+        let enough = DECREMENT.max(RELATIVE_DECREMENT * value.abs());
         let mut length = 1.0;
         let mut moved = None;
-        while decrement > DECREMENT && length > 1e-10 {
+        while decrement > enough && length > 1e-10 {
             let trial: Vec<f64> = v.iter().zip(&step).map(|(v, s)| v - length * s).collect();
             let trial_f = prior.multiply(&trial);
             let trial_value = 0.5 * dot(&trial, &trial) - log_likelihood(sites, link, &trial_f);

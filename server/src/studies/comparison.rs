@@ -4,7 +4,7 @@ use super::standing::Standing;
 use crate::store::TrialId;
 use crate::store::feedback::Said;
 use crate::store::trials::TrialState;
-use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask};
+use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};
 
 /// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
 /// as the learner's settings say. `standing` is read before the new trial's result is in it.
@@ -14,8 +14,11 @@ use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask};
 pub fn partners(standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
     let Some(new) = standing.trial(new) else { return Ok(Vec::new()) };
     let plan = &standing.study.plan;
-    let questions =
-        comparisons_to_ask(&plan.search_space, &standing.log_of_converged(), new.action_index, &plan.learner)?;
+    let comparable = standing.comparable();
+    let log = standing.log();
+    let questions = comparisons_to_ask_among(&plan.search_space, &log, new.action_index, &plan.learner, |a| {
+        comparable.contains(&a)
+    })?;
     Ok(questions.into_iter().filter_map(|q| standing.trial_of(q.against)).map(|trial| trial.id).collect())
 }
 
@@ -37,8 +40,9 @@ pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> Said {
 /// When the learner refuses the log.
 pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
     let plan = &standing.study.plan;
-    let log = standing.log_of_converged();
-    let Some(&newest) = log.visited.last() else { return Ok(None) };
+    let log = standing.log();
+    let comparable = standing.comparable();
+    let Some(&newest) = log.visited.iter().rev().find(|action| comparable.contains(action)) else { return Ok(None) };
     // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
     // best one, and with it the question.
     let mut before = log.clone();
@@ -46,7 +50,8 @@ pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, 
         (a, Some(b)) => a != newest && b != newest,
         (_, None) => true,
     });
-    let questions = comparisons_to_ask(&plan.search_space, &before, newest, &plan.learner)?;
+    let questions =
+        comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| comparable.contains(&a))?;
     let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
     let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
     let mut pairs = open.filter_map(|q| Some((converged(q.action)?, converged(q.against)?)));

@@ -6,7 +6,7 @@ use crate::store::studies::{FeedbackMode, Study};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, StoreResult, TrialId, feedback, presentations, trials};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Everything that the next decision of a study depends on, read in one go.
 #[derive(Debug, Clone)]
@@ -96,26 +96,22 @@ impl Standing {
         same.then(|| format!("the best action stayed the same over {limit} results"))
     }
 
+    /// Actions whose gaits can be shown to people: they exist, and no rater called them unsafe. What did not converge
+    /// has no gait, and its label has said so already.
+    pub fn comparable(&self) -> HashSet<ActionIndex> {
+        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.closed.contains(&trial.id);
+        self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
+    }
+
     /// What the learner hears: results in the order in which they were recorded, and every answer that was
     /// not taken back.
     pub fn log(&self) -> FeedbackLog {
-        self.log_where(|_| true)
-    }
-
-    /// The log of the converged trials alone, for choosing whom to compare with: a gait that does not exist
-    /// cannot be compared, and its label has said so already.
-    pub fn log_of_converged(&self) -> FeedbackLog {
-        self.log_where(|trial| trial.state == TrialState::Converged && !self.closed.contains(&trial.id))
-    }
-
-    fn log_where(&self, visited: impl Fn(&Trial) -> bool) -> FeedbackLog {
         let by_id: HashMap<TrialId, &Trial> = self.trials.iter().map(|trial| (trial.id, trial)).collect();
         let action = |id: TrialId| by_id.get(&id).map(|trial| trial.action_index);
         let mut log = FeedbackLog::default();
         for row in &self.feedback {
             if let Said::Label { trial, .. } = row.said
                 && let Some(trial) = by_id.get(&trial)
-                && visited(trial)
             {
                 log.visited.push(trial.action_index);
             }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer};
 
-use crate::settings::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
+use super::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
 
 /// Of a field that is given, its value: null is a value where the field has one.
 fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
@@ -14,15 +14,15 @@ macro_rules! settings {
         /// The settings given, each of them optional.
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
-        pub(crate) struct GivenSettings {
+        pub(crate) struct WrittenSettings {
             #[serde(default, deserialize_with = "given")]
             method: Option<Method>,
             $(#[serde(default, deserialize_with = "given")]
             $field: Option<$type>,)*
         }
 
-        impl From<GivenSettings> for LearnerSettings {
-            fn from(given: GivenSettings) -> Self {
+        impl From<WrittenSettings> for LearnerSettings {
+            fn from(given: WrittenSettings) -> Self {
                 let rest = given.method.map_or_else(Self::default, Self::of);
                 Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* }
             }

@@ -1,0 +1,88 @@
+//! A person who answers, and the regret of what is recommended to them.
+
+use gait_learner::{ActionIndex, Feedback, FeedbackLog, Learner, LearnerError, LearnerSettings};
+
+use crate::problems::{Problem, SplitMix64};
+
+/// Somebody who knows the utility and answers with noise.
+pub struct Person<'a> {
+    problem: &'a Problem,
+    /// Scale of the logistic noise on the utility; 0 answers exactly.
+    noise: f64,
+    seed: u64,
+    random: SplitMix64,
+}
+
+impl<'a> Person<'a> {
+    pub fn new(problem: &'a Problem, noise: f64, seed: u64) -> Self {
+        Self { problem, noise, seed, random: SplitMix64(seed ^ 0x005E_ED0F_A17E) }
+    }
+
+    /// Which of two is better; nothing when neither converges or they are equal.
+    fn compare(&mut self, a: ActionIndex, b: ActionIndex) -> Option<Feedback> {
+        let ((ua, ca), (ub, cb)) = (self.problem.of(a), self.problem.of(b));
+        let first = match (ca, cb) {
+            (false, false) => return None,
+            (true, false) => true,
+            (false, true) => false,
+            (true, true) if self.noise > 0.0 => self.random.unit() < 1.0 / (1.0 + (-(ua - ub) / self.noise).exp()),
+            (true, true) if ua == ub => return None,
+            (true, true) => ua > ub,
+        };
+        let (winner, loser) = if first { (a, b) } else { (b, a) };
+        Some(Feedback::Preference { winner, loser })
+    }
+}
+
+/// Regret after 0, 1, ... comparisons, `batch` actions being proposed before the first of them is answered.
+pub fn run(
+    mut person: Person<'_>,
+    settings: &LearnerSettings,
+    comparisons: usize,
+    batch: usize,
+) -> Result<Vec<f64>, LearnerError> {
+    let problem = person.problem;
+    let labelled = problem.converged.iter().any(|c| !c);
+    let mut learner = Learner::default();
+    let mut log = FeedbackLog::default();
+    let mut regrets = Vec::new();
+    while regrets.len() <= comparisons {
+        let mut proposed: Vec<ActionIndex> = Vec::new();
+        while proposed.len() < batch {
+            let seed = person.seed;
+            proposed.push(learner.propose(&problem.space, &log, &proposed, settings, seed)?.action);
+        }
+        for action in proposed {
+            let questions = learner.comparisons_to_ask(&problem.space, &log, action, settings)?;
+            if labelled {
+                log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
+            }
+            log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
+            log.visited.push(action);
+            let best = learner.posterior(&problem.space, &log, settings)?.best();
+            // Something was tried, so there is a best.
+            regrets.push(best.map_or(1.0, |best| 1.0 - problem.of(best).0));
+        }
+    }
+    regrets.truncate(comparisons + 1);
+    Ok(regrets)
+}
+
+/// Random search: the winner stays.
+pub fn champion(mut person: Person<'_>, comparisons: usize) -> Vec<f64> {
+    let problem = person.problem;
+    let mut random = SplitMix64(person.seed.wrapping_mul(31).wrapping_add(7));
+    let mut draw = || ActionIndex(random.below(problem.utility.len()) as u64);
+    let mut champion = draw();
+    let mut regrets = vec![1.0 - problem.of(champion).0];
+    for _ in 0..comparisons {
+        let challenger = draw();
+        match person.compare(challenger, champion) {
+            Some(Feedback::Preference { winner, .. }) => champion = winner,
+            _ if !problem.of(champion).1 => champion = challenger,
+            _ => {}
+        }
+        regrets.push(1.0 - problem.of(champion).0);
+    }
+    regrets
+}

@@ -1,0 +1,56 @@
+//! The learner learns: its regret on instances that no figure of the README is about, held well below that of random
+//! search. The figures themselves take the `regret` example.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs, unreachable_pub, dead_code)]
+
+#[path = "../examples/regret/problems.rs"]
+mod problems;
+#[path = "../examples/regret/simulation.rs"]
+mod simulation;
+
+use gait_learner::{LearnerSettings, Method};
+use problems::Problem;
+use simulation::{Person, champion, run};
+
+const COMPARISONS: usize = 25;
+
+/// Mean regret after the last comparison; random search without settings.
+fn mean_regret(name: &str, noise: f64, settings: Option<&LearnerSettings>) -> f64 {
+    let seeds = 40..52;
+    let count = (seeds.end - seeds.start) as f64;
+    let last = |seed| {
+        let problem = Problem::named(name, seed, None).unwrap();
+        let person = Person::new(&problem, noise, seed);
+        let regrets = match settings {
+            Some(settings) => run(person, settings, COMPARISONS, 1).unwrap(),
+            None => champion(person, COMPARISONS),
+        };
+        assert_eq!(regrets.len(), COMPARISONS + 1);
+        regrets[COMPARISONS]
+    };
+    seeds.map(last).sum::<f64>() / count
+}
+
+#[test]
+fn exact_answers_lead_near_the_top() {
+    let random = mean_regret("table1", 0.0, None);
+    let line = mean_regret("table1", 0.0, Some(&LearnerSettings::of(Method::LineCoSpar)));
+    let eubo = mean_regret("table1", 0.0, Some(&LearnerSettings::of(Method::Eubo)));
+    assert!(line < 0.75 * random && eubo < 0.5 * random, "random {random} linecospar {line} eubo {eubo}");
+}
+
+#[test]
+fn uncertain_answers_lead_nearer_the_top_than_random_search() {
+    let random = mean_regret("table1", 0.05, None);
+    for settings in [LearnerSettings::of(Method::LineCoSpar), LearnerSettings::for_uncertain_answers()] {
+        let regret = mean_regret("table1", 0.05, Some(&settings));
+        assert!(regret < 0.8 * random, "{regret} random {random} {settings:?}");
+    }
+}
+
+#[test]
+fn a_smooth_function_of_three_quantities_is_found() {
+    let random = mean_regret("hart3", 0.0, None);
+    let eubo = mean_regret("hart3", 0.0, Some(&LearnerSettings::of(Method::Eubo)));
+    assert!(eubo < 0.6 * random, "random {random} eubo {eubo}");
+}
