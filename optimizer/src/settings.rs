@@ -279,3 +279,16 @@ impl GaitSettings {
         self.regularisation.validate()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_of_weights_without_a_bend_has_none() {
+        let old = r#"{"regularisation": {"torque": 0.003, "activation": 0.003, "fibre_velocity": 0.01}}"#;
+        assert_eq!(serde_json::from_str::<GaitSettings>(old).unwrap(), GaitSettings::reference_problem());
+        assert_eq!(serde_json::from_str::<GaitSettings>("{}").unwrap(), GaitSettings::default());
+        assert_ne!(GaitSettings::default(), GaitSettings::reference_problem());
+    }
+}

@@ -6,9 +6,11 @@
 
 pub mod access;
 pub mod cli;
+mod document;
 pub mod error;
 pub mod http;
 pub mod plots;
+mod printable;
 pub mod store;
 pub mod studies;
 pub mod workers;

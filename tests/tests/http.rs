@@ -77,6 +77,7 @@ async fn subjects_are_made_listed_and_refused() {
         (with("name", json!("Jane")), "unknown field `name`"),
         (json!({"pseudonym": "S03"}), "missing field `height_m`"),
         (json!("a subject"), "not the JSON that is expected here"),
+        (json!(["S03", 1.7, 65]), "expected an object with named fields"),
     ] {
         is_problem(
             &service.post("/api/v1/subjects", &body).await,

@@ -83,7 +83,7 @@ fn the_figures_outlive_the_file() {
     let arguments = [&["solve", "--json", "--out", "place/gait.json", "--max-iterations", "40"][..], &COARSE].concat();
     let child =
         cli::command(BINARY, folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    while !place.join("gait.json.part").exists() {
+    while cli::files(&place).is_empty() {
         std::thread::sleep(Duration::from_millis(1));
     }
     std::fs::remove_dir_all(&place).unwrap();
@@ -91,6 +91,48 @@ fn the_figures_outlive_the_file() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("cannot write place/gait.json"));
     assert!(json_of(&output)["status"].is_string());
+}
+
+/// What a command must not write over it leaves as it was: its own input, and the file of a solve that was stopped.
+#[cfg(unix)]
+#[test]
+fn a_file_that_is_there_is_not_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let solved = gaitwright(folder, &[&["solve", "--out", "gait.json"][..], &COARSE].concat());
+    assert!(solved.status.success());
+    let gait = std::fs::read(folder.join("gait.json")).unwrap();
+
+    std::os::unix::fs::symlink("gait.json", folder.join("link.json")).unwrap();
+    let onto_itself = [&["solve", "--warm", "gait.json", "--out", "link.json"][..], &COARSE].concat();
+    let output = cli::run(BINARY, folder, &onto_itself);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("gait.json is read by this command"));
+
+    // A link is followed.
+    std::fs::write(folder.join("target.json"), "old").unwrap();
+    std::os::unix::fs::symlink("target.json", folder.join("other.json")).unwrap();
+    let through = [&["solve", "--warm", "gait.json", "--out", "other.json"][..], &COARSE].concat();
+    assert!(gaitwright(folder, &through).status.success());
+    assert!(folder.join("other.json").is_symlink());
+    assert!(std::fs::read_to_string(folder.join("target.json")).unwrap().contains("\"report\""));
+
+    // A device is written to, not replaced.
+    let device = [&["solve", "--warm", "gait.json", "--out", "/dev/null"][..], &COARSE].concat();
+    assert!(gaitwright(folder, &device).status.success());
+    assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+
+    let stopped = [&["solve", "--tolerance", "1e-10", "--out", "gait.json"][..], &COARSE].concat();
+    let child = cli::command(BINARY, folder, &stopped).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    while !cli::files(folder).iter().any(|name| name.ends_with(".part")) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let killed = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert_eq!(std::fs::read(folder.join("gait.json")).unwrap(), gait);
+    assert_eq!(cli::files(folder), ["gait.json", "link.json", "other.json", "target.json"]);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use super::right::Role;
 use super::secret;
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::users::{self, NAME_UNIQUE, User};
 use crate::store::{OnConstraint, UserId, Writer, now, sessions};
@@ -32,7 +33,7 @@ pub struct NewUser {
 /// # Errors
 /// [`Error::Invalid`], [`Error::Conflict`] when the name is taken.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewUser) -> Result<User, Error> {
-    let name = checked_name("name", &new.name)?;
+    let name = printable::name("name", &new.name, 80)?;
     let user = users::insert(writer, name, new.role)
         .await
         .on_constraint(NAME_UNIQUE, || Error::conflict(format!("there is a user {name:?} already")))?;
@@ -104,13 +105,4 @@ pub async fn set_disabled(writer: &mut Writer, actor: &Actor, id: UserId, disabl
 pub async fn has_admin(db: &mut crate::store::Connection) -> Result<bool, Error> {
     let all = users::all(db).await?;
     Ok(all.iter().any(|user| user.role == Role::Admin && user.has_password && user.disabled_at.is_none()))
-}
-
-/// A name of a user or a token.
-pub(super) fn checked_name<'a>(field: &str, name: &'a str) -> Result<&'a str, Error> {
-    let trimmed = name.trim();
-    if trimmed.is_empty() || trimmed.chars().count() > 80 || trimmed.chars().any(char::is_control) {
-        return Err(Error::invalid(field, name, "1 to 80 printable characters"));
-    }
-    Ok(trimmed)
 }

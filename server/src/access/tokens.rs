@@ -1,9 +1,9 @@
 //! Tokens of scripts: made, shown once, ended.
 
-use super::people::checked_name;
 use super::right::Right;
 use super::secret;
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::tokens::{self, NAME_UNIQUE, Token};
 use crate::store::{OnConstraint, TokenId, Writer, now};
@@ -35,7 +35,7 @@ pub struct NewToken {
 /// # Errors
 /// [`Error::Invalid`], [`Error::Conflict`] when the name is taken.
 pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<(Token, String), Error> {
-    let name = checked_name("name", &new.name)?;
+    let name = printable::name("name", &new.name, 80)?;
     if new.scopes.is_empty() || new.scopes.contains(&Right::Administer) {
         let allowed = "some of read, run, answer, rate: people administer, programs do not";
         return Err(Error::invalid("scopes", json!(new.scopes), allowed));

@@ -94,8 +94,8 @@ pub fn run() -> ExitCode {
     let done = match cli.command {
         Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
         Command::Tune(tune) => runtime.block_on(tune.run()),
-        Command::Solve(solve) => runtime.block_on(solve.run()).map(|()| Ended::Done),
-        Command::Sweep(sweep) => runtime.block_on(sweep.run()).map(|()| Ended::Done),
+        Command::Solve(solve) => runtime.block_on(solve.run()),
+        Command::Sweep(sweep) => runtime.block_on(sweep.run()),
         Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
         Command::Config(config) => config.run().map(|()| Ended::Done),
         Command::Openapi => openapi::text().map_err(|e| Error::Internal(e.to_string())).map(|text| {

@@ -3,32 +3,43 @@
 
 use super::output::tell;
 use crate::error::Error;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A file that is written whole or not at all. Until then there is an empty `.part` beside it.
+/// A file that is written whole or not at all. Until then there is an empty hidden one beside it. A link is followed; a
+/// device or pipe is written to as it is.
 #[derive(Debug)]
 pub(super) struct OutFile {
     path: PathBuf,
-    part: PathBuf,
+    /// `None`: no regular file.
+    part: Option<PathBuf>,
     file: Option<File>,
 }
 
 impl OutFile {
-    /// Makes sure that the file can be written.
+    /// Makes sure that the file can be written. `inputs` are files that the command reads: writing over one of them is
+    /// refused.
     ///
     /// # Errors
     /// [`Error::Malformed`] with the reason when it cannot.
-    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path, inputs: &[&Path]) -> Result<Self, Error> {
+        let known = path.canonicalize().ok();
+        if let (Some(known), Some(input)) = (&known, inputs.iter().find(|i| i.canonicalize().ok() == known)) {
+            return Err(failed(path, format!("{} is read by this command ({})", input.display(), known.display())));
+        }
         if path.is_dir() {
             return Err(failed(path, "it is a folder"));
         }
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let file = File::create(&part).map_err(|e| failed(path, e))?;
-        Ok(Self { path: path.to_owned(), part, file: Some(file) })
+        if known.as_ref().is_some_and(|known| !known.is_file()) {
+            let file = OpenOptions::new().write(true).open(path).map_err(|e| failed(path, e))?;
+            return Ok(Self { path: path.to_owned(), part: None, file: Some(file) });
+        }
+        let path = known.unwrap_or_else(|| path.to_owned());
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let part = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
+        let file = OpenOptions::new().write(true).create_new(true).open(&part).map_err(|e| failed(&path, e))?;
+        Ok(Self { path, part: Some(part), file: Some(file) })
     }
 
     /// The file.
@@ -42,22 +53,26 @@ impl OutFile {
     /// [`Error::Malformed`] with the reason.
     pub(super) fn write(mut self, text: &str) -> Result<(), Error> {
         let Some(mut file) = self.file.take() else { return Ok(()) };
-        let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
-        drop(file);
-        match written.and_then(|()| std::fs::rename(&self.part, &self.path)) {
-            Ok(()) => Ok(()),
-            Err(e) => {
-                self.clean();
-                Err(failed(&self.path, e))
+        let written = file.write_all(text.as_bytes());
+        let done = match &self.part {
+            Some(part) => {
+                let done = written.and_then(|()| file.sync_all()).and_then(|()| std::fs::rename(part, &self.path));
+                if done.is_err() {
+                    self.clean();
+                }
+                done
             }
-        }
+            None => written,
+        };
+        done.map_err(|e| failed(&self.path, e))
     }
 
     fn clean(&self) {
-        if let Err(e) = std::fs::remove_file(&self.part)
+        if let Some(part) = &self.part
+            && let Err(e) = std::fs::remove_file(part)
             && e.kind() != std::io::ErrorKind::NotFound
         {
-            tell(&format!("gaitwright: {} is left over: {e}", self.part.display()));
+            tell(&format!("gaitwright: {} is left over: {e}", part.display()));
         }
     }
 }

@@ -4,6 +4,7 @@ use super::body::{Body, Switch};
 use super::numbers::iterations;
 use super::output::tell;
 use super::serve::interrupted;
+use crate::document;
 use crate::error::Error;
 use clap::Args;
 use gait_optimizer::{
@@ -51,7 +52,7 @@ impl ProblemFlags {
             None => Device::ampro3()?,
         };
         let mut settings = match &self.settings {
-            Some(path) => serde_json::from_str(&read(path)?)
+            Some(path) => document::read(read(path)?.as_bytes())
                 .map_err(|e| Error::Malformed(format!("{}: not settings of the gait problem: {e}", path.display())))?,
             None => GaitSettings::default(),
         };
@@ -59,6 +60,11 @@ impl ProblemFlags {
         settings.validate()?;
         let (subject, muscles) = (self.body.subject()?, self.muscles.is_on());
         Ok(GaitProblem { subject, device, bounds, muscles, settings, reference: ReferenceGait::builtin()? })
+    }
+
+    /// The files that are read.
+    pub(super) fn inputs(&self) -> Vec<&Path> {
+        [&self.device, &self.settings, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {

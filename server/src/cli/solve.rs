@@ -1,5 +1,6 @@
 //! `gaitwright solve`: one gait.
 
+use super::Ended;
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal};
@@ -45,10 +46,10 @@ struct Answer<'a> {
 }
 
 impl Solve {
-    pub(super) async fn run(self) -> Result<(), Error> {
+    pub(super) async fn run(self) -> Result<Ended, Error> {
         let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
         let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
-        let out = self.out.as_deref().map(OutFile::open).transpose()?;
+        let out = self.out.as_deref().map(|out| OutFile::open(out, &self.flags.inputs())).transpose()?;
         let cancel = cancelled_by_signal();
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
@@ -80,10 +81,13 @@ impl Solve {
         } else {
             data(&for_people(&outcome, explanation.as_ref()))?;
         }
-        match out {
-            Some(out) => out.write(&serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?),
-            None => Ok(()),
+        if outcome.report.status == SolveStatus::Cancelled {
+            return Ok(Ended::Interrupted);
         }
+        if let Some(out) = out {
+            out.write(&serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?)?;
+        }
+        Ok(Ended::Done)
     }
 }
 

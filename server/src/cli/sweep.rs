@@ -1,5 +1,6 @@
 //! `gaitwright sweep`: one gait for each row of a table of actions, in parallel, answers in the order of the rows.
 
+use super::Ended;
 use super::numbers::workers;
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -38,13 +39,15 @@ const COLUMNS: [&str; 6] =
 type Answer = Result<SolveOutcome, SolveError>;
 
 impl Sweep {
-    pub(super) async fn run(self) -> Result<(), Error> {
+    pub(super) async fn run(self) -> Result<Ended, Error> {
         let actions = actions(&self.actions)?;
         let problem = self.flags.problem(TunedBounds::default())?;
         let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
-        let out = OutFile::open(&self.out)?;
+        let mut inputs = self.flags.inputs();
+        inputs.push(&self.actions);
+        let out = OutFile::open(&self.out, &inputs)?;
         let (cancel, workers) = (cancelled_by_signal(), cores_or(self.workers));
-        let rows = actions.clone();
+        let (rows, stopped) = (actions.clone(), cancel.clone());
         let mut answers =
             tokio::task::spawn_blocking(move || solve_all(&problem, &rows, warm.as_ref(), &options, workers, &cancel))
                 .await
@@ -57,6 +60,11 @@ impl Sweep {
         }
         let table = table(&actions, &answers)?;
         let path = out.path().to_owned();
+        if stopped.is_cancelled() {
+            data(table.trim_end())?;
+            tell(&format!("stopped: what is done is above, {} is as it was", path.display()));
+            return Ok(Ended::Interrupted);
+        }
         if let Err(error) = out.write(&table) {
             // Hours of solving are not lost with the file.
             data(table.trim_end())?;
@@ -64,7 +72,7 @@ impl Sweep {
         }
         let converged = answers.iter().flatten().filter(|o| o.report.status == SolveStatus::Converged).count();
         tell(&format!("{converged} of {} converged; written to {}", actions.len(), path.display()));
-        Ok(())
+        Ok(Ended::Done)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Extractors whose refusals are problem documents.
 
 use super::BODY_LIMIT_BYTES;
+use crate::document;
 use crate::error::Error;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
@@ -18,17 +19,7 @@ pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Re
     if !absent && !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
         return Err(Error::Malformed(format!("content type {kind:?}: this needs application/json")));
     }
-    let mut reader = serde_json::Deserializer::from_slice(bytes);
-    let value = serde_path_to_error::deserialize(&mut reader).map_err(|e| {
-        let (path, inner) = (e.path().to_string(), e.into_inner());
-        if inner.is_data() && path != "." {
-            Error::Malformed(format!("field {path}: {inner}"))
-        } else {
-            Error::Malformed(format!("not the JSON that is expected here: {inner}"))
-        }
-    })?;
-    reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
-    Ok(value)
+    document::read(bytes)
 }
 
 /// A body that could not be taken in.

@@ -2,6 +2,7 @@
 
 use crate::access::Caller;
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit;
 use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
 use crate::store::trials::{Trial, TrialState};
@@ -60,10 +61,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
     }
-    let author = answer.author.as_deref().unwrap_or(&caller.name).trim();
-    if author.is_empty() || author.chars().count() > 80 {
-        return Err(Error::invalid("author", author, "1 to 80 characters"));
-    }
+    let author = printable::name("author", answer.author.as_deref().unwrap_or(&caller.name), 80)?;
     if answer.note.chars().count() > 2000 {
         return Err(Error::invalid("note", answer.note.chars().count(), "at most 2000 characters"));
     }
@@ -104,10 +102,7 @@ pub async fn retract(
     if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
         return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
     }
-    let author = author.unwrap_or(&caller.name).trim();
-    if author.is_empty() || author.chars().count() > 80 {
-        return Err(Error::invalid("author", author, "1 to 80 characters"));
-    }
+    let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = reason.trim();
     if reason.is_empty() || reason.chars().count() > 2000 {
         return Err(Error::invalid("reason", reason, "1 to 2000 characters: why it is taken back"));

@@ -2,6 +2,7 @@
 
 use super::{catalogue, search};
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
 use crate::store::{
@@ -201,11 +202,8 @@ pub async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Er
     let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {
         None | Some("") => format!("{}, {variant}, seed {}", subject.pseudonym, new.seed),
-        Some(name) => name.to_owned(),
+        Some(name) => printable::name("name", name, 120)?.to_owned(),
     };
-    if name.chars().count() > 120 {
-        return Err(Error::invalid("name", name, "at most 120 characters"));
-    }
     check_range("trial_budget", i64::from(new.trial_budget), 1, 10_000)?;
     check_range("parallel_trials", i64::from(new.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(new.priority), -10, 10)?;
