@@ -2,6 +2,7 @@
 
 use crate::store::StoreError;
 use crate::studies::lifecycle::NotPossible;
+use crate::workers::DispatchError;
 use gait_learner::LearnerError;
 use gait_optimizer::{ModelError, SolveError};
 use serde_json::Value;
@@ -90,6 +91,9 @@ pub enum Error {
     /// The learner refused.
     #[error("learner: {0}")]
     Learner(LearnerError),
+    /// Service and workers cannot speak to each other.
+    #[error(transparent)]
+    Dispatch(#[from] DispatchError),
     /// The record.
     #[error(transparent)]
     Store(StoreError),
@@ -111,7 +115,7 @@ impl Error {
 
     /// Whether the request is at fault, and not the program or the machine.
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Store(_) | Self::Internal(_))
+        !matches!(self, Self::Store(_) | Self::Dispatch(_) | Self::Internal(_))
     }
 }
 
@@ -119,6 +123,7 @@ impl From<StoreError> for Error {
     fn from(error: StoreError) -> Self {
         match error {
             StoreError::Missing { what, id } => Self::NotFound { what: what.to_owned(), id },
+            withdrawn if withdrawn.is_withdrawal() => Self::Conflict(StoreError::Withdrawn.to_string()),
             other => Self::Store(other),
         }
     }

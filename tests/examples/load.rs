@@ -1,4 +1,5 @@
-//! Load on loopback while real solves run: durable preference writes at a steady rate, and study reads.
+//! Load on loopback while real solves run: durable preference writes of several raters at a steady rate together, and
+//! study reads.
 //!
 //! `cargo run --release -p gaitwright-tests --example load -- [SECONDS] [WRITES_PER_SECOND]`
 
@@ -12,6 +13,9 @@ use gaitwright_tests::service::Service;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
+
+/// Who writes at the same time.
+const RATERS: usize = 8;
 
 /// Studies with muscles are solved, others answered at once.
 struct Both(Analytic);
@@ -104,21 +108,24 @@ async fn main() {
     let write = format!("/api/v1/studies/{study}/preferences");
     let read = format!("/api/v1/studies/{study}");
 
-    let writer = std::thread::spawn({
-        let address = address.clone();
-        move || {
+    let rater = |number: usize| {
+        let (address, write, body) = (address.clone(), write.clone(), body.clone());
+        std::thread::spawn(move || {
             let mut connection = Connection::open(&address);
             let (begun, mut times) = (Instant::now(), Vec::new());
+            let each = RATERS as f64 / rate;
             while begun.elapsed().as_secs_f64() < seconds {
                 // From when the request was due: a slow answer delays the next one, and that counts.
-                let due = begun + Duration::from_secs_f64(times.len() as f64 / rate);
+                let due = (times.len() as f64 + number as f64 / RATERS as f64) * each;
+                let due = begun + Duration::from_secs_f64(due);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));
                 assert_eq!(connection.send("POST", &write, &body), 201);
                 times.push(due.elapsed());
             }
             times
-        }
-    });
+        })
+    };
+    let raters: Vec<_> = (0..RATERS).map(rater).collect();
     let reader = std::thread::spawn(move || {
         let mut connection = Connection::open(&address);
         let (begun, mut times) = (Instant::now(), Vec::new());
@@ -130,8 +137,12 @@ async fn main() {
         }
         times
     });
-    let (writes, reads) =
-        tokio::task::spawn_blocking(|| (writer.join().unwrap(), reader.join().unwrap())).await.unwrap();
+    let (writes, reads) = tokio::task::spawn_blocking(|| {
+        let writes = raters.into_iter().flat_map(|rater| rater.join().unwrap()).collect();
+        (writes, reader.join().unwrap())
+    })
+    .await
+    .unwrap();
     let trials = service.trials(solved).await;
     let running = trials.iter().any(|trial| trial.state.is_open());
     println!("a solve with muscles ran on one worker: {running}; trials of that study: {}", trials.len());

@@ -24,6 +24,8 @@ pub struct Analytic {
     pub panics: Vec<u32>,
     /// Trials with these numbers panic the first time only.
     pub panics_once: Vec<u32>,
+    /// The first solve hangs after its first iteration, and does not hear that it is cancelled.
+    pub hangs_once: bool,
     /// How many solves were begun.
     pub begun: AtomicU32,
 }
@@ -67,6 +69,9 @@ impl Evaluate for Analytic {
                 step: 1.0,
                 guess: 0,
             });
+            while self.hangs_once && begun == 0 {
+                std::thread::park();
+            }
             std::thread::sleep(self.pause);
         }
         Ok(outcome(assignment, status, rmse))

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::missing_panics_doc)]
 
 pub mod analytic;
+pub mod broker;
 pub mod cli;
 pub mod client;
 pub mod service;

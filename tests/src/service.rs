@@ -12,7 +12,7 @@ use gaitwright::store::{Store, StudyId, SubjectId, commit, feedback, studies, su
 use gaitwright::studies::catalogue;
 use gaitwright::studies::director::Director;
 use gaitwright::studies::plan::{self, NewStudy};
-use gaitwright::workers::{Board, Evaluate, Pool};
+use gaitwright::workers::{Dispatch, Evaluate, InProcess};
 use http_body_util::BodyExt;
 use serde_json::Value;
 use std::path::Path;
@@ -58,21 +58,25 @@ impl Answer {
 impl Service {
     /// Starts a service with a solver and so many workers.
     pub async fn start(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
+        Self::start_with(database, Arc::new(InProcess::new(workers, Arc::new(solver)).standing_back())).await
+    }
+
+    /// Starts a service whose jobs go to an engine.
+    pub async fn start_with(database: &Path, engine: Arc<dyn Dispatch>) -> Self {
         let store = Store::open(database).await.unwrap();
         let mut writer = store.write().await.unwrap();
         catalogue::ensure(&mut writer).await.unwrap();
         commit(writer).await.unwrap();
-        Self::over(store, solver, workers)
+        Self::over(store, engine)
     }
 
     /// Starts a service on a record as it is, adding nothing to it.
     pub async fn start_as_is(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
-        Self::over(Store::open(database).await.unwrap(), solver, workers)
+        Self::over(Store::open(database).await.unwrap(), Arc::new(InProcess::new(workers, Arc::new(solver))))
     }
 
-    fn over(store: Store, solver: impl Evaluate, workers: usize) -> Self {
-        let pool = Pool::new(workers, Arc::new(solver), Arc::new(Board::default()));
-        let director = Director::new(store.clone(), pool, None);
+    fn over(store: Store, engine: Arc<dyn Dispatch>) -> Self {
+        let director = Director::new(store.clone(), engine, None);
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await.unwrap() }

@@ -75,7 +75,12 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let api = "/api/v1";
 
     let subject = json!({"pseudonym": "S1", "height_m": 1.8, "body_mass_kg": 70});
-    scene.one(done, "post /subjects", &format!("{api}/subjects"), subject).await;
+    let subject = scene.one(done, "post /subjects", &format!("{api}/subjects"), subject).await;
+    let of_subject = format!("{api}/subjects/{}", text(&subject["id"]));
+    let form = json!({"form": "version 3 of 2026-05-01"});
+    scene.one(done, "post /subjects/{id}/consents", &format!("{of_subject}/consents"), form).await;
+    let why = json!({"reason": "no time"});
+    scene.one(done, "post /subjects/{id}/withdraw", &format!("{of_subject}/withdraw"), why).await;
     let study = json!({"subject_id": service.subject().await, "start": false});
     scene.one(done, "post /studies", &format!("{api}/studies"), study).await;
     let of_draft = format!("{api}/studies/{draft}");

@@ -5,10 +5,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_optimizer::Violation;
 use gaitwright::http::openapi;
+use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 #[test]
@@ -69,6 +72,169 @@ async fn the_description_is_served_and_its_page_needs_nothing_from_elsewhere() {
     assert!(page.text.contains("/api/v1/studies/{id}/preferences"));
     for elsewhere in ["http://", "https://", "//cdn"] {
         assert!(!page.text.contains(elsewhere), "{elsewhere}");
+    }
+    service.stop().await;
+}
+
+/// The description, and which of its schemas a real value was held against.
+struct Description {
+    document: Value,
+    seen: BTreeSet<String>,
+}
+
+impl Description {
+    fn read() -> Self {
+        Self { document: serde_json::from_str(&openapi::text().unwrap()).unwrap(), seen: BTreeSet::new() }
+    }
+
+    /// Holds what the service answered to a `GET` against the schema of that answer.
+    fn hold(&mut self, path: &str, answer: &Value) {
+        let pointer = format!("/paths/{}/get/responses/200/content/application~1json/schema", path.replace('/', "~1"));
+        let schema = self.document.pointer(&pointer).unwrap_or_else(|| panic!("{path} is not described")).clone();
+        self.fits(&schema, answer, path);
+    }
+
+    /// Holds a value against a schema by name.
+    fn hold_named(&mut self, name: &str, value: &Value) {
+        self.fits(&json!({ "$ref": format!("#/components/schemas/{name}") }), value, name);
+    }
+
+    /// Names and presence of every property, types of every value.
+    fn fits(&mut self, schema: &Value, value: &Value, place: &str) {
+        if let Some(reference) = schema["$ref"].as_str() {
+            let name = reference.trim_start_matches("#/components/schemas/");
+            self.seen.insert(name.to_owned());
+            let named = self.document["components"]["schemas"][name].clone();
+            assert!(named.is_object(), "{place}: {name} is not described");
+            return self.fits(&named, value, &format!("{place}: {name}"));
+        }
+        if let Some(parts) = schema["oneOf"].as_array() {
+            // Either nothing or the rest: which of the rest, the present descriptions leave no doubt about.
+            let null = |part: &&Value| part["type"] == "null";
+            if value.is_null() {
+                assert!(parts.iter().any(|part| null(&part)), "{place} is null");
+                return;
+            }
+            let rest: Vec<&Value> = parts.iter().filter(|part| !null(part)).collect();
+            let [one] = rest[..] else { return };
+            return self.fits(one, value, place);
+        }
+        let kinds: Vec<&str> = match &schema["type"] {
+            Value::String(kind) => vec![kind],
+            Value::Array(kinds) => kinds.iter().map(|kind| kind.as_str().unwrap()).collect(),
+            _ => Vec::new(),
+        };
+        let kind = match value {
+            Value::Null => "null",
+            Value::Bool(_) => "boolean",
+            Value::Number(number) if number.is_f64() => "number",
+            Value::Number(_) => "integer",
+            Value::String(_) => "string",
+            Value::Array(_) => "array",
+            Value::Object(_) => "object",
+        };
+        let fits = |expected: &&str| *expected == kind || (*expected == "number" && kind == "integer");
+        assert!(kinds.is_empty() || kinds.iter().any(fits), "{place}: {value} is not {kinds:?}");
+        for (index, item) in value.as_array().into_iter().flatten().enumerate() {
+            self.fits(&schema["items"], item, &format!("{place}[{index}]"));
+        }
+        let (properties, required) = self.shape(schema);
+        let Some(object) = value.as_object().filter(|_| !properties.is_empty()) else { return };
+        for (name, value) in object {
+            let property = properties.get(name).unwrap_or_else(|| panic!("{place} has {name}, which is not described"));
+            self.fits(property, value, &format!("{place}.{name}"));
+        }
+        for name in required {
+            assert!(object.contains_key(&name), "{place} has no {name}");
+        }
+    }
+
+    /// Every property of an object with its schema, and those that must be there, parts included.
+    fn shape(&mut self, schema: &Value) -> (BTreeMap<String, Value>, Vec<String>) {
+        if let Some(reference) = schema["$ref"].as_str() {
+            let name = reference.trim_start_matches("#/components/schemas/");
+            self.seen.insert(name.to_owned());
+            let named = self.document["components"]["schemas"][name].clone();
+            return self.shape(&named);
+        }
+        let own = schema["properties"].as_object().into_iter().flatten();
+        let mut properties: BTreeMap<_, _> = own.map(|(name, schema)| (name.clone(), schema.clone())).collect();
+        let names = schema["required"].as_array().into_iter().flatten();
+        let mut required: Vec<String> = names.map(|name| name.as_str().unwrap().to_owned()).collect();
+        for part in schema["allOf"].as_array().into_iter().flatten() {
+            let (more, needed) = self.shape(part);
+            properties.extend(more);
+            required.extend(needed);
+        }
+        // One of several shapes: which one, the value says; all of their names are described.
+        for alternative in schema["oneOf"].as_array().into_iter().flatten() {
+            properties.extend(self.shape(alternative).0);
+        }
+        (properties, required)
+    }
+}
+
+#[tokio::test]
+async fn what_is_answered_has_the_properties_that_the_description_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await;
+    let trials = service.trials(study).await;
+    let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});
+    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await.json();
+    let given = given["id"].as_str().unwrap().to_owned();
+    service.post(&format!("/api/v1/preferences/{given}/retract"), &json!({"reason": "r"})).await;
+    service.post("/api/v1/users", &json!({"name": "R", "role": "rater"})).await;
+    service.post("/api/v1/tokens", &json!({"name": "t", "scopes": ["read"]})).await;
+
+    let mut description = Description::read();
+    let (study, script, trial) = (study.to_string(), script.to_string(), trials[0].id.to_string());
+    let device = service.fetch("/api/v1/devices").await.json()[0]["id"].as_str().unwrap().to_owned();
+    let reference = service.fetch("/api/v1/reference-gaits").await.json()[0]["id"].as_str().unwrap().to_owned();
+    let subject = service.subject().await.to_string();
+    for (path, id) in [
+        ("/subjects", ""),
+        ("/subjects/{id}", &subject),
+        ("/devices", ""),
+        ("/devices/{id}", &device),
+        ("/reference-gaits", ""),
+        ("/reference-gaits/{id}", &reference),
+        ("/studies", ""),
+        ("/studies/{id}", &study),
+        ("/studies/{id}", &script),
+        ("/studies/{id}/trials", &study),
+        ("/studies/{id}/trials", &script),
+        ("/studies/{id}/history", &study),
+        ("/studies/{id}/preferences", &study),
+        ("/studies/{id}/raters", &study),
+        ("/trials/{id}", &trial),
+        ("/trials/{id}/iterations", &trial),
+        ("/trials/{id}/attempts", &trial),
+        ("/trials/{id}/gait", &trial),
+        ("/trials/{id}/motion", &trial),
+        ("/preferences/{id}", &given),
+        ("/me", ""),
+        ("/users", ""),
+        ("/tokens", ""),
+        ("/audit", ""),
+        ("/health", ""),
+    ] {
+        let path = format!("/api/v1{path}");
+        let answer = service.fetch(&path.replace("{id}", id)).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path} of {id}: {}", answer.text);
+        description.hold(&path, &answer.json());
+    }
+    let missed = service.fetch(&format!("/api/v1/studies/{trial}")).await;
+    description.hold_named("Problem", &missed.json());
+    // No analytic trial has rows that were not met and are shown: the shape is that of the library all the same.
+    let row = Violation { row: "SS2_R node 3 C3".to_owned(), amount: 0.004, unit: "m".to_owned() };
+    description.hold_named("Violation", &serde_json::to_value(row).unwrap());
+    // Every shape that is written down a second time was held against what it repeats.
+    for shape in ["Bounds", "SearchSpace", "Dimension", "Violation", "Iteration"] {
+        assert!(description.seen.contains(shape), "{shape} was not seen among {:?}", description.seen);
     }
     service.stop().await;
 }

@@ -12,7 +12,7 @@ use std::str::FromStr;
 const DEFAULT_FILE: &str = "gaitwright.toml";
 
 /// What can be set: name in the file, default, meaning. Flag and environment follow from the name.
-const KNOWN: [(&str, &str, &str); 10] = [
+const KNOWN: [(&str, &str, &str); 12] = [
     ("listen", "127.0.0.1:8080", "where to listen"),
     ("database", "gaitwright.db", "the SQLite file"),
     (
@@ -20,7 +20,9 @@ const KNOWN: [(&str, &str, &str); 10] = [
         "",
         "names under which browsers reach the service, besides its address and localhost; commas between",
     ),
-    ("workers", "cores", "how many solves at the same time"),
+    ("workers", "cores", "how many solves at the same time; with nats, over all its workers together"),
+    ("nats", "", "NATS broker whose workers solve, nats://HOST:PORT; empty: this process solves itself"),
+    ("nats_queue", "gaitwright", "name of this service on the broker; its workers are told the same"),
     ("sign_in", "true", "whether people and programs say who they are; false on this machine only"),
     ("idle_minutes", "60", "a session without a sign of life for so long ends"),
     ("tls_certificate", "", "PEM file with the certificate chain; with tls_key, the service speaks HTTPS"),
@@ -47,6 +49,12 @@ pub(super) struct Flags {
     /// How many solves at the same time; default: the number of cores.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
+    /// NATS broker whose workers solve (`gaitwright worker`); default: this process solves itself.
+    #[arg(long, value_name = "URL")]
+    nats: Option<String>,
+    /// Name of this service on the broker; default gaitwright.
+    #[arg(long, value_name = "NAME")]
+    nats_queue: Option<String>,
     /// Ask nobody to sign in: for one person on this machine.
     #[arg(long)]
     no_sign_in: bool,
@@ -149,6 +157,13 @@ impl Settings {
         }
     }
 
+    /// The broker and the name of the service there; `None`: no broker.
+    pub(super) fn nats(&self) -> Result<Option<(&str, &str)>, Error> {
+        let queue = self.text("nats_queue");
+        queue_name(queue).map_err(|_| self.refused("nats_queue", QUEUE_NAMES))?;
+        Ok(Some((self.text("nats"), queue)).filter(|(url, _)| !url.is_empty()))
+    }
+
     pub(super) fn host_names(&self) -> Vec<String> {
         let names = self.text("host_names").split(',').map(str::trim);
         names.filter(|name| !name.is_empty()).map(str::to_owned).collect()
@@ -189,12 +204,36 @@ impl Flags {
             "database" => self.database.clone(),
             "host_names" => Some(self.host_name.join(",")).filter(|names| !names.is_empty()),
             "workers" => self.workers.map(|workers| workers.to_string()),
+            "nats" => self.nats.clone(),
+            "nats_queue" => self.nats_queue.clone(),
             "sign_in" => self.no_sign_in.then(|| "false".to_owned()),
             "idle_minutes" => self.idle_minutes.clone(),
             "tls_certificate" => self.tls_certificate.clone(),
             "tls_key" => self.tls_key.clone(),
             _ => None,
         }
+    }
+}
+
+/// Names that NATS takes for a stream and as the first part of a subject.
+const QUEUE_NAMES: &str = "1 to 60 letters, digits, - and _";
+
+/// A name of a service on a broker.
+pub(super) fn queue_name(text: &str) -> Result<String, String> {
+    let known = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if (1..=60).contains(&text.len()) && text.chars().all(known) {
+        Ok(text.to_owned())
+    } else {
+        Err(QUEUE_NAMES.to_owned())
+    }
+}
+
+/// An address as it may be shown: whoever is named in it, without the password.
+fn without_password(text: &str) -> String {
+    let Some((scheme, rest)) = text.split_once("://") else { return text.to_owned() };
+    match rest.rsplit_once('@') {
+        Some((_, host)) => format!("{scheme}://...@{host}"),
+        None => text.to_owned(),
     }
 }
 
@@ -245,7 +284,7 @@ impl Config {
         let settings = Settings::read(&flags)?;
         for (name, _, meaning) in KNOWN {
             let origin = settings.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
-            println!("{name} = {:?}  # {origin}; {meaning}", settings.text(name));
+            println!("{name} = {:?}  # {origin}; {meaning}", without_password(settings.text(name)));
         }
         Ok(())
     }
@@ -286,5 +325,23 @@ mod tests {
         assert!(parse(Path::new("x.toml"), "colour = 1").unwrap_err().to_string().contains("colour is not a setting"));
         assert!(parse(Path::new("x.toml"), "workers = [1]").is_err());
         assert!(parse(Path::new("x.toml"), "workers = ").is_err());
+        let dotted = Flags { nats_queue: Some("a.b".to_owned()), ..Flags::default() };
+        assert!(settings(&dotted, &[]).unwrap().nats().unwrap_err().to_string().contains("letters, digits"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_settings_file_is_read_or_refused(text in "[a-z_]{0,12} ?=? ?\\PC{0,40}", bytes in "\\PC{0,200}") {
+            let _ = parse(Path::new("x.toml"), &text);
+            let _ = parse(Path::new("x.toml"), &bytes);
+            let _ = parse(Path::new("x.toml"), &format!("listen = {bytes:?}"));
+        }
+    }
+
+    #[test]
+    fn a_password_in_an_address_is_not_shown() {
+        assert_eq!(without_password("nats://lab:s3@cret@broker:4222"), "nats://...@broker:4222");
+        assert_eq!(without_password("nats://broker:4222"), "nats://broker:4222");
+        assert_eq!(without_password("warn,gaitwright=info"), "warn,gaitwright=info");
     }
 }

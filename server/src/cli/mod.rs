@@ -13,6 +13,7 @@ mod solve;
 pub mod study;
 mod sweep;
 mod tune;
+mod worker;
 
 use crate::error::Error;
 use crate::http::openapi;
@@ -50,6 +51,8 @@ struct Cli {
 enum Command {
     /// Serve the pages and the REST interface, and run the studies of a database.
     Serve(serve::Serve),
+    /// Solve what a service hands out through a NATS broker.
+    Worker(worker::Worker),
     /// Tune a gait unattended: propose, optimise, compare by Gait RMSE, repeat.
     Tune(tune::Tune),
     /// Optimise one gait.
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
     };
     let done = match cli.command {
         Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
+        Command::Worker(worker) => runtime.block_on(worker.run()).map(|()| Ended::Done),
         Command::Tune(tune) => runtime.block_on(tune.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),

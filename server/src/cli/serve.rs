@@ -8,7 +8,8 @@ use crate::store::audit::Actor;
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
 use crate::studies::director::Director;
-use crate::workers::{Board, GaitSolver, Pool};
+use crate::workers::nats::JetStream;
+use crate::workers::{Dispatch, GaitSolver, InProcess, LEASE};
 use axum_server::Handle;
 use axum_server::tls_rustls::RustlsConfig;
 use clap::Args;
@@ -72,8 +73,12 @@ impl Serve {
         let origin = format!("{}://{address}", if access.secure { "https" } else { "http" });
         let link = if sign_in { self.link(&store).await? } else { None };
 
-        let pool = Pool::new(cores_or(workers), Arc::new(GaitSolver), Arc::new(Board::default()));
-        let director = Director::new(store.clone(), pool, None);
+        let size = cores_or(workers);
+        let engine: Arc<dyn Dispatch> = match settings.nats()? {
+            Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
+            None => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
+        };
+        let director = Director::new(store.clone(), engine, None);
         let hosts = Hosts::new(address, &settings.host_names());
         let app = router(AppState::new(director.clone(), Arc::new(access), hosts));
         let work = tokio::spawn({

@@ -15,7 +15,7 @@ use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
 use crate::studies::standing::Standing;
 use crate::studies::summary::{self, Summary};
-use crate::workers::{Board, GaitSolver, Pool};
+use crate::workers::{GaitSolver, InProcess};
 use clap::Args;
 use gait_optimizer::TunedBounds;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -54,8 +54,8 @@ impl Tune {
         let store = Store::open(&self.database).await?;
         let study = self.study(&store, subject, workers).await?;
 
-        let pool = Pool::new(workers, Arc::new(GaitSolver), Arc::new(Board::default()));
-        let director = Director::new(store.clone(), pool, Some(study.id));
+        let engine = InProcess::new(workers, Arc::new(GaitSolver));
+        let director = Director::new(store.clone(), Arc::new(engine), Some(study.id));
         let work = tokio::spawn({
             let director = director.clone();
             async move { director.run().await }

@@ -71,8 +71,10 @@ fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
     if names_something || changes {
         problems.push(("404", "There is no such thing"));
     }
-    if changes {
+    if changes || operation.parameters.is_some() {
         problems.push(("409", "Not possible in the present state"));
+    }
+    if changes {
         problems.push(("412", "It was changed since it was read"));
         problems.push(("413", "The body is too large"));
     }

@@ -92,7 +92,7 @@ impl From<&Error> for Problem {
                 "The learner cannot work with this",
                 detail,
             ),
-            Error::Store(_) | Error::Internal(_) => Self::new(
+            Error::Store(_) | Error::Dispatch(_) | Error::Internal(_) => Self::new(
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "/problems/internal",
                 "The program failed",

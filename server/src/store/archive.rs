@@ -15,7 +15,7 @@ const FORMAT: &str = "gaitwright study 1";
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 12] = [
+const TABLES: [(&str, &str); 13] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -23,6 +23,7 @@ const TABLES: [(&str, &str); 12] = [
     ("trials", "study_id = ? order by number"),
     ("gaits", "trial_id in (select id from trials where study_id = ?)"),
     ("jobs", "trial_id in (select id from trials where study_id = ?)"),
+    ("results", "trial_id in (select id from trials where study_id = ?)"),
     ("feedback", "study_id = ? order by seq"),
     ("retractions", "feedback_seq in (select seq from feedback where study_id = ?)"),
     ("presentations", "study_id = ? order by id"),

@@ -46,7 +46,8 @@ pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
     Ok(SqlitePoolOptions::new().max_connections(1).connect_with(options).await?)
 }
 
-async fn into_file(pool: &SqlitePool, to: &Path) -> StoreResult<()> {
+/// Writes a compact copy to a new file and checks the copy.
+pub(super) async fn into_file(pool: &SqlitePool, to: &Path) -> StoreResult<()> {
     if to.exists() {
         let source = std::io::ErrorKind::AlreadyExists.into();
         return Err(StoreError::Open { path: to.to_owned(), source });

@@ -63,12 +63,30 @@ pub enum StoreError {
         /// Why.
         reason: String,
     },
+    /// The subject withdrew consent.
+    #[error("the subject withdrew consent: the record is kept, but nothing is added to it and nothing is given out")]
+    Withdrawn,
+    /// The record was closed.
+    #[error("the database is closed: the service is shutting down")]
+    Closed,
+    /// A change could not be written to the disk; it did not happen.
+    #[error("database: the change could not be made durable: {0}")]
+    NotDurable(String),
     /// Anything else the database reports.
     #[error("database: {0}")]
     Database(#[from] sqlx::Error),
 }
 
 impl StoreError {
+    /// Whether the subject withdrew consent: refused here, or by a trigger.
+    pub fn is_withdrawal(&self) -> bool {
+        match self {
+            Self::Withdrawn => true,
+            Self::Database(sqlx::Error::Database(found)) => found.message() == "the subject withdrew consent",
+            _ => false,
+        }
+    }
+
     /// Whether a file was named that cannot be what was meant, rather than a failure of the record itself.
     pub fn is_wrong_file(&self) -> bool {
         matches!(self, Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. })

@@ -44,7 +44,7 @@ pub async fn insert(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
 }
 
 /// Leases the next job: highest priority first, then the study with the fewest running jobs, then the
-/// oldest. With `only`, from that study.
+/// oldest. With `only`, from that study. `None`: there is none, or `most` are leased already.
 ///
 /// # Errors
 /// What the database reports.
@@ -53,7 +53,12 @@ pub async fn lease(
     worker: &str,
     until: Instant,
     only: Option<StudyId>,
+    most: usize,
 ) -> StoreResult<Option<Lease>> {
+    let (_, out) = depth(db).await?;
+    if out as usize >= most {
+        return Ok(None);
+    }
     let row = sqlx::query(
         "select j.id, j.trial_id, j.attempts, t.study_id from jobs j \
          join trials t on t.id = j.trial_id join studies s on s.id = t.study_id \
@@ -81,6 +86,20 @@ pub async fn lease(
         .execute(db)
         .await?;
     Ok(Some(lease))
+}
+
+/// The lease of an attempt at a trial, whether it still holds or not.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has no job, or what the database reports.
+pub async fn lease_of(db: &mut Connection, trial: TrialId, attempt: u32) -> StoreResult<Lease> {
+    let row =
+        sqlx::query("select j.id, t.study_id from jobs j join trials t on t.id = j.trial_id where j.trial_id = ?")
+            .bind(trial)
+            .fetch_optional(db)
+            .await?
+            .ok_or_else(|| StoreError::Missing { what: "the job of trial", id: trial.to_string() })?;
+    Ok(Lease { job: row.try_get("id")?, trial, study: row.try_get("study_id")?, attempt })
 }
 
 /// Keeps a lease alive. `false`: it is not ours any more.
@@ -182,16 +201,18 @@ pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>
     )
 }
 
-/// Every lease: at start, what an earlier process left behind.
+/// Every lease that was given to an engine: at start, what an earlier process left behind.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn leased(db: &mut Connection) -> StoreResult<Vec<Lease>> {
+pub async fn leased(db: &mut Connection, engine: Option<&str>) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
             "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
-             where j.state = 'leased' order by j.id",
+             where j.state = 'leased' and (? is null or j.worker = ?) order by j.id",
         )
+        .bind(engine)
+        .bind(engine)
         .fetch_all(db)
         .await?,
     )

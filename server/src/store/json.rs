@@ -14,6 +14,12 @@ pub(super) fn to_text<T: Serialize>(what: &'static str, value: &T) -> StoreResul
     serde_json::to_string(value).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }
 
+/// [`to_text`], or `None` where it could not be read back: JSON has no word for numbers that are not finite.
+pub(super) fn readable<T: Serialize + DeserializeOwned>(what: &'static str, value: &T) -> StoreResult<Option<String>> {
+    let text = to_text(what, value)?;
+    Ok(serde_json::from_str::<T>(&text).is_ok().then_some(text))
+}
+
 pub(super) fn from_text<T: DeserializeOwned>(what: &'static str, text: &str) -> StoreResult<T> {
     serde_json::from_str(text).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }

@@ -1,18 +1,20 @@
 //! The schema: numbered SQL files, embedded, applied at start in one go.
 
-use super::{StoreError, StoreResult};
+use super::{StoreError, StoreResult, backup, beside};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::{Row, SqlSafeStr, SqlitePool};
 use std::borrow::Cow;
 use std::path::Path;
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 5] = [
+const FILES: [(i64, &str, &str); 7] = [
     (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
     (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
     (4, "scripts", include_str!("../../../migrations/0004_scripts.sql")),
     (5, "blind", include_str!("../../../migrations/0005_blind.sql")),
+    (6, "results", include_str!("../../../migrations/0006_results.sql")),
+    (7, "consent", include_str!("../../../migrations/0007_consent.sql")),
 ];
 
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
@@ -39,15 +41,20 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
     Ok(found)
 }
 
-/// A file that is about to be changed is copied first: `gaitwright.db.v1`.
+/// A file that is about to be changed is copied first: `gaitwright.db.v1`. The copy gets its name when it is whole, so
+/// that a process which is killed while it copies leaves nothing that looks like one.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
-    let mut copy = path.as_os_str().to_owned();
-    copy.push(format!(".v{found}"));
-    if found == 0 || found == FILES[FILES.len() - 1].0 || Path::new(&copy).exists() {
+    let copy = beside(path, &format!(".v{found}"));
+    if found == 0 || found == FILES[FILES.len() - 1].0 || copy.exists() {
         return Ok(());
     }
-    sqlx::query("vacuum into ?").bind(copy.to_string_lossy().into_owned()).execute(pool).await?;
-    Ok(())
+    let part = beside(path, &format!(".v{found}.part"));
+    let cannot_write = |source| StoreError::Open { path: part.clone(), source };
+    if part.exists() {
+        std::fs::remove_file(&part).map_err(cannot_write)?;
+    }
+    backup::into_file(pool, &part).await?;
+    std::fs::rename(&part, &copy).map_err(cannot_write)
 }
 
 /// The newest migration that was applied; 0 for a fresh file.

@@ -1,12 +1,13 @@
 //! The record: one SQLite file, owned by one process.
 //!
 //! Only this module names SQL. Reads go through a small pool of read-only connections that never block;
-//! writes go through one connection with `BEGIN IMMEDIATE`, so that no writer ever meets `SQLITE_BUSY`.
+//! writes go through one connection, one after the other, so that no writer ever meets `SQLITE_BUSY`.
 //! A transaction never spans CPU or network work.
 
 pub mod archive;
 pub mod audit;
 pub mod backup;
+pub mod consents;
 pub mod devices;
 mod error;
 pub mod events;
@@ -20,6 +21,7 @@ mod json;
 mod migrations;
 pub mod presentations;
 pub mod reference_gaits;
+pub mod results;
 pub mod schema;
 pub mod sessions;
 pub mod studies;
@@ -29,26 +31,26 @@ pub mod tokens;
 pub mod totals;
 pub mod trials;
 pub mod users;
+mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
     DeviceId, FeedbackId, JobId, PresentationId, ReferenceGaitId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use time::{Instant, now};
+pub use writing::Writer;
 
 use sqlx::pool::PoolConnection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
+use sqlx::{Sqlite, SqliteConnection, SqlitePool};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use writing::Writing;
 
 /// A connection to read with. Sees one consistent state per statement.
 pub type Reader = PoolConnection<Sqlite>;
-
-/// A write transaction: everything in it happens, or nothing.
-pub type Writer = Transaction<'static, Sqlite>;
 
 /// The open record.
 #[derive(Debug, Clone)]
@@ -56,7 +58,7 @@ pub struct Store {
     /// Read-only connections.
     readers: SqlitePool,
     /// The one connection that writes.
-    writer: SqlitePool,
+    writing: Arc<Writing>,
     /// Where the file is, for messages.
     path: PathBuf,
     /// Held as long as any clone lives: a second process that opens the file for writing is refused.
@@ -76,7 +78,7 @@ impl Store {
         let opened = Self::open_owned(path, owner).await.map_err(|error| file_kind::named(path, error));
         if made && opened.as_ref().is_err_and(StoreError::is_wrong_file) {
             // Nothing is left beside a file that is not ours.
-            let _ = std::fs::remove_file(lock_of(path));
+            let _ = std::fs::remove_file(beside(path, ".lock"));
         }
         opened
     }
@@ -89,10 +91,11 @@ impl Store {
             .synchronous(SqliteSynchronous::Full)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(10));
-        let writer = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
-        migrations::apply(&writer, path).await?;
+        let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
+        migrations::apply(&only, path).await?;
+        let writing = Arc::new(Writing::new(only.acquire().await?.detach()));
         let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
-        Ok(Self { readers, writer, path: path.to_owned(), _owner: Arc::new(owner) })
+        Ok(Self { readers, writing, path: path.to_owned(), _owner: Arc::new(owner) })
     }
 
     /// A connection to read with.
@@ -108,7 +111,7 @@ impl Store {
     /// # Errors
     /// When no transaction can be begun.
     pub async fn write(&self) -> StoreResult<Writer> {
-        Ok(self.writer.begin_with("begin immediate").await?)
+        self.writing.begin().await
     }
 
     /// The present second in a form that suits file names.
@@ -124,7 +127,7 @@ impl Store {
     /// Closes every connection, folding the write-ahead log into the file.
     pub async fn close(&self) {
         self.readers.close().await;
-        self.writer.close().await;
+        self.writing.close().await;
     }
 }
 
@@ -133,21 +136,22 @@ impl Store {
 /// # Errors
 /// When the database cannot; nothing has happened then.
 pub async fn commit(writer: Writer) -> StoreResult<()> {
-    Ok(writer.commit().await?)
+    writer.commit().await
 }
 
 /// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].
 pub type Connection = SqliteConnection;
 
-fn lock_of(path: &Path) -> PathBuf {
+/// The file next to the record whose name ends so.
+fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
-    name.push(".lock");
+    name.push(ending);
     PathBuf::from(name)
 }
 
 /// The locked file, and whether it was made for this.
 fn take_ownership(path: &Path) -> StoreResult<(File, bool)> {
-    let lock = lock_of(path);
+    let lock = beside(path, ".lock");
     let made = !lock.exists();
     let file = OpenOptions::new()
         .create(true)

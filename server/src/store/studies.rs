@@ -282,6 +282,19 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
+/// Studies of a subject that did not end.
+///
+/// # Errors
+/// What the database reports.
+pub async fn open_of(db: &mut Connection, subject: SubjectId) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where subject_id = ? and state not in ('finished', 'stopped') order by id")
+            .bind(subject)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// Studies that ended before an instant.
 ///
 /// # Errors

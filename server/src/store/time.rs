@@ -6,6 +6,7 @@ use sqlx::error::BoxDynError;
 use sqlx::{Decode, Encode, Sqlite, Type};
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 use utoipa::ToSchema;
 
 /// An instant of the record.
@@ -24,6 +25,12 @@ impl Instant {
     #[must_use]
     pub fn plus_seconds(self, seconds: i64) -> Self {
         Self(self.0.checked_add(jiff::SignedDuration::from_secs(seconds)).unwrap_or(self.0))
+    }
+
+    /// This instant moved into the future; at the end of time it stays where it is.
+    #[must_use]
+    pub fn after(self, time: Duration) -> Self {
+        Self(self.0.checked_add(time).unwrap_or(self.0))
     }
 
     /// Seconds from `earlier` to this instant.

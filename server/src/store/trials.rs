@@ -275,9 +275,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     // A figure that is not a number stays out of the record (the column is null).
     let finite = |f: fn(&SolveReport) -> f64| figures.map(f).filter(|x| x.is_finite());
     let status = figures.map(|r| json::to_text("status", &r.status)).transpose()?;
-    // JSON has no word for numbers that are not finite: such a document could not be read back.
-    let report = figures.map(|r| json::to_text("report", r)).transpose()?;
-    let report = report.filter(|text| serde_json::from_str::<SolveReport>(text).is_ok());
+    let report = figures.map(|r| json::readable("report", r)).transpose()?.flatten();
     let violations: Vec<&Violation> = end.violations.iter().filter(|v| v.amount.is_finite()).collect();
     sqlx::query(
         "update trials set state = ?, status = ?, gait_rmse_rad = ?, cost_of_transport = ?, objective = ?, \

@@ -24,21 +24,38 @@ pub struct Done {
 /// [`Error::NotFound`], or [`Error::Conflict`] with what is possible instead.
 pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
     let study = studies::get(writer, id).await?;
+    let cancelled = if act == Act::Stop {
+        stop(writer, &study, reason).await?
+    } else {
+        move_on(writer, &study, act, reason).await?;
+        Vec::new()
+    };
+    let changed = studies::get(writer, id).await?;
+    let detail = json!({ "from": study.state, "to": changed.state, "reason": reason });
+    audit::append(writer, actor, &format!("study.{}", act.as_str()), &format!("study {id}"), &detail).await?;
+    Ok(Done { study: changed, cancelled })
+}
+
+/// Ends a study with its open trials, which it gives; whoever does so says it in the audit trail.
+///
+/// # Errors
+/// [`Error::Conflict`] when it has ended.
+pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Result<Vec<TrialId>, Error> {
+    let mut cancelled = Vec::new();
+    for trial in trials::of_study(writer, study.id).await?.into_iter().filter(|trial| trial.state.is_open()) {
+        record::cancelled(writer, trial.id, "the study was stopped").await?;
+        cancelled.push(trial.id);
+    }
+    move_on(writer, study, Act::Stop, reason).await?;
+    Ok(cancelled)
+}
+
+async fn move_on(writer: &mut Writer, study: &Study, act: Act, reason: &str) -> Result<(), Error> {
     let state = lifecycle::after(study.state, act)?;
-    if !studies::set_state(writer, &study, state, reason).await? {
+    if !studies::set_state(writer, study, state, reason).await? {
         return Err(Error::conflict("the study changed at the same moment; try again"));
     }
-    let mut cancelled = Vec::new();
-    if act == Act::Stop {
-        for trial in trials::of_study(writer, id).await?.into_iter().filter(|trial| trial.state.is_open()) {
-            record::cancelled(writer, trial.id, "the study was stopped").await?;
-            cancelled.push(trial.id);
-        }
-    }
-    events::append(writer, id, "study_changed", &json!({ "state": state, "reason": reason })).await?;
-    let detail = json!({ "from": study.state, "to": state, "reason": reason });
-    audit::append(writer, actor, &format!("study.{}", act.as_str()), &format!("study {id}"), &detail).await?;
-    Ok(Done { study: studies::get(writer, id).await?, cancelled })
+    Ok(events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": reason })).await?)
 }
 
 /// Ends an open trial.

@@ -1,7 +1,7 @@
 //! The director: proposes, dispatches, records, for every study that goes on by itself.
 //!
-//! One task plans; each running job has a task that keeps its lease alive and records its finding. What they
-//! decide depends on the record alone, so the process may end at any instant.
+//! One task plans and hands jobs to the engine, another hears what comes of them. What they decide depends on the
+//! record alone, so the process may end at any instant.
 
 use super::choice;
 use super::comparison;
@@ -13,24 +13,26 @@ use crate::store::jobs::Lease;
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
 use crate::store::{
-    Store, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies, subjects,
-    trials,
+    Store, StoreError, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies,
+    subjects, trials,
 };
-use crate::workers::{Assignment, Board, Finding, Pool, Slot};
+use crate::workers::{Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
 use gait_optimizer::{GaitProblem, SolveStatus};
 use serde_json::json;
+use std::collections::HashMap;
+use std::fmt;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::{Notify, watch};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-/// A lease lives this long without a sign of life.
-const LEASE_SECONDS: i64 = 60;
-/// A sign of life is given this often.
-const HEARTBEAT: Duration = Duration::from_secs(20);
+/// Signs of life come with every iteration; so many of them are written down during a lease.
+const HEARTBEATS_PER_LEASE: u32 = 3;
 /// The plan is looked at this often even when nothing seems to happen.
 const IDLE: Duration = Duration::from_secs(5);
+/// Changes within this time lead to one plan.
+const TOGETHER: Duration = Duration::from_millis(10);
 /// So many trials in a row without a result pause a study: something is wrong with the set-up.
 const FAILURES_IN_A_ROW: usize = 3;
 
@@ -38,10 +40,11 @@ const FAILURES_IN_A_ROW: usize = 3;
 #[derive(Debug, Clone)]
 pub struct Director(Arc<Inner>);
 
-#[derive(Debug)]
 struct Inner {
     store: Store,
-    pool: Pool,
+    engine: Arc<dyn Dispatch>,
+    /// How far the running solves are.
+    board: Arc<Board>,
     /// With `Some`, the only study that is looked at.
     only: Option<StudyId>,
     /// Something changed: plan again.
@@ -52,12 +55,22 @@ struct Inner {
     tasks: TaskTracker,
 }
 
+impl fmt::Debug for Inner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Director")
+            .field("engine", &self.engine.name())
+            .field("only", &self.only)
+            .finish_non_exhaustive()
+    }
+}
+
 impl Director {
     /// A director over a record; [`Self::run`] sets it to work.
-    pub fn new(store: Store, pool: Pool, only: Option<StudyId>) -> Self {
+    pub fn new(store: Store, engine: Arc<dyn Dispatch>, only: Option<StudyId>) -> Self {
         Self(Arc::new(Inner {
             store,
-            pool,
+            engine,
+            board: Arc::default(),
             only,
             wake: Notify::new(),
             pulse: watch::channel(0).0,
@@ -73,12 +86,12 @@ impl Director {
 
     /// How far the running solves are.
     pub fn board(&self) -> &Arc<Board> {
-        self.0.pool.board()
+        &self.0.board
     }
 
     /// How many solves can run at the same time.
     pub fn workers(&self) -> usize {
-        self.0.pool.size()
+        self.0.engine.size()
     }
 
     /// Changes whenever something was recorded.
@@ -98,8 +111,9 @@ impl Director {
     }
 
     /// Asks the solve of a trial to stop within one iteration.
-    pub fn cancel_solve(&self, trial: TrialId) {
-        self.0.pool.cancel(trial);
+    pub async fn cancel_solve(&self, trial: TrialId) {
+        self.0.engine.withdraw(trial).await;
+        self.0.board.close(trial);
     }
 
     /// Tells the director to stop; [`Self::run`] returns soon after.
@@ -107,34 +121,43 @@ impl Director {
         self.0.shutdown.cancel();
     }
 
-    /// Works until told to stop. Solves that run then are given back to the queue.
+    /// Works until told to stop. Solves that run in this process then are given back to the queue.
     ///
     /// # Errors
-    /// What the database reports at start; later errors are logged and tried again.
+    /// What the database reports at start and end; errors between them are logged and tried again.
     pub async fn run(&self) -> Result<(), Error> {
         self.take_back_leases().await?;
-        while !self.0.shutdown.is_cancelled() {
+        let stopped = self.0.shutdown.cancelled();
+        tokio::select! {
+            () = stopped => {}
+            () = self.keep_planning() => {}
+            () = self.keep_listening() => {}
+        }
+        self.0.tasks.close();
+        self.0.tasks.wait().await;
+        self.take_back_leases().await
+    }
+
+    async fn keep_planning(&self) {
+        let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
+        loop {
             if let Err(error) = self.plan_and_dispatch().await {
                 tracing::error!(%error, "planning failed; trying again");
             }
-            tokio::select! {
-                () = self.0.wake.notified() => {}
-                () = tokio::time::sleep(IDLE) => {}
-                () = self.0.shutdown.cancelled() => {}
-            }
+            // Nothing new for so long, or something new; what comes close together is planned with once.
+            let _ = tokio::time::timeout(pause, self.0.wake.notified()).await;
+            tokio::time::sleep(TOGETHER).await;
         }
-        self.0.pool.cancel_all();
-        self.0.tasks.close();
-        self.0.tasks.wait().await;
-        Ok(())
     }
 
-    /// An earlier process that held the record is gone, and its leases with it.
+    /// Jobs that ended with the process that ran them go back to the queue, uncounted.
     async fn take_back_leases(&self) -> Result<(), Error> {
+        let engine = self.0.engine.outlives_process().then_some(IN_PROCESS);
         let mut reader = self.0.store.read().await?;
-        let left = jobs::leased(&mut reader).await?;
+        let left = jobs::leased(&mut reader, engine).await?;
         drop(reader);
         for lease in left {
+            self.0.engine.withdraw(lease.trial).await;
             record::interrupted(&self.0.store, &lease).await?;
         }
         Ok(())
@@ -146,7 +169,7 @@ impl Director {
         let active = studies::active(&mut reader).await?;
         drop(reader);
         for lease in expired {
-            record::silent(&self.0.store, &lease).await?;
+            self.look_after(&lease).await?;
         }
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
             if let Err(error) = self.plan(study.clone()).await {
@@ -154,6 +177,19 @@ impl Director {
             }
         }
         self.dispatch().await
+    }
+
+    /// A lease ran out. What no worker took yet is handed over once more, in case the engine forgot it; what a worker
+    /// took and is silent about is taken from it.
+    async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
+        let state = trials::get(&mut *self.0.store.read().await?, lease.trial).await?.state;
+        if state == TrialState::Queued {
+            self.live_on(lease).await?;
+            return self.submit(lease).await;
+        }
+        self.cancel_solve(lease.trial).await;
+        record::silent(&self.0.store, lease).await?;
+        Ok(())
     }
 
     /// Proposes trials until the study has as many open ones as it may, or moves it to another state.
@@ -215,82 +251,140 @@ impl Director {
         Ok(true)
     }
 
-    /// Leases jobs while there are free slots.
+    /// Hands jobs to the engine as long as it takes some.
     async fn dispatch(&self) -> Result<(), Error> {
-        while !self.0.shutdown.is_cancelled()
-            && let Some(slot) = self.0.pool.try_slot()
-        {
-            let Some(lease) = self.lease().await? else { return Ok(()) };
-            let director = self.clone();
-            self.0.tasks.spawn(async move {
-                if let Err(error) = director.work(slot, &lease).await {
-                    // The lease runs out, and the job is tried again.
-                    tracing::error!(trial = %lease.trial, %error, "cannot run or record a trial");
-                }
-                director.changed();
-            });
+        while let Some(lease) = self.lease().await? {
+            self.submit(&lease).await?;
         }
         Ok(())
     }
 
     async fn lease(&self) -> Result<Option<Lease>, Error> {
+        let engine = &self.0.engine;
         let mut writer = self.0.store.write().await?;
-        let until = now().plus_seconds(LEASE_SECONDS);
-        let Some(lease) = jobs::lease(&mut writer, "in-process", until, self.0.only).await? else { return Ok(None) };
-        trials::start(&mut writer, lease.trial).await?;
-        let trial = trials::get(&mut writer, lease.trial).await?;
-        let payload = json!({ "trial_id": trial.id, "number": trial.number, "state": trial.state });
-        events::append(&mut writer, lease.study, "trial_started", &payload).await?;
+        let until = now().after(engine.lease());
+        let Some(lease) = jobs::lease(&mut writer, engine.name(), until, self.0.only, engine.size()).await? else {
+            return Ok(None);
+        };
         commit(writer).await?;
-        self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
         Ok(Some(lease))
     }
 
-    /// Runs one leased job to its end and records it.
-    async fn work(&self, slot: Slot, lease: &Lease) -> Result<(), Error> {
-        let assignment = assignment(&self.0.store, lease).await?;
-        let mut finding = self.0.pool.run(slot, assignment);
-        let found = loop {
-            tokio::select! {
-                found = &mut finding => break found,
-                () = tokio::time::sleep(HEARTBEAT) => self.heartbeat(lease).await?,
+    async fn submit(&self, lease: &Lease) -> Result<(), Error> {
+        let assignment = match assignment(&self.0.store, lease).await {
+            Ok(assignment) => assignment,
+            Err(error) => {
+                record::broke(&self.0.store, lease, &error.to_string()).await?;
+                return Ok(());
             }
         };
-        self.0.pool.release(lease.trial);
-        match found {
-            Ok(Finding::Ended { outcome, iterations }) => {
-                let (outcome, packed) = tokio::task::spawn_blocking(move || {
-                    let packed = gaits::PackedGait::new(&outcome, &iterations);
-                    (outcome, packed)
-                })
-                .await
-                .map_err(|e| Error::Internal(e.to_string()))?;
-                let packed = packed?;
-                if packed.is_none() && outcome.report.status == SolveStatus::Converged {
-                    let reason = "the solver called a gait converged that holds numbers that are not finite";
-                    record::broke(&self.0.store, lease, reason).await?;
-                } else {
-                    record::ended(&self.0.store, lease, &outcome, packed.as_ref()).await?;
-                }
-            }
-            Ok(Finding::Broke(reason)) => {
-                record::broke(&self.0.store, lease, &reason).await?;
-            }
-            Err(_) => {
-                record::broke(&self.0.store, lease, "the solver thread ended without an answer").await?;
-            }
+        if let Err(error) = self.0.engine.submit(assignment).await {
+            // The lease runs out, and the job is handed over again.
+            tracing::error!(trial = %lease.trial, %error, "a job was not taken");
         }
         Ok(())
     }
 
-    async fn heartbeat(&self, lease: &Lease) -> Result<(), Error> {
+    /// Hears what comes of the jobs.
+    async fn keep_listening(&self) {
+        let mut written: HashMap<TrialId, Instant> = HashMap::new();
+        loop {
+            let heard = match self.0.engine.next().await {
+                News::Started { attempt, worker } => {
+                    written.insert(attempt.trial, Instant::now());
+                    self.started(attempt, &worker).await
+                }
+                News::Iterated { attempt, record } => {
+                    self.0.board.add(attempt.trial, record);
+                    let last = written.entry(attempt.trial).or_insert_with(Instant::now);
+                    if last.elapsed() < self.0.engine.lease() / HEARTBEATS_PER_LEASE {
+                        continue;
+                    }
+                    *last = Instant::now();
+                    self.heartbeat(attempt).await
+                }
+                News::Ended { attempt, worker, finding, receipt } => {
+                    written.remove(&attempt.trial);
+                    let director = self.clone();
+                    self.0.tasks.spawn(async move {
+                        match director.ended(attempt, &worker, finding).await {
+                            Ok(()) => receipt.sign().await,
+                            // Not signed for: it comes again, or the lease runs out.
+                            Err(error) => tracing::error!(trial = %attempt.trial, %error, "cannot record a trial"),
+                        }
+                        director.changed();
+                    });
+                    Ok(())
+                }
+            };
+            if let Err(error) = heard {
+                tracing::error!(%error, "cannot write down that a worker lives");
+            }
+        }
+    }
+
+    /// A worker took a job.
+    async fn started(&self, attempt: Attempt, worker: &str) -> Result<(), Error> {
         let mut writer = self.0.store.write().await?;
-        let ours = jobs::heartbeat(&mut writer, lease, now().plus_seconds(LEASE_SECONDS)).await?;
+        let lease = jobs::lease_of(&mut writer, attempt.trial, attempt.number).await?;
+        if !jobs::heartbeat(&mut writer, &lease, now().after(self.0.engine.lease())).await? {
+            drop(writer);
+            self.0.engine.withdraw(attempt.trial).await;
+            return Ok(());
+        }
+        trials::start(&mut writer, lease.trial).await?;
+        let trial = trials::get(&mut writer, lease.trial).await?;
+        let payload = json!({ "trial_id": trial.id, "number": trial.number, "state": trial.state, "worker": worker });
+        events::append(&mut writer, lease.study, "trial_started", &payload).await?;
         commit(writer).await?;
-        if !ours {
-            self.0.pool.cancel(lease.trial);
+        self.0.board.open(trial.id, lease.study, trial.number);
+        self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
+        Ok(())
+    }
+
+    async fn heartbeat(&self, attempt: Attempt) -> Result<(), Error> {
+        let lease = jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await?;
+        if !self.live_on(&lease).await? {
+            self.0.engine.withdraw(attempt.trial).await;
         }
         Ok(())
+    }
+
+    /// Keeps a lease alive. `false`: it is another attempt's by now.
+    async fn live_on(&self, lease: &Lease) -> Result<bool, Error> {
+        let mut writer = self.0.store.write().await?;
+        let ours = jobs::heartbeat(&mut writer, lease, now().after(self.0.engine.lease())).await?;
+        commit(writer).await?;
+        Ok(ours)
+    }
+
+    /// Records what came of an attempt.
+    async fn ended(&self, attempt: Attempt, worker: &str, finding: Finding) -> Result<(), Error> {
+        self.0.board.close(attempt.trial);
+        let store = &self.0.store;
+        let lease = jobs::lease_of(&mut *store.read().await?, attempt.trial, attempt.number).await;
+        let lease = match lease {
+            Err(StoreError::Missing { .. }) => {
+                tracing::warn!(trial = %attempt.trial, worker, "a result of a trial that this record does not have");
+                return Ok(());
+            }
+            other => other?,
+        };
+        let (outcome, iterations) = match finding {
+            Finding::Ended { outcome, iterations } => (outcome, iterations),
+            Finding::Broke(reason) => return record::broke(store, &lease, &reason).await.map(drop),
+        };
+        let packed = tokio::task::spawn_blocking(move || {
+            let packed = gaits::PackedGait::new(&outcome, &iterations);
+            (outcome, packed)
+        });
+        let (outcome, packed) = packed.await.map_err(|e| Error::Internal(e.to_string()))?;
+        let packed = packed?;
+        if packed.is_none() && outcome.report.status == SolveStatus::Converged {
+            let reason = "the solver called a gait converged that holds numbers that are not finite";
+            return record::broke(store, &lease, reason).await.map(drop);
+        }
+        record::ended(store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
     }
 }
 
@@ -366,8 +460,7 @@ async fn assignment(store: &Store, lease: &Lease) -> Result<Assignment, Error> {
         reference,
     };
     Ok(Assignment {
-        study: lease.study,
-        trial: lease.trial,
+        attempt: Attempt { trial: lease.trial, number: lease.attempt },
         number: trial.number,
         problem,
         warm_start,

@@ -11,6 +11,7 @@ pub mod change;
 pub mod choice;
 pub mod command;
 pub mod comparison;
+pub mod consent;
 pub mod director;
 pub mod history;
 pub mod lifecycle;

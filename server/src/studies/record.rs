@@ -10,20 +10,22 @@ use crate::store::gaits::PackedGait;
 use crate::store::jobs::{Lease, Troubles};
 use crate::store::studies::FeedbackMode;
 use crate::store::trials::{TrialEnd, TrialState};
-use crate::store::{Store, TrialId, Writer, commit, events, feedback, gaits, jobs, studies, trials};
+use crate::store::{Store, TrialId, Writer, commit, events, feedback, gaits, jobs, results, studies, trials};
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use serde_json::json;
 
 /// Author of what the program itself says.
 const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"));
 
-/// Records a solve that ended by itself. `false`: the lease was not ours any more, nothing was recorded.
+/// Records a solve that ended by itself. `false`: the lease was not ours any more; what came is kept as evidence, and
+/// nobody hears of it.
 ///
 /// # Errors
 /// What the database or the learner reports; nothing is recorded then.
 pub async fn ended(
     store: &Store,
     lease: &Lease,
+    worker: &str,
     outcome: &SolveOutcome,
     gait: Option<&PackedGait>,
 ) -> Result<bool, Error> {
@@ -50,9 +52,13 @@ pub async fn ended(
         if feedback::version(&mut writer, lease.study).await? != standing.version {
             continue;
         }
-        if !jobs::finish(&mut writer, lease).await? {
+        let taken = jobs::finish(&mut writer, lease).await?;
+        results::keep(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, taken).await?;
+        if !taken {
+            commit(writer).await?;
             return Ok(false);
         }
+        trials::start(&mut writer, lease.trial).await?;
         trials::finish(&mut writer, lease.trial, &end).await?;
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;

@@ -62,11 +62,11 @@ impl Board {
         self.tracks().len()
     }
 
-    pub(super) fn open(&self, trial: TrialId, study: StudyId, number: u32) {
+    pub(crate) fn open(&self, trial: TrialId, study: StudyId, number: u32) {
         self.tracks().insert(trial, Track { study, number, records: Vec::new() });
     }
 
-    pub(super) fn add(&self, trial: TrialId, record: IterationRecord) {
+    pub(crate) fn add(&self, trial: TrialId, record: IterationRecord) {
         let progress = self.tracks().get_mut(&trial).map(|track| {
             track.records.push(record);
             Progress { study_id: track.study, trial_id: trial, number: track.number, record }
@@ -77,8 +77,8 @@ impl Board {
         }
     }
 
-    pub(super) fn close(&self, trial: TrialId) -> Vec<IterationRecord> {
-        self.tracks().remove(&trial).map(|track| track.records).unwrap_or_default()
+    pub(crate) fn close(&self, trial: TrialId) {
+        self.tracks().remove(&trial);
     }
 
     fn tracks(&self) -> MutexGuard<'_, HashMap<TrialId, Track>> {

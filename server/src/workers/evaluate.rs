@@ -1,16 +1,15 @@
 //! The seam between the service and the optimizer.
 
-use crate::store::{StudyId, TrialId};
+use super::dispatch::Attempt;
 use gait_optimizer::{CancelToken, GaitProblem, IterationRecord, SolveOptions, SolveOutcome, WarmStart, solve};
+use serde::{Deserialize, Serialize};
 
 /// One solve to run.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Assignment {
-    /// The study.
-    pub study: StudyId,
-    /// The trial.
-    pub trial: TrialId,
-    /// Its number within the study.
+    /// The trial, and which try at it this is.
+    pub attempt: Attempt,
+    /// Number of the trial within its study.
     pub number: u32,
     /// What to solve.
     pub problem: GaitProblem,

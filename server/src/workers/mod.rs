@@ -1,12 +1,16 @@
 //! Workers: what runs a solve. They never see the database.
 //!
-//! A worker gets an [`Assignment`], reports iterations, and gives back a [`Finding`]. Solves are CPU work: each
-//! runs on a thread of its own, at most as many at a time as the pool has slots, and never on the async runtime.
+//! A worker gets an [`Assignment`], reports iterations, and gives back a [`Finding`]. What hands assignments out is an
+//! engine ([`Dispatch`]): threads of this process ([`InProcess`]), or workers elsewhere behind a broker ([`nats`]).
+//! Solves are CPU work: each runs on a thread of its own and never on the async runtime.
 
 mod board;
+mod dispatch;
 mod evaluate;
-mod pool;
+mod in_process;
+pub mod nats;
 
 pub use board::{Board, Progress, Track};
+pub use dispatch::{Attempt, Dispatch, DispatchError, Finding, News, Receipt};
 pub use evaluate::{Assignment, Evaluate, GaitSolver};
-pub use pool::{Finding, Pool, Slot};
+pub use in_process::{IN_PROCESS, InProcess, LEASE};

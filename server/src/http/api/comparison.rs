@@ -7,7 +7,7 @@ use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::store::studies::{self, StudyState};
 use crate::store::trials::{self, TrialCounts};
-use crate::store::{Connection, StudyId, schema};
+use crate::store::{Connection, StudyId, consents, schema};
 use crate::studies::choice::best_to_show;
 use crate::studies::standing::Standing;
 use axum::Json;
@@ -76,6 +76,7 @@ pub(super) async fn get(
 
 async fn row(db: &mut Connection, id: StudyId) -> Result<Compared, Error> {
     let study = studies::get(db, id).await?;
+    consents::may_leave(db, id).await?;
     let counts = trials::counts(db, id).await?;
     let standing = Standing::read(db, study).await?;
     let (standing, best) = tokio::task::spawn_blocking(move || {

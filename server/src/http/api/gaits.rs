@@ -6,7 +6,7 @@ use crate::http::AppState;
 use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
-use crate::store::{TrialId, gaits, trials};
+use crate::store::{TrialId, consents, gaits, trials};
 use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
@@ -52,7 +52,8 @@ pub(super) async fn get_csv(_: May<Read>, State(app): State<AppState>, Id(id): I
 
 async fn table(app: &AppState, id: TrialId) -> Result<Response, Error> {
     let mut reader = app.read().await?;
-    trials::get(&mut reader, id).await?;
+    let trial = trials::get(&mut reader, id).await?;
+    consents::may_leave(&mut reader, trial.study_id).await?;
     let gait = gaits::get(&mut reader, id).await?;
     drop(reader);
     let (header, rows) = rows(&gait);

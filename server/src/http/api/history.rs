@@ -6,7 +6,7 @@ use crate::http::AppState;
 use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
-use crate::store::{StudyId, studies};
+use crate::store::{StudyId, consents, studies};
 use crate::studies::history::{self, Milestone};
 use crate::studies::standing::Standing;
 use axum::Json;
@@ -30,7 +30,7 @@ pub(super) async fn of_study(
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let history = read(&app, id).await?;
-    if wants_csv(&headers) { table(id, &history) } else { Ok(Json(history).into_response()) }
+    if wants_csv(&headers) { table(&app, id, &history).await } else { Ok(Json(history).into_response()) }
 }
 
 /// `GET /studies/{id}/history.csv`.
@@ -47,7 +47,7 @@ pub(super) async fn of_study_csv(
     State(app): State<AppState>,
     Id(id): Id<StudyId>,
 ) -> Result<Response, Error> {
-    table(id, &read(&app, id).await?)
+    table(&app, id, &read(&app, id).await?).await
 }
 
 async fn read(app: &AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
@@ -61,7 +61,8 @@ async fn read(app: &AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
         .map_err(Error::Learner)
 }
 
-fn table(study: StudyId, history: &[Milestone]) -> Result<Response, Error> {
+async fn table(app: &AppState, study: StudyId, history: &[Milestone]) -> Result<Response, Error> {
+    consents::may_leave(&mut *app.read().await?, study).await?;
     let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     let rows = history
         .iter()

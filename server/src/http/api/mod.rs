@@ -29,6 +29,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         // who and what
         .routes(routes!(subjects::list, subjects::create))
         .routes(routes!(subjects::get))
+        .routes(routes!(subjects::consents, subjects::consent))
+        .routes(routes!(subjects::withdraw))
         .routes(routes!(devices::list))
         .routes(routes!(devices::get))
         .routes(routes!(reference_gaits::list))
@@ -54,6 +56,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::cancel))
         .routes(routes!(trials::retry))
         .routes(routes!(trials::iterations))
+        .routes(routes!(trials::attempts))
         .routes(routes!(gaits::get))
         .routes(routes!(gaits::get_csv))
         .routes(routes!(motion::get))

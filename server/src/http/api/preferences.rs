@@ -9,7 +9,7 @@ use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::OnceWith;
 use crate::http::pages_of::{After, linked_after};
 use crate::store::feedback::{self, FeedbackRow, Said};
-use crate::store::{FeedbackId, StudyId, studies};
+use crate::store::{FeedbackId, StudyId, consents, studies};
 use crate::studies::answer::{self, Answer};
 use axum::Json;
 use axum::extract::State;
@@ -38,6 +38,7 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     if wants_csv(&headers) {
+        consents::may_leave(&mut reader, id).await?;
         return table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?);
     }
     let limit = page.limit(1000)?;

@@ -225,7 +225,9 @@ async fn act(
     let revision = done.study.revision;
     let view = StudyView::of(&mut writer, done.study).await?;
     let answer = once.finish(app, writer, StatusCode::OK, None, &view).await?;
-    done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
+    for trial in done.cancelled {
+        app.director.cancel_solve(trial).await;
+    }
     Ok(tagged(answer, revision))
 }
 

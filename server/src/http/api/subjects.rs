@@ -8,7 +8,9 @@ use crate::http::may::May;
 use crate::http::once::OnceWith;
 use crate::http::pages_of::{Before, linked};
 use crate::store::SubjectId;
+use crate::store::consents::{self, Consent};
 use crate::store::subjects::{self, Subject};
+use crate::studies::consent::{self, NewConsent, Withdrawal};
 use crate::studies::person::{self, NewSubject};
 use axum::Json;
 use axum::extract::State;
@@ -71,4 +73,74 @@ pub(super) async fn create(
     let subject = person::add(&mut writer, &once.actor, &new).await?;
     let location = format!("/api/v1/subjects/{}", subject.id);
     once.finish(&app, writer, StatusCode::CREATED, Some(location), &subject).await
+}
+
+/// `GET {id}/consents`: what the subject signed and withdrew, oldest first; the last one counts.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/consents",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "Oldest first", body = Vec<Consent>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn consents(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+) -> Result<Json<Vec<Consent>>, Error> {
+    let mut reader = app.read().await?;
+    subjects::get(&mut reader, id).await?;
+    Ok(Json(consents::of_subject(&mut reader, id).await?))
+}
+
+/// `POST {id}/consents`: what the subject signed.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/consents",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body = NewConsent,
+    responses((status = 201, description = "Written down", body = Consent)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn consent(
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+    OnceWith(once, new): OnceWith<Run, NewConsent>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = consent::give(&mut writer, &once.actor, id, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+}
+
+/// `POST {id}/withdraw`: the subject does not take part any more. Every study of the subject stops; the record is
+/// kept, but nothing is added to it and nothing is given out.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/withdraw",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body = Withdrawal,
+    responses((status = 200, description = "Written down, and done", body = Consent)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn withdraw(
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+    OnceWith(once, why): OnceWith<Run, Withdrawal>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let (row, cancelled) = consent::withdraw(&mut writer, &once.actor, id, &why).await?;
+    let answer = once.finish(&app, writer, StatusCode::OK, None, &row).await?;
+    for trial in cancelled {
+        app.director.cancel_solve(trial).await;
+    }
+    Ok(answer)
 }

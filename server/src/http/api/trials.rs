@@ -7,8 +7,9 @@ use crate::http::extract::{Id, Params};
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::Once;
+use crate::store::results::{self, AttemptResult};
 use crate::store::trials::{self, Trial};
-use crate::store::{Connection, StudyId, TrialId, gaits, schema, studies};
+use crate::store::{Connection, StudyId, TrialId, consents, gaits, schema, studies};
 use crate::studies::command;
 use axum::Json;
 use axum::extract::State;
@@ -119,7 +120,7 @@ pub(super) async fn cancel(
     };
     let trial = command::cancel(&mut writer, &once.actor, id, "cancelled on request").await?;
     let answer = once.finish(&app, writer, StatusCode::OK, None, &trial).await?;
-    app.director.cancel_solve(id);
+    app.director.cancel_solve(id).await;
     Ok(answer)
 }
 
@@ -165,7 +166,27 @@ pub(super) async fn iterations(
     Ok(Json(gaits::iterations(&mut *app.read().await?, id).await?))
 }
 
+/// `GET /trials/{id}/attempts`: what workers brought, also what came too late to count.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/attempts",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "By attempt", body = Vec<AttemptResult>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn attempts(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+) -> Result<Json<Vec<AttemptResult>>, Error> {
+    let mut reader = app.read().await?;
+    trials::get(&mut reader, id).await?;
+    Ok(Json(results::of_trial(&mut reader, id).await?))
+}
+
 async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Error> {
+    consents::may_leave(db, study).await?;
     let mut header = vec!["number", "trial_id"];
     header.extend(TunedBounds::NAMES);
     header.extend([

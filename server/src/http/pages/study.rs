@@ -138,7 +138,9 @@ pub(super) async fn post(
     let mut writer = app.write().await?;
     let done = command::act(&mut writer, &may.caller.actor, id, act, "").await?;
     commit(writer).await?;
-    done.cancelled.into_iter().for_each(|trial| app.director.cancel_solve(trial));
+    for trial in done.cancelled {
+        app.director.cancel_solve(trial).await;
+    }
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}")))
 }

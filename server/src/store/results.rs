@@ -1,0 +1,74 @@
+//! Results as workers brought them: each attempt once, those that came too late included.
+
+use super::{Connection, Instant, StoreResult, TrialId, json, now};
+use gait_optimizer::{SolveReport, SolveStatus};
+use serde::Serialize;
+use sqlx::Row;
+use utoipa::ToSchema;
+
+/// What a worker brought.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AttemptResult {
+    /// Number of the attempt, from 1.
+    pub attempt: u32,
+    /// Who ran it.
+    pub worker: String,
+    /// Whether it is the result of the trial; else it came too late and is evidence only.
+    pub taken: bool,
+    /// How the solve ended.
+    #[schema(value_type = String)]
+    pub status: SolveStatus,
+    /// All figures of the solve, where they are finite.
+    #[schema(value_type = Option<Object>)]
+    pub report: Option<SolveReport>,
+    /// When it came.
+    pub received_at: Instant,
+}
+
+/// Keeps what was brought. `false`: this attempt brought its result already.
+///
+/// # Errors
+/// What the database reports.
+pub async fn keep(
+    db: &mut Connection,
+    (trial, attempt): (TrialId, u32),
+    worker: &str,
+    report: &SolveReport,
+    taken: bool,
+) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into results (trial_id, attempt, worker, taken, status, report, received_at) \
+         values (?, ?, ?, ?, ?, ?, ?) on conflict do nothing",
+    )
+    .bind(trial)
+    .bind(attempt)
+    .bind(worker)
+    .bind(taken)
+    .bind(json::to_text("status", &report.status)?)
+    .bind(json::readable("report", report)?)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// What was brought for a trial, by attempt.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<AttemptResult>> {
+    let rows =
+        sqlx::query("select * from results where trial_id = ? order by attempt").bind(trial).fetch_all(db).await?;
+    rows.iter()
+        .map(|row| {
+            Ok(AttemptResult {
+                attempt: row.try_get("attempt")?,
+                worker: row.try_get("worker")?,
+                taken: row.try_get("taken")?,
+                status: json::column(row, "status")?,
+                report: json::optional_column(row, "report")?,
+                received_at: row.try_get("received_at")?,
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,287 @@
+//! The one connection that writes.
+//!
+//! Making a change durable means waiting for the disk, which takes far longer than the change itself. Changes that
+//! are ready while the disk is busy are therefore made durable together: each is a savepoint of its own within one
+//! transaction, and each is acknowledged only when that transaction is on the disk.
+
+use super::{StoreError, StoreResult};
+use sqlx::{Connection as _, SqliteConnection};
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::{Notify, OwnedMappedMutexGuard, OwnedMutexGuard, watch};
+use tokio::task::JoinHandle;
+
+/// The connection; `None`: closed. Whoever waits for it gets it in the order of asking.
+type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
+
+/// How the disk answered for a group of changes; `None`: not yet.
+type Outcome = Option<Result<(), String>>;
+
+/// The writing connection, and what makes its changes durable.
+#[derive(Debug)]
+pub(super) struct Writing {
+    line: Line,
+    shared: Arc<Shared>,
+    flusher: JoinHandle<()>,
+}
+
+/// A change: everything in it happens, or nothing. Dropped without [`super::commit`], it leaves no trace.
+#[derive(Debug)]
+pub struct Writer {
+    connection: OwnedMappedMutexGuard<Option<SqliteConnection>, SqliteConnection>,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    state: Mutex<State>,
+    /// A change ended: what is there is to be made durable.
+    ended: Notify,
+}
+
+/// Changes only while the connection is held.
+#[derive(Debug, Default)]
+struct State {
+    /// A transaction is open; whoever has a change in it waits for its outcome.
+    group: Option<watch::Sender<Outcome>>,
+    /// A change was begun and did not end yet.
+    begun: bool,
+}
+
+impl Writing {
+    /// Over a connection that nobody else writes with.
+    pub(super) fn new(connection: SqliteConnection) -> Self {
+        let line = Line::new(Some(connection).into());
+        let shared = Arc::<Shared>::default();
+        let flusher = tokio::spawn(keep_flushing(Arc::clone(&line), Arc::clone(&shared)));
+        Self { line, shared, flusher }
+    }
+
+    /// Begins a change when those before it have ended.
+    pub(super) async fn begin(&self) -> StoreResult<Writer> {
+        let (line, shared) = (Arc::clone(&self.line), Arc::clone(&self.shared));
+        // A task of its own: whoever asked may go away between two statements, which belong together.
+        tokio::spawn(begin(line, shared)).await.map_err(|_| StoreError::Closed)?
+    }
+
+    /// Makes durable what is there, and closes the connection.
+    pub(super) async fn close(&self) {
+        let mut line = self.line.lock().await;
+        if let Some(mut connection) = line.take() {
+            self.shared.flush(&mut connection).await;
+            if let Err(error) = connection.close().await {
+                tracing::warn!(%error, "closing the database");
+            }
+        }
+    }
+}
+
+impl Drop for Writing {
+    fn drop(&mut self) {
+        self.flusher.abort();
+    }
+}
+
+impl Writer {
+    /// Ends the change and waits until the disk has it.
+    pub(super) async fn commit(self) -> StoreResult<()> {
+        let ended = tokio::spawn(async move {
+            let mut writer = self;
+            run(&mut writer.connection, "release change").await?;
+            let mut state = writer.shared.state();
+            state.begun = false;
+            Ok::<_, StoreError>(state.group.as_ref().map(watch::Sender::subscribe))
+        });
+        let group = ended.await.map_err(|_| StoreError::Closed)??;
+        let mut group = group.ok_or(StoreError::Closed)?;
+        let outcome = group.wait_for(Option::is_some).await.map_err(|_| StoreError::Closed)?.clone();
+        outcome.unwrap_or(Ok(())).map_err(StoreError::NotDurable)
+    }
+}
+
+impl Drop for Writer {
+    fn drop(&mut self) {
+        self.shared.ended.notify_one();
+    }
+}
+
+impl Deref for Writer {
+    type Target = SqliteConnection;
+
+    fn deref(&self) -> &SqliteConnection {
+        &self.connection
+    }
+}
+
+impl DerefMut for Writer {
+    fn deref_mut(&mut self) -> &mut SqliteConnection {
+        &mut self.connection
+    }
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        // The state is whole between any two statements that hold the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes back a change that was begun and dropped.
+    async fn take_back(&self, connection: &mut SqliteConnection) {
+        if !self.state().begun {
+            return;
+        }
+        let taken_back = match run(connection, "rollback to change").await {
+            Ok(()) => run(connection, "release change").await,
+            error => error,
+        };
+        match taken_back {
+            Ok(()) => self.state().begun = false,
+            // The database gave up the whole transaction, as it does when the disk is full.
+            Err(error) => self.give_up(connection, &error).await,
+        }
+    }
+
+    /// Makes the open transaction durable and tells everybody who waits for it.
+    async fn flush(&self, connection: &mut SqliteConnection) {
+        self.take_back(connection).await;
+        if self.state().group.is_none() {
+            return;
+        }
+        match run(connection, "commit").await {
+            Ok(()) => self.tell(Ok(())),
+            Err(error) => self.give_up(connection, &error).await,
+        }
+    }
+
+    async fn give_up(&self, connection: &mut SqliteConnection, error: &StoreError) {
+        // Fails when the database did so already.
+        let _ = run(connection, "rollback").await;
+        self.tell(Err(error.to_string()));
+    }
+
+    fn tell(&self, outcome: Result<(), String>) {
+        let mut state = self.state();
+        state.begun = false;
+        if let Some(group) = state.group.take() {
+            group.send_replace(Some(outcome));
+        }
+    }
+}
+
+async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
+    let held = line.lock_owned().await;
+    let mut connection = OwnedMutexGuard::try_map(held, Option::as_mut).map_err(|_| StoreError::Closed)?;
+    shared.take_back(&mut connection).await;
+    if shared.state().group.is_none() {
+        run(&mut connection, "begin immediate").await?;
+        shared.state().group = Some(watch::channel(None).0);
+    }
+    if let Err(error) = run(&mut connection, "savepoint change").await {
+        shared.give_up(&mut connection, &error).await;
+        return Err(error);
+    }
+    shared.state().begun = true;
+    Ok(Writer { connection, shared })
+}
+
+/// Makes changes durable as they end: those that stand in line by then come first, and into the same transaction.
+async fn keep_flushing(line: Line, shared: Arc<Shared>) {
+    loop {
+        shared.ended.notified().await;
+        match line.lock().await.as_mut() {
+            Some(connection) => shared.flush(connection).await,
+            None => return,
+        }
+    }
+}
+
+async fn run(connection: &mut SqliteConnection, statement: &'static str) -> StoreResult<()> {
+    sqlx::query(statement).execute(connection).await?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sqlx::Row;
+    use sqlx::sqlite::SqliteConnectOptions;
+
+    async fn open(file: &std::path::Path) -> SqliteConnection {
+        let options = SqliteConnectOptions::new().filename(file).create_if_missing(true);
+        SqliteConnection::connect_with(&options.journal_mode(sqlx::sqlite::SqliteJournalMode::Wal)).await.unwrap()
+    }
+
+    async fn table(file: &std::path::Path) -> Writing {
+        let mut connection = open(file).await;
+        run(&mut connection, "create table t (x integer primary key) strict").await.unwrap();
+        Writing::new(connection)
+    }
+
+    async fn insert(writer: &mut Writer, x: i64) -> Result<(), sqlx::Error> {
+        sqlx::query("insert into t (x) values (?)").bind(x).execute(&mut **writer).await.map(drop)
+    }
+
+    /// What another connection sees: what is durable.
+    async fn rows(file: &std::path::Path) -> Vec<i64> {
+        let rows = sqlx::query("select x from t order by x").fetch_all(&mut open(file).await).await.unwrap();
+        rows.iter().map(|row| row.get(0)).collect()
+    }
+
+    #[tokio::test]
+    async fn a_change_is_there_for_others_when_it_is_acknowledged_and_a_dropped_one_never() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.db");
+        let writing = table(&file).await;
+        let mut kept = writing.begin().await.unwrap();
+        insert(&mut kept, 1).await.unwrap();
+        kept.commit().await.unwrap();
+        assert_eq!(rows(&file).await, [1]);
+        let mut dropped = writing.begin().await.unwrap();
+        insert(&mut dropped, 2).await.unwrap();
+        assert!(insert(&mut dropped, 1).await.is_err());
+        drop(dropped);
+        let mut after = writing.begin().await.unwrap();
+        insert(&mut after, 3).await.unwrap();
+        after.commit().await.unwrap();
+        assert_eq!(rows(&file).await, [1, 3]);
+        writing.close().await;
+        assert!(matches!(writing.begin().await, Err(StoreError::Closed)));
+    }
+
+    #[tokio::test]
+    async fn many_at_once_all_happen_and_those_that_fail_take_nothing_with_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.db");
+        let writing = Arc::new(table(&file).await);
+        let changes = (0..200_i64).map(|x| {
+            let writing = Arc::clone(&writing);
+            tokio::spawn(async move {
+                let mut writer = writing.begin().await.unwrap();
+                insert(&mut writer, x).await.unwrap();
+                if x % 3 == 0 { drop(writer) } else { writer.commit().await.unwrap() }
+            })
+        });
+        for change in changes.collect::<Vec<_>>() {
+            change.await.unwrap();
+        }
+        writing.close().await;
+        assert_eq!(rows(&file).await, (0..200).filter(|x| x % 3 != 0).collect::<Vec<_>>());
+    }
+
+    #[tokio::test]
+    async fn whoever_shares_a_transaction_that_the_database_gives_up_is_told_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.db");
+        let writing = table(&file).await;
+        let mut first = writing.begin().await.unwrap();
+        insert(&mut first, 1).await.unwrap();
+        // As when the disk is full: the whole transaction is gone.
+        run(&mut first, "rollback").await.unwrap();
+        assert!(first.commit().await.is_err());
+        let mut second = writing.begin().await.unwrap();
+        insert(&mut second, 2).await.unwrap();
+        second.commit().await.unwrap();
+        assert_eq!(rows(&file).await, [2]);
+        writing.close().await;
+    }
+}

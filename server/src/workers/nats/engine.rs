@@ -1,0 +1,180 @@
+//! The service's end: jobs out, signs of life and results in.
+
+use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
+use super::{AGAIN, BROKER_HEARTBEAT, EXPIRES, Link, unreachable};
+use crate::store::TrialId;
+use crate::workers::Assignment;
+use crate::workers::dispatch::{Dispatch, DispatchError, News, Receipt};
+use async_nats::jetstream::stream::LastRawMessageErrorKind;
+use async_nats::jetstream::{self, AckKind};
+use futures_util::StreamExt;
+use futures_util::future::BoxFuture;
+use std::fmt;
+use std::time::Duration;
+use tokio::sync::Mutex;
+use tokio::sync::mpsc::{self, Receiver, Sender};
+use tokio_util::sync::{CancellationToken, DropGuard};
+
+/// News that wait for the service; more wait in the broker.
+const WAITING: usize = 256;
+
+/// Jobs are run by whoever asks a NATS broker for them.
+pub struct JetStream {
+    link: Link,
+    size: usize,
+    heard: Mutex<Receiver<News>>,
+    _ends: DropGuard,
+}
+
+impl JetStream {
+    /// Connects to a broker. At most `size` jobs are out at the same time.
+    ///
+    /// # Errors
+    /// [`DispatchError::Unreachable`] when it does not answer or has no JetStream.
+    pub async fn connect(url: &str, queue: &str, size: usize, lease: Duration) -> Result<Self, DispatchError> {
+        let link = Link::open(url, queue, lease).await?;
+        // Says at start, and not at the first job, that the broker is not what is needed.
+        link.jobs().await?;
+        link.results().await?;
+        let (news, heard) = mpsc::channel(WAITING);
+        let ends = CancellationToken::new();
+        for task in [0, 1] {
+            let (link, news, ends) = (link.clone(), news.clone(), ends.clone());
+            tokio::spawn(ends.run_until_cancelled_owned(async move {
+                loop {
+                    let ended = if task == 0 { signs(&link, &news).await } else { results(&link, &news).await };
+                    if let Err(error) = ended {
+                        tracing::warn!(%error, "listening to workers; trying again");
+                    }
+                    tokio::time::sleep(AGAIN).await;
+                }
+            }));
+        }
+        Ok(Self { link, size: size.max(1), heard: Mutex::new(heard), _ends: ends.drop_guard() })
+    }
+
+    async fn publish(&self, assignment: Assignment) -> Result<(), DispatchError> {
+        let subject = self.link.job_subject(assignment.attempt);
+        let order = Order { program: PROGRAM.to_owned(), assignment };
+        let bytes = tokio::task::spawn_blocking(move || pack(&order)).await.map_err(unreachable)??;
+        self.link.fits("a job", &bytes)?;
+        let jobs = self.link.jobs().await?;
+        match jobs.get_last_raw_message_by_subject(&subject).await {
+            // It waits already, or a worker has it.
+            Ok(_) => return Ok(()),
+            Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => {}
+            Err(error) => return Err(unreachable(error)),
+        }
+        let acknowledged = self.link.context.publish(subject, bytes.into()).await.map_err(unreachable)?;
+        acknowledged.await.map(drop).map_err(unreachable)
+    }
+
+    async fn recall(&self, trial: TrialId) -> Result<(), DispatchError> {
+        let client = self.link.context.client();
+        client.publish(self.link.cancel_subject(), trial.to_string().into()).await.map_err(unreachable)?;
+        self.link.jobs().await?.purge().filter(self.link.jobs_of(trial)).await.map(drop).map_err(unreachable)
+    }
+}
+
+impl Dispatch for JetStream {
+    fn name(&self) -> &'static str {
+        "nats"
+    }
+
+    fn size(&self) -> usize {
+        self.size
+    }
+
+    fn lease(&self) -> Duration {
+        self.link.lease
+    }
+
+    fn outlives_process(&self) -> bool {
+        true
+    }
+
+    fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
+        Box::pin(self.publish(assignment))
+    }
+
+    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        Box::pin(async move {
+            if let Err(error) = self.recall(trial).await {
+                // Its result will come late, and not count.
+                tracing::warn!(%trial, %error, "a job cannot be taken back from the broker");
+            }
+        })
+    }
+
+    fn next(&self) -> BoxFuture<'_, News> {
+        Box::pin(async move {
+            match self.heard.lock().await.recv().await {
+                Some(news) => news,
+                // The listening tasks live as long as this engine.
+                None => std::future::pending().await,
+            }
+        })
+    }
+}
+
+impl fmt::Debug for JetStream {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("JetStream").field("link", &self.link).field("size", &self.size).finish_non_exhaustive()
+    }
+}
+
+/// The service went away.
+fn gone<T>(_: T) -> DispatchError {
+    DispatchError::Unreachable("nobody listens".to_owned())
+}
+
+/// Tells signs of life until the subscription ends.
+async fn signs(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
+    let mut signs = link.context.client().subscribe(link.sign_subject()).await.map_err(unreachable)?;
+    while let Some(message) = signs.next().await {
+        match unpack::<Sign>(&message.payload) {
+            Ok(Sign { attempt, worker, records }) if records.is_empty() => {
+                news.send(News::Started { attempt, worker }).await.map_err(gone)?;
+            }
+            Ok(Sign { attempt, records, .. }) => {
+                for record in records {
+                    news.send(News::Iterated { attempt, record }).await.map_err(gone)?;
+                }
+            }
+            Err(error) => tracing::warn!(%error, "a sign of life cannot be read"),
+        }
+    }
+    Ok(())
+}
+
+/// Brings results until the broker refuses.
+async fn results(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
+    let recorder = link.recorder().await?;
+    let messages = recorder.stream().max_messages_per_batch(16).expires(EXPIRES).heartbeat(BROKER_HEARTBEAT);
+    let mut messages = messages.messages().await.map_err(unreachable)?;
+    while let Some(message) = messages.next().await {
+        let message = message.map_err(unreachable)?;
+        bring(message, news).await?;
+    }
+    Ok(())
+}
+
+async fn bring(message: jetstream::Message, news: &Sender<News>) -> Result<(), DispatchError> {
+    let (message, acker) = message.split();
+    let read = tokio::task::spawn_blocking(move || unpack::<Brought>(&message.payload)).await.map_err(unreachable)?;
+    let brought = match read {
+        Ok(brought) => brought,
+        Err(error) => {
+            tracing::error!(%error, "a result cannot be read; it is left out");
+            return acker.ack_with(AckKind::Term).await.map_err(unreachable);
+        }
+    };
+    let receipt = Receipt::new(async move {
+        if let Err(error) = acker.double_ack().await {
+            // It comes again, and is known then.
+            tracing::warn!(%error, "a receipt did not reach the broker");
+        }
+    });
+    let Brought { attempt, worker, finding } = brought;
+    news.send(News::Ended { attempt, worker, finding, receipt }).await.map_err(gone)
+}

@@ -1,0 +1,74 @@
+//! A NATS broker as a process, with a folder of its own.
+
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// A running broker; killed when dropped.
+pub struct Broker {
+    folder: TempDir,
+    port: u16,
+    process: Child,
+}
+
+impl Broker {
+    /// Starts one. `None`, with the reason on stderr: there is no nats-server on this machine and none is required.
+    pub fn start() -> Option<Self> {
+        if Command::new("nats-server").arg("--version").output().is_err() {
+            assert!(std::env::var_os("GAITWRIGHT_REQUIRE_NATS").is_none(), "nats-server is required and not there");
+            eprintln!("skipped: there is no nats-server on this machine");
+            return None;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let process = run(&folder, port);
+        Some(Self { folder, port, process })
+    }
+
+    /// Its address.
+    pub fn url(&self) -> String {
+        format!("nats://127.0.0.1:{}", self.port)
+    }
+
+    /// Kills it and starts it again with what it kept.
+    pub fn restart(&mut self) {
+        self.kill();
+        self.process = run(&self.folder, self.port);
+    }
+
+    /// Kills it and starts it again with nothing.
+    pub fn wipe(&mut self) {
+        self.kill();
+        self.folder = tempfile::tempdir().unwrap();
+        self.process = run(&self.folder, self.port);
+    }
+
+    fn kill(&mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+}
+
+impl Drop for Broker {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+fn run(folder: &TempDir, port: u16) -> Child {
+    let process = Command::new("nats-server")
+        .args(["-js", "-a", "127.0.0.1", "-p", &port.to_string(), "-sd"])
+        .arg(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    for _ in 0..500 {
+        if TcpStream::connect(("127.0.0.1", port)).is_ok() {
+            return process;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("nats-server does not listen");
+}

@@ -1,0 +1,354 @@
+//! The contract of an engine, held by threads of this process and by workers behind a broker: whatever happens to a
+//! worker, a result or the engine itself, nothing is lost and nothing counts twice.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use futures_util::future::BoxFuture;
+use gaitwright::store::feedback::Said;
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, TrialId, results};
+use gaitwright::workers::nats::JetStream;
+use gaitwright::workers::{Assignment, Dispatch, DispatchError, InProcess, News, Receipt};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::broker::Broker;
+use gaitwright_tests::service::Service;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::process::{Child, Command};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tempfile::TempDir;
+
+const LEASE: Duration = Duration::from_secs(3);
+/// Twelve of them make a solve.
+const ITERATION: Duration = Duration::from_millis(15);
+const QUEUE: &str = "contract";
+const TRIALS: u32 = 4;
+
+/// What happens to the first solve of a worker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Worker {
+    Steady,
+    /// Ends in the middle: a thread panics, a process is killed by the test.
+    Dies,
+    Hangs,
+}
+
+/// Where jobs run.
+struct Rig {
+    /// `None`: threads of this process.
+    broker: Option<Broker>,
+    workers: Vec<Child>,
+    folder: TempDir,
+}
+
+impl Rig {
+    fn threads() -> Option<Self> {
+        Some(Self { broker: None, workers: Vec::new(), folder: tempfile::tempdir().unwrap() })
+    }
+
+    fn nats() -> Option<Self> {
+        Some(Self { broker: Some(Broker::start()?), workers: Vec::new(), folder: tempfile::tempdir().unwrap() })
+    }
+
+    fn database(&self) -> PathBuf {
+        self.folder.path().join("a.db")
+    }
+
+    async fn engine(&mut self, worker: Worker) -> Arc<dyn Dispatch> {
+        let Some(broker) = &self.broker else {
+            let panics_once = if worker == Worker::Dies { vec![1] } else { Vec::new() };
+            let solver = Analytic { panics_once, hangs_once: worker == Worker::Hangs, ..Analytic::slow(ITERATION) };
+            return Arc::new(InProcess::new(1, Arc::new(solver)).with_lease(LEASE));
+        };
+        let url = broker.url();
+        self.add_worker(worker);
+        for _ in 0..100 {
+            match JetStream::connect(&url, QUEUE, 1, LEASE).await {
+                Ok(engine) => return Arc::new(engine),
+                Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
+            }
+        }
+        panic!("no JetStream at {url}");
+    }
+
+    fn add_worker(&mut self, worker: Worker) {
+        let url = self.broker.as_ref().unwrap().url();
+        let process = Command::new(env!("CARGO_BIN_EXE_worker-analytic"))
+            .args([&url, QUEUE, &LEASE.as_millis().to_string(), &ITERATION.as_millis().to_string()])
+            .arg((worker == Worker::Hangs).to_string())
+            .spawn()
+            .unwrap();
+        self.workers.push(process);
+    }
+
+    /// Kills what runs the present job; another worker is there. A thread does that by itself.
+    fn kill_worker(&mut self) {
+        if self.broker.is_some() {
+            let mut victim = self.workers.remove(0);
+            victim.kill().unwrap();
+            victim.wait().unwrap();
+            self.add_worker(Worker::Steady);
+        }
+    }
+}
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        for worker in &mut self.workers {
+            worker.kill().unwrap();
+            worker.wait().unwrap();
+        }
+    }
+}
+
+async fn started(service: &Service) -> StudyId {
+    service.study(|new| (new.seed, new.trial_budget) = (3, TRIALS)).await
+}
+
+async fn wait_for_a_solve(service: &Service, study: StudyId) {
+    for _ in 0..2000 {
+        if service.trials(study).await.iter().any(|trial| trial.state == TrialState::Running) {
+            return tokio::time::sleep(3 * ITERATION).await;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("no solve was begun");
+}
+
+/// What must not depend on what happened on the way.
+async fn essence(service: &Service, study: StudyId) -> Vec<String> {
+    let trials = service.trials(study).await;
+    let line = |t: &gaitwright::store::trials::Trial| {
+        format!("{} {} {:?} {:?}", t.number, t.action_index, t.state, t.gait_rmse_rad.map(f64::to_bits))
+    };
+    trials.iter().map(line).collect()
+}
+
+async fn undisturbed() -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = started(&service).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let expected = essence(&service, study).await;
+    service.stop().await;
+    expected
+}
+
+/// The study ends with the trials of an undisturbed run, each with one label and one result that counts.
+async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
+    service.wait_for(study, &[StudyState::Finished]).await;
+    assert_eq!(essence(service, study).await, undisturbed().await);
+    let feedback = service.feedback(study).await;
+    for trial in service.trials(study).await {
+        let labels = feedback.iter().filter(|row| matches!(row.said, Said::Label { trial: of, .. } if of == trial.id));
+        assert_eq!(labels.count(), 1, "labels of trial {}", trial.number);
+        let brought = results::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
+        assert_eq!(brought.iter().filter(|result| result.taken).count(), 1, "{brought:?}");
+    }
+}
+
+async fn an_undisturbed_study(mut rig: Rig) {
+    let service = Service::start_with(&rig.database(), rig.engine(Worker::Steady).await).await;
+    let study = started(&service).await;
+    nothing_is_lost_or_doubled(&service, study).await;
+    service.stop().await;
+}
+
+async fn a_worker_that_is_killed(mut rig: Rig) {
+    let service = Service::start_with(&rig.database(), rig.engine(Worker::Dies).await).await;
+    let study = started(&service).await;
+    wait_for_a_solve(&service, study).await;
+    rig.kill_worker();
+    nothing_is_lost_or_doubled(&service, study).await;
+    service.stop().await;
+}
+
+async fn a_worker_that_hangs(mut rig: Rig) {
+    let service = Service::start_with(&rig.database(), rig.engine(Worker::Hangs).await).await;
+    let study = started(&service).await;
+    nothing_is_lost_or_doubled(&service, study).await;
+    service.stop().await;
+}
+
+async fn a_result_that_is_brought_twice(mut rig: Rig) {
+    let engine = Changed {
+        engine: rig.engine(Worker::Steady).await,
+        change: Change::Twice,
+        held: Mutex::default(),
+        once: AtomicBool::new(true),
+    };
+    let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
+    let study = started(&service).await;
+    nothing_is_lost_or_doubled(&service, study).await;
+    service.stop().await;
+}
+
+async fn a_result_that_comes_late(mut rig: Rig) {
+    let engine = Changed {
+        engine: rig.engine(Worker::Steady).await,
+        change: Change::Late,
+        held: Mutex::default(),
+        once: AtomicBool::new(true),
+    };
+    let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
+    let study = started(&service).await;
+    nothing_is_lost_or_doubled(&service, study).await;
+    let first = service.trials(study).await[0].id;
+    let brought = service.fetch(&format!("/api/v1/trials/{first}/attempts")).await.json();
+    let brought: Vec<_> = brought.as_array().unwrap().iter().map(|r| (&r["attempt"], &r["taken"])).collect();
+    assert_eq!(brought.len(), 2, "{brought:?}");
+    assert!(brought[0] == (&1.into(), &false.into()) && brought[1] == (&2.into(), &true.into()), "{brought:?}");
+    service.stop().await;
+}
+
+async fn a_job_that_is_cancelled(mut rig: Rig) {
+    let service = Service::start_with(&rig.database(), rig.engine(Worker::Steady).await).await;
+    let study = started(&service).await;
+    wait_for_a_solve(&service, study).await;
+    let running = service.trials(study).await[0].id;
+    let cancelled = service.post(&format!("/api/v1/trials/{running}/cancel"), &serde_json::json!({})).await;
+    assert_eq!(cancelled.json()["state"], "cancelled");
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let feedback = service.feedback(study).await;
+    assert!(!feedback.iter().any(|row| matches!(row.said, Said::Label { trial, .. } if trial == running)));
+    let brought = results::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
+    assert!(brought.iter().all(|result| !result.taken), "{brought:?}");
+    service.stop().await;
+}
+
+async fn an_engine_that_is_restarted(rig: Rig) {
+    disturbed(rig, Broker::restart).await;
+}
+
+async fn an_engine_that_is_wiped(rig: Rig) {
+    disturbed(rig, Broker::wipe).await;
+}
+
+/// The broker goes away and comes back; of threads, the process does.
+async fn disturbed(mut rig: Rig, disturb: impl Fn(&mut Broker)) {
+    let mut service = Service::start_with(&rig.database(), rig.engine(Worker::Steady).await).await;
+    let study = started(&service).await;
+    for ended in [0, 2] {
+        service.wait_for_trials(study, ended).await;
+        wait_for_a_solve(&service, study).await;
+        if let Some(broker) = &mut rig.broker {
+            disturb(broker);
+        } else {
+            service.stop().await;
+            service = Service::start_with(&rig.database(), rig.engine(Worker::Steady).await).await;
+        }
+    }
+    nothing_is_lost_or_doubled(&service, study).await;
+    service.stop().await;
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Change {
+    /// Every result is brought a second time.
+    Twice,
+    /// The first result comes when another attempt is under way.
+    Late,
+}
+
+/// An engine whose results are brought in another way.
+struct Changed {
+    engine: Arc<dyn Dispatch>,
+    change: Change,
+    held: Mutex<VecDeque<News>>,
+    /// Nothing was held back yet.
+    once: AtomicBool,
+}
+
+impl Changed {
+    async fn changed(&self) -> News {
+        loop {
+            if matches!(self.change, Change::Twice)
+                && let Some(news) = self.held.lock().unwrap().pop_front()
+            {
+                return news;
+            }
+            let news = self.engine.next().await;
+            match (self.change, &news) {
+                (Change::Twice, News::Ended { attempt, worker, finding, .. }) => {
+                    let (worker, finding, receipt) = (worker.clone(), finding.clone(), Receipt::not_needed());
+                    let again = News::Ended { attempt: *attempt, worker, finding, receipt };
+                    self.held.lock().unwrap().push_back(again);
+                }
+                (Change::Late, News::Ended { attempt, .. })
+                    if attempt.number == 1 && self.once.swap(false, Ordering::SeqCst) =>
+                {
+                    self.held.lock().unwrap().push_back(news);
+                    continue;
+                }
+                (Change::Late, News::Iterated { attempt, .. }) if attempt.number == 2 => {
+                    let late = self.held.lock().unwrap().pop_front();
+                    // The iteration that is left out for it is missed by nobody.
+                    return late.unwrap_or(news);
+                }
+                _ => {}
+            }
+            return news;
+        }
+    }
+}
+
+impl Dispatch for Changed {
+    fn name(&self) -> &'static str {
+        self.engine.name()
+    }
+
+    fn size(&self) -> usize {
+        self.engine.size()
+    }
+
+    fn lease(&self) -> Duration {
+        self.engine.lease()
+    }
+
+    fn outlives_process(&self) -> bool {
+        self.engine.outlives_process()
+    }
+
+    fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
+        self.engine.submit(assignment)
+    }
+
+    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        self.engine.withdraw(trial)
+    }
+
+    fn next(&self) -> BoxFuture<'_, News> {
+        Box::pin(self.changed())
+    }
+}
+
+macro_rules! contract {
+    ($($clause:ident),* $(,)?) => {
+        contract!(@on threads, $($clause),*);
+        contract!(@on nats, $($clause),*);
+    };
+    (@on $rig:ident, $($clause:ident),*) => {
+        mod $rig {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $clause() {
+                if let Some(rig) = super::Rig::$rig() {
+                    super::$clause(rig).await;
+                }
+            })*
+        }
+    };
+}
+
+contract!(
+    an_undisturbed_study,
+    a_worker_that_is_killed,
+    a_worker_that_hangs,
+    a_result_that_is_brought_twice,
+    a_result_that_comes_late,
+    a_job_that_is_cancelled,
+    an_engine_that_is_restarted,
+    an_engine_that_is_wiped,
+);
