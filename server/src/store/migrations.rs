@@ -31,10 +31,19 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     Ok(())
 }
 
-/// Refuses a file that a newer version of the program wrote; otherwise its version.
+/// Refuses a file of another program and one that a newer version of this one wrote; otherwise its version.
 pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult<i64> {
     let known = FILES[FILES.len() - 1].0;
     let found = version(pool).await?;
+    if found == 0
+        && let Some(table) = sqlx::query("select name from sqlite_master where name not glob '_sqlx*' limit 1")
+            .fetch_optional(pool)
+            .await?
+    {
+        let table: String = table.try_get(0)?;
+        let reason = format!("it is another program's, with a table {table:?}");
+        return Err(StoreError::NotADatabase { path: path.to_owned(), reason });
+    }
     if found > known {
         return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });
     }
