@@ -69,8 +69,10 @@ impl Evaluate for Analytic {
                 step: 1.0,
                 guess: 0,
             });
-            while self.hangs_once && begun == 0 {
-                std::thread::park();
+            if self.hangs_once && begun == 0 {
+                loop {
+                    std::thread::park();
+                }
             }
             std::thread::sleep(self.pause);
         }

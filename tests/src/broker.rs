@@ -57,7 +57,7 @@ impl Drop for Broker {
 }
 
 fn run(folder: &TempDir, port: u16) -> Child {
-    let process = Command::new("nats-server")
+    let mut process = Command::new("nats-server")
         .args(["-js", "-a", "127.0.0.1", "-p", &port.to_string(), "-sd"])
         .arg(folder.path())
         .stdout(Stdio::null())
@@ -70,5 +70,7 @@ fn run(folder: &TempDir, port: u16) -> Child {
         }
         std::thread::sleep(Duration::from_millis(20));
     }
+    process.kill().unwrap();
+    process.wait().unwrap();
     panic!("nats-server does not listen");
 }

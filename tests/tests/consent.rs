@@ -57,7 +57,6 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 60})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
-        (format!("/api/v1/studies/{human}/blind/next"), json!({})),
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
         (
             format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),
@@ -67,6 +66,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         let refused = service.post(&path, &body).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}: {}", refused.text);
     }
+    let blind = service.post(&format!("/api/v1/studies/{human}/blind/next"), &json!({})).await;
+    assert!(blind.json()["pair"].is_null(), "{}", blind.text);
     let form = format!("a={}&b={}&answer=b&source=subject&author=K&key={}", trials[0].id, trials[1].id, trials[0].id);
     let kind = "application/x-www-form-urlencoded";
     let refused = service.post_text(&format!("/studies/{finished}/compare"), kind, &form).await;

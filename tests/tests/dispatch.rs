@@ -45,6 +45,7 @@ struct Rig {
 }
 
 impl Rig {
+    #[allow(clippy::unnecessary_wraps, reason = "the other rig may be missing")]
     fn threads() -> Option<Self> {
         Some(Self { broker: None, workers: Vec::new(), folder: tempfile::tempdir().unwrap() })
     }

@@ -218,8 +218,11 @@ async fn cursors_and_identifiers() {
         any::<u64>().prop_map(|number| number.to_string()),
         "[a-f0-9-]{36}",
         "[!-~]{0,30}",
-        prop::collection::vec(any::<u8>(), 0..12)
-            .prop_map(|bytes| bytes.iter().map(|byte| format!("%{byte:02x}")).collect::<String>()),
+        prop::collection::vec(any::<u8>(), 0..12).prop_map(|bytes| bytes
+            .iter()
+            .map(|byte| format!("%{byte:02x}"))
+            .collect::<Vec<_>>()
+            .concat()),
     ];
     for text in drawn(&text) {
         for path in &paths {

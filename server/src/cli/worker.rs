@@ -43,7 +43,7 @@ impl Worker {
                 stop.cancel();
             }
         });
-        let worked = worker.run(stop).await;
+        let worked = Box::pin(worker.run(stop)).await;
         asked.abort();
         Ok(worked?)
     }

@@ -3,27 +3,28 @@
 //! One task plans and hands jobs to the engine, another hears what comes of them. What they decide depends on the
 //! record alone, so the process may end at any instant.
 
-use super::choice;
-use super::comparison;
 use super::lifecycle::{self, Act};
+use super::next_step::{Step, likely_next, next_step};
 use super::record;
+use super::rehearsal::{PREPARED, Prepared, Rehearsals};
 use super::standing::Standing;
 use crate::error::Error;
+use crate::store::feedback::LogVersion;
 use crate::store::jobs::Lease;
-use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
+use crate::store::studies::{Study, StudyPlan, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
 use crate::store::{
     Store, StoreError, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies,
     subjects, trials,
 };
 use crate::workers::{Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
-use gait_optimizer::{GaitProblem, SolveStatus};
+use gait_optimizer::{GaitProblem, SolveStatus, TunedBounds};
 use serde_json::json;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tokio::sync::{Notify, watch};
+use tokio::sync::{Mutex, Notify, watch};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
@@ -33,8 +34,6 @@ const HEARTBEATS_PER_LEASE: u32 = 3;
 const IDLE: Duration = Duration::from_secs(5);
 /// Changes within this time lead to one plan.
 const TOGETHER: Duration = Duration::from_millis(10);
-/// So many trials in a row without a result pause a study: something is wrong with the set-up.
-const FAILURES_IN_A_ROW: usize = 3;
 
 /// Runs the studies of a record.
 #[derive(Debug, Clone)]
@@ -45,6 +44,10 @@ struct Inner {
     engine: Arc<dyn Dispatch>,
     /// How far the running solves are.
     board: Arc<Board>,
+    /// Solves that are run before anybody asked for them.
+    rehearsals: Rehearsals,
+    /// What could still be rehearsed of a study that waits for an answer, by what it has heard.
+    likely: Mutex<HashMap<StudyId, (LogVersion, Vec<NewTrial>)>>,
     /// With `Some`, the only study that is looked at.
     only: Option<StudyId>,
     /// Something changed: plan again.
@@ -71,6 +74,8 @@ impl Director {
             store,
             engine,
             board: Arc::default(),
+            rehearsals: Rehearsals::default(),
+            likely: Mutex::default(),
             only,
             wake: Notify::new(),
             pulse: watch::channel(0).0,
@@ -112,7 +117,7 @@ impl Director {
 
     /// Asks the solve of a trial to stop within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
-        self.0.engine.withdraw(trial).await;
+        self.0.engine.withdraw(self.0.rehearsals.name_of(trial)).await;
         self.0.board.close(trial);
     }
 
@@ -135,6 +140,7 @@ impl Director {
         }
         self.0.tasks.close();
         self.0.tasks.wait().await;
+        self.withdraw(self.0.rehearsals.forget_running()).await;
         self.take_back_leases().await
     }
 
@@ -157,7 +163,7 @@ impl Director {
         let left = jobs::leased(&mut reader, engine).await?;
         drop(reader);
         for lease in left {
-            self.0.engine.withdraw(lease.trial).await;
+            self.cancel_solve(lease.trial).await;
             record::interrupted(&self.0.store, &lease).await?;
         }
         Ok(())
@@ -171,6 +177,9 @@ impl Director {
         for lease in expired {
             self.look_after(&lease).await?;
         }
+        let waiting = |id: StudyId| active.iter().any(|study| study.id == id);
+        self.0.likely.lock().await.retain(|study, _| waiting(*study));
+        self.withdraw(self.0.rehearsals.forget(waiting)).await;
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
             if let Err(error) = self.plan(study.clone()).await {
                 tracing::error!(study = %study.id, %error, "cannot plan a study");
@@ -205,6 +214,7 @@ impl Director {
             .await
             .map_err(|e| Error::Internal(e.to_string()))?;
             match step? {
+                Step::Nothing if standing.study.state == StudyState::Waiting => return self.rehearse(standing).await,
                 Step::Nothing => return Ok(()),
                 Step::Act(act, reason) => match self.act(&standing.study, act, &reason).await? {
                     Some(changed) => study = changed,
@@ -278,6 +288,19 @@ impl Director {
                 return Ok(());
             }
         };
+        let attempt = assignment.attempt;
+        match self.0.rehearsals.claim(&assignment) {
+            Prepared::Nothing => {}
+            Prepared::Running => return self.started(attempt, PREPARED).await,
+            Prepared::Done(finding) => {
+                self.started(attempt, PREPARED).await?;
+                return self.ended(attempt, PREPARED, finding).await;
+            }
+        }
+        if self.busy().await? > self.0.engine.size() {
+            self.0.likely.lock().await.clear();
+            self.withdraw(self.0.rehearsals.forget_running()).await;
+        }
         if let Err(error) = self.0.engine.submit(assignment).await {
             // The lease runs out, and the job is handed over again.
             tracing::error!(trial = %lease.trial, %error, "a job was not taken");
@@ -285,11 +308,59 @@ impl Director {
         Ok(())
     }
 
+    /// How many solves are out, also those that nobody asked for.
+    async fn busy(&self) -> Result<usize, Error> {
+        let (_, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        Ok(leased as usize + self.0.rehearsals.running())
+    }
+
+    /// Runs what a study will need next, whatever the answer that it waits for, where no worker is needed for others.
+    async fn rehearse(&self, standing: Standing) -> Result<(), Error> {
+        let (study, version) = (standing.study.id, standing.version);
+        let plan = standing.study.plan.clone();
+        let mut all = self.0.likely.lock().await;
+        if all.get(&study).is_none_or(|(known, _)| *known != version) {
+            self.withdraw(self.0.rehearsals.forget(|other| other != study)).await;
+            let likely = tokio::task::spawn_blocking(move || likely_next(&standing));
+            all.insert(study, (version, likely.await.map_err(|e| Error::Internal(e.to_string()))??));
+        }
+        let Some((_, likely)) = all.get_mut(&study) else { return Ok(()) };
+        while self.busy().await? < self.0.engine.size()
+            && let Some(new) = likely.pop()
+        {
+            // No trial has this name: what comes of it is kept here until one asks.
+            let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
+            let start = new.warm_started_from;
+            let assignment = assignment_of(&self.0.store, &plan, (attempt, new.number), new.action, start).await?;
+            if self.0.rehearsals.begin(study, &assignment)
+                && let Err(error) = self.0.engine.submit(assignment).await
+            {
+                tracing::warn!(%error, "a solve cannot be prepared");
+                self.0.rehearsals.forget_running();
+            }
+        }
+        Ok(())
+    }
+
+    async fn withdraw(&self, names: Vec<TrialId>) {
+        for name in names {
+            self.0.engine.withdraw(name).await;
+        }
+    }
+
     /// Hears what comes of the jobs.
     async fn keep_listening(&self) {
         let mut written: HashMap<TrialId, Instant> = HashMap::new();
         loop {
-            let heard = match self.0.engine.next().await {
+            let news = match self.0.rehearsals.hear(self.0.engine.next().await) {
+                Ok(news) => news,
+                Err(receipt) => {
+                    receipt.sign().await;
+                    self.0.wake.notify_one();
+                    continue;
+                }
+            };
+            let heard = match news {
                 News::Started { attempt, worker } => {
                     written.insert(attempt.trial, Instant::now());
                     self.started(attempt, &worker).await
@@ -329,7 +400,7 @@ impl Director {
         let lease = jobs::lease_of(&mut writer, attempt.trial, attempt.number).await?;
         if !jobs::heartbeat(&mut writer, &lease, now().after(self.0.engine.lease())).await? {
             drop(writer);
-            self.0.engine.withdraw(attempt.trial).await;
+            self.cancel_solve(attempt.trial).await;
             return Ok(());
         }
         trials::start(&mut writer, lease.trial).await?;
@@ -345,7 +416,7 @@ impl Director {
     async fn heartbeat(&self, attempt: Attempt) -> Result<(), Error> {
         let lease = jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await?;
         if !self.live_on(&lease).await? {
-            self.0.engine.withdraw(attempt.trial).await;
+            self.cancel_solve(attempt.trial).await;
         }
         Ok(())
     }
@@ -388,82 +459,33 @@ impl Director {
     }
 }
 
-/// What a study needs next.
-enum Step {
-    Nothing,
-    Act(Act, String),
-    Try(NewTrial),
-}
-
-/// Decides it, from the standing alone.
-fn next_step(standing: &Standing) -> Result<Step, Error> {
-    let study = &standing.study;
-    if study.plan.feedback_mode == FeedbackMode::Human {
-        let open = comparison::open_question(standing).map_err(Error::Learner)?.is_some();
-        match (study.state, open) {
-            (StudyState::Running, true) => return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into())),
-            (StudyState::Waiting, false) => return Ok(Step::Act(Act::Answered, String::new())),
-            _ => {}
-        }
-    }
-    if study.state != StudyState::Running {
-        return Ok(Step::Nothing);
-    }
-    let ended_in_a_row = standing.trials.iter().rev().filter(|trial| !trial.state.is_open());
-    let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
-    if failed == FAILURES_IN_A_ROW {
-        let message = standing.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
-        let reason = format!("{failed} trials in a row failed; the last: {}", message.unwrap_or_default());
-        return Ok(Step::Act(Act::Pause, reason));
-    }
-    let open = standing.open();
-    let tried = u32::try_from(standing.trials.len()).unwrap_or(u32::MAX);
-    if tried >= study.plan.trial_budget {
-        let finished = Step::Act(Act::Finish, format!("all {} trials are done", study.plan.trial_budget));
-        return Ok(if open == 0 { finished } else { Step::Nothing });
-    }
-    if let Some(reason) = standing.is_enough() {
-        return Ok(if open == 0 { Step::Act(Act::Finish, reason) } else { Step::Nothing });
-    }
-    if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
-        return Ok(Step::Nothing);
-    }
-    match choice::next_trial(standing) {
-        Ok(new) => Ok(Step::Try(new)),
-        Err(e) if e.is_exhausted() && open == 0 => {
-            Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
-        }
-        Err(e) if e.is_exhausted() => Ok(Step::Nothing),
-        Err(choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
-        Err(choice::ChoiceError::Bounds(e)) => Err(e.into()),
-    }
-}
-
-/// Collects what a solve needs.
+/// The solve of a leased job.
 async fn assignment(store: &Store, lease: &Lease) -> Result<Assignment, Error> {
     let mut reader = store.read().await?;
     let trial = trials::get(&mut reader, lease.trial).await?;
     let plan = studies::get(&mut reader, lease.study).await?.plan;
+    drop(reader);
+    let attempt = Attempt { trial: lease.trial, number: lease.attempt };
+    assignment_of(store, &plan, (attempt, trial.number), trial.action, trial.warm_started_from).await
+}
+
+/// Collects what a solve needs: of a trial with this number, or of one that may come.
+async fn assignment_of(
+    store: &Store,
+    plan: &StudyPlan,
+    (attempt, number): (Attempt, u32),
+    bounds: TunedBounds,
+    start: Option<TrialId>,
+) -> Result<Assignment, Error> {
+    let mut reader = store.read().await?;
     let subject = subjects::get(&mut reader, plan.subject_id).await?.body();
     let device = devices::get(&mut reader, plan.device_id).await?.definition;
     let reference = reference_gaits::get(&mut reader, plan.reference_gait_id).await?.definition;
-    let warm_start = match trial.warm_started_from {
+    let warm_start = match start {
         Some(from) => Some(gaits::warm_start(&mut reader, from).await?),
         None => None,
     };
-    let problem = GaitProblem {
-        subject,
-        device,
-        bounds: trial.action,
-        muscles: plan.muscles,
-        settings: plan.gait_settings,
-        reference,
-    };
-    Ok(Assignment {
-        attempt: Attempt { trial: lease.trial, number: lease.attempt },
-        number: trial.number,
-        problem,
-        warm_start,
-        options: plan.solve_options,
-    })
+    let (muscles, settings) = (plan.muscles, plan.gait_settings);
+    let problem = GaitProblem { subject, device, bounds, muscles, settings, reference };
+    Ok(Assignment { attempt, number, problem, warm_start, options: plan.solve_options })
 }

@@ -2,7 +2,7 @@
 //!
 //! `worker-analytic URL QUEUE LEASE_MILLISECONDS MILLISECONDS_PER_ITERATION HANGS_ONCE`
 
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright::workers::nats::Worker;
 use gaitwright_tests::analytic::Analytic;
@@ -18,5 +18,5 @@ async fn main() {
     let solver = Analytic { hangs_once: hangs == "true", ..Analytic::slow(milliseconds(pause)) };
     let name = format!("worker {}", std::process::id());
     let worker = Worker::connect(url, queue, name, 1, milliseconds(lease), Arc::new(solver)).await.unwrap();
-    worker.run(CancellationToken::new()).await.unwrap();
+    Box::pin(worker.run(CancellationToken::new())).await.unwrap();
 }

@@ -1,0 +1,95 @@
+//! What a study needs next, as a pure function of where it stands.
+
+use super::choice;
+use super::comparison;
+use super::lifecycle::Act;
+use super::standing::Standing;
+use crate::error::Error;
+use crate::store::feedback::{FeedbackRow, Said, Source};
+use crate::store::studies::{Evaluation, FeedbackMode, StudyState};
+use crate::store::trials::{NewTrial, TrialState};
+use crate::store::{FeedbackId, now};
+
+/// So many trials in a row without a result pause a study: something is wrong with the set-up.
+const FAILURES_IN_A_ROW: usize = 3;
+
+/// What a study needs next.
+pub(super) enum Step {
+    Nothing,
+    Act(Act, String),
+    Try(NewTrial),
+}
+
+/// Decides it, from the standing alone.
+pub(super) fn next_step(standing: &Standing) -> Result<Step, Error> {
+    let study = &standing.study;
+    if study.plan.feedback_mode == FeedbackMode::Human {
+        let open = comparison::open_question(standing).map_err(Error::Learner)?.is_some();
+        match (study.state, open) {
+            (StudyState::Running, true) => return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into())),
+            (StudyState::Waiting, false) => return Ok(Step::Act(Act::Answered, String::new())),
+            _ => {}
+        }
+    }
+    if study.state != StudyState::Running {
+        return Ok(Step::Nothing);
+    }
+    let ended_in_a_row = standing.trials.iter().rev().filter(|trial| !trial.state.is_open());
+    let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
+    if failed == FAILURES_IN_A_ROW {
+        let message = standing.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
+        let reason = format!("{failed} trials in a row failed; the last: {}", message.unwrap_or_default());
+        return Ok(Step::Act(Act::Pause, reason));
+    }
+    let open = standing.open();
+    let tried = u32::try_from(standing.trials.len()).unwrap_or(u32::MAX);
+    if tried >= study.plan.trial_budget {
+        let finished = Step::Act(Act::Finish, format!("all {} trials are done", study.plan.trial_budget));
+        return Ok(if open == 0 { finished } else { Step::Nothing });
+    }
+    if let Some(reason) = standing.is_enough() {
+        return Ok(if open == 0 { Step::Act(Act::Finish, reason) } else { Step::Nothing });
+    }
+    if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
+        return Ok(Step::Nothing);
+    }
+    match choice::next_trial(standing) {
+        Ok(new) => Ok(Step::Try(new)),
+        Err(e) if e.is_exhausted() && open == 0 => {
+            Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
+        }
+        Err(e) if e.is_exhausted() => Ok(Step::Nothing),
+        Err(choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
+        Err(choice::ChoiceError::Bounds(e)) => Err(e.into()),
+    }
+}
+
+/// The trials that would be proposed next, one for each answer to the question that waits for one.
+pub(super) fn likely_next(standing: &Standing) -> Result<Vec<NewTrial>, Error> {
+    let Some((a, b)) = comparison::open_question(standing).map_err(Error::Learner)? else { return Ok(Vec::new()) };
+    let mut likely: Vec<NewTrial> = Vec::new();
+    for said in [Said::Preference { winner: a, loser: b }, Said::Preference { winner: b, loser: a }, Said::Tie { a, b }]
+    {
+        let mut then = standing.clone();
+        then.study.state = StudyState::Running;
+        then.feedback.push(FeedbackRow {
+            seq: standing.feedback.last().map_or(1, |row| row.seq + 1),
+            id: FeedbackId::fresh(),
+            study_id: standing.study.id,
+            said,
+            source: Source::Subject,
+            author: String::new(),
+            note: String::new(),
+            created_at: now(),
+            retraction: None,
+        });
+        if let Step::Try(new) = next_step(&then)?
+            && !likely
+                .iter()
+                .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))
+        {
+            likely.push(new);
+        }
+    }
+    Ok(likely)
+}

@@ -1,0 +1,56 @@
+//! While a person decides, what the study will need next is solved already; the trials are the same as without.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright::store::results;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::studies::comparison::open_question;
+use gaitwright::studies::standing::Standing;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use serde_json::json;
+use std::time::Duration;
+
+/// The trials of a study whose person takes so long for each answer, and who solved them.
+async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(4)), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (7, FeedbackMode::Human)).await;
+    loop {
+        let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
+        if present.state == StudyState::Finished {
+            break;
+        }
+        tokio::time::sleep(thinks).await;
+        let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
+        let Some((a, b)) = open_question(&standing).unwrap() else { continue };
+        let rmse = |id| standing.trial(id).unwrap().gait_rmse_rad.unwrap();
+        let answer = json!({"trial_a": a, "trial_b": b, "answer": if rmse(a) < rmse(b) { "a" } else { "b" }});
+        let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
+        assert!(given.status.is_success(), "{}", given.text);
+    }
+    let trials = service.trials(study).await;
+    let (mut essence, mut workers) = (Vec::new(), Vec::new());
+    for t in &trials {
+        let from = t.warm_started_from.map(|from| trials.iter().find(|other| other.id == from).unwrap().number);
+        let rmse = t.gait_rmse_rad.map(f64::to_bits);
+        essence.push(format!("{} {} {:?} {rmse:?} {from:?} {}", t.number, t.action_index, t.state, t.reason));
+        let brought = results::of_trial(&mut service.store.read().await.unwrap(), t.id).await.unwrap();
+        assert_eq!(brought.len(), 1, "{brought:?}");
+        assert!(brought[0].taken);
+        workers.push(brought[0].worker.clone());
+    }
+    service.stop().await;
+    (essence, workers)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_thinks_long_gets_the_same_trials_and_does_not_wait_for_them() {
+    let (at_once, _) = tuned(Duration::ZERO).await;
+    let (thoughtful, workers) = tuned(Duration::from_millis(1500)).await;
+    assert_eq!(at_once.len(), 7);
+    assert_eq!(thoughtful, at_once);
+    assert!(workers.iter().any(|worker| worker == "prepared"), "{workers:?}");
+    // Somewhere in the middle of a solve, which goes on for the trial that asks for it.
+    assert_eq!(tuned(Duration::from_millis(60)).await.0, at_once);
+}
