@@ -94,7 +94,7 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
         let (_, gait) = golden_gait(subject, muscles);
         let text = motion_file(&gait, 2000.0).unwrap();
         let recording = Recording::from_opensim("gait.mot", &text, None, None).unwrap();
-        // The file has eight decimals.
+        // The file has eight decimals; linear between rows, 90 rad/s² leave h^2/8 qdd = 3e-6 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
         let strikes = HeelStrikes::Given(vec![0.0, end]);
         let reference = recording.reference("gait", &strikes, Walker::default()).unwrap();
@@ -105,7 +105,7 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
                 for i in 0..5 {
                     worst = worst.max((found[i] - q[2 + i]).abs());
                 }
-                assert!(worst < 2e-6, "domain {name} at {time}: {worst}");
+                assert!(worst < 3e-6, "domain {name} at {time}: {worst}");
             }
         }
         let middle = gait.coordinates_at(0.5 * gait.stride_time_s);
@@ -182,7 +182,7 @@ fn malformed_files_get_line_column_and_reason() {
         ("no unit", changed("inDegrees=yes\n", ""), "line 5: the header has no inDegrees=yes or no"),
         ("odd unit", changed("inDegrees=yes", "inDegrees=grad"), "line 5: inDegrees=grad: expected yes or no"),
         ("wrong unit", changed("inDegrees=yes", "inDegrees=no"), "is the unit right?"),
-        ("cut in half", half, "line 124"),
+        ("cut in half", half, "line 117: 4 cells, but 10 columns"),
         ("rows missing", changed(&format!("{}\n", row(50)), ""), "line 3: nRows=221, but there are 220"),
         ("columns disagree", changed("nColumns=10", "nColumns=9"), "line 4: nColumns=9, but there are 10"),
         ("rows not a number", changed("nRows=221", "nRows=many"), "line 3: nRows=many"),

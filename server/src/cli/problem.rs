@@ -22,6 +22,9 @@ pub(super) struct ProblemFlags {
     /// Device file (JSON); default: the built-in AMPRO3.
     #[arg(long, value_name = "FILE")]
     device: Option<PathBuf>,
+    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
     /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
     #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh, allow_hyphen_values = true)]
     mesh: Option<Mesh>,
@@ -49,7 +52,11 @@ impl ProblemFlags {
         let settings = GaitSettings { mesh: self.mesh.unwrap_or_default(), ..GaitSettings::default() };
         settings.validate()?;
         let (subject, muscles) = (self.body.subject()?, self.muscles.is_on());
-        Ok(GaitProblem { subject, device, bounds, muscles, settings, reference: ReferenceGait::builtin()? })
+        let reference = match &self.reference {
+            Some(path) => ReferenceGait::from_json(&path.display().to_string(), &read(path)?)?,
+            None => ReferenceGait::builtin()?,
+        };
+        Ok(GaitProblem { subject, device, bounds, muscles, settings, reference })
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {

@@ -5,8 +5,10 @@ use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal};
 use crate::error::Error;
 use clap::Args;
-use gait_optimizer::{SolveOutcome, SolveStatus, TunedBounds, solve};
+use gait_optimizer::certificate::{Certificate, certify};
+use gait_optimizer::{SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve};
 use indicatif::ProgressBar;
+use serde::Serialize;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -28,6 +30,18 @@ pub(super) struct Solve {
     /// Print the figures as one JSON object.
     #[arg(long)]
     json: bool,
+    /// Examine a converged gait as `certify` does; with --json the certificate is its member `certificate`.
+    #[arg(long)]
+    certify: bool,
+}
+
+/// The figures of a solve, with the certificate where it was asked for.
+#[derive(Serialize)]
+struct Figures<'a> {
+    #[serde(flatten)]
+    report: &'a SolveReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certificate: Option<&'a Certificate>,
 }
 
 impl Solve {
@@ -51,11 +65,23 @@ impl Solve {
         .await
         .map_err(|e| Error::Internal(e.to_string()))??;
         bar.finish_and_clear();
+        let converged = outcome.report.status == SolveStatus::Converged;
+        let certificate = if self.certify && converged {
+            let gait = outcome.gait.clone();
+            let examined = tokio::task::spawn_blocking(move || certify(&gait)).await;
+            Some(examined.map_err(|e| Error::Internal(e.to_string()))??)
+        } else {
+            None
+        };
         // The figures first: whatever becomes of the file, they are not lost.
         if self.json {
-            data(&serde_json::to_string_pretty(&outcome.report).map_err(|e| Error::Internal(e.to_string()))?)?;
+            let figures = Figures { report: &outcome.report, certificate: certificate.as_ref() };
+            data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
             data(&for_people(&outcome))?;
+            if let Some(certificate) = &certificate {
+                data(&super::certify::for_people(certificate))?;
+            }
         }
         match out {
             Some(out) => out.write(&serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?),

@@ -7,12 +7,13 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 5] = [
+const FILES: [(i64, &str, &str); 6] = [
     (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
     (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
     (4, "scripts", include_str!("../../../migrations/0004_scripts.sql")),
     (5, "blind", include_str!("../../../migrations/0005_blind.sql")),
+    (6, "certificates", include_str!("../../../migrations/0006_certificates.sql")),
 ];
 
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {

@@ -12,6 +12,7 @@ pub mod choice;
 pub mod command;
 pub mod comparison;
 pub mod director;
+pub mod examination;
 pub mod history;
 pub mod lifecycle;
 pub mod person;
