@@ -13,7 +13,7 @@ const FILES: [(i64, &str, &str); 6] = [
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
     (4, "scripts", include_str!("../../../migrations/0004_scripts.sql")),
     (5, "blind", include_str!("../../../migrations/0005_blind.sql")),
-    (6, "certificates", include_str!("../../../migrations/0006_certificates.sql")),
+    (8, "certificates", include_str!("../../../migrations/0008_certificates.sql")),
 ];
 
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
