@@ -24,9 +24,9 @@ fn opensim(strides: usize) -> String {
         let (hip_r, knee_r, ankle_r) = leg(phase);
         let (hip_l, knee_l, ankle_l) = leg(phase + 0.5 * TAU);
         let force = if (phase / TAU).fract() < 0.6 { 700.0 } else { 0.0 };
-        text.push_str(&format!(
+        text.extend([format!(
             "{time:.4}\t-3.0\t{hip_r:.6}\t{knee_r:.6}\t{ankle_r:.6}\t{hip_l:.6}\t{knee_l:.6}\t{ankle_l:.6}\t-4.0\t{force:.1}\n"
-        ));
+        )]);
     }
     text
 }
@@ -129,8 +129,8 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
     let mut own = "# one adult\ntime_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad\n".to_owned();
     for k in 0..40 {
         let time = f64::from(k) / 200.0;
-        camargo.push_str(&format!("{time},-30,-10,20,5,3,4,-2,-6\n"));
-        own.push_str(&format!("{time},0.1,0.2,0.3,0.4,0.5\n"));
+        camargo.extend([format!("{time},-30,-10,20,5,3,4,-2,-6\n")]);
+        own.extend([format!("{time},0.1,0.2,0.3,0.4,0.5\n")]);
     }
     let recording = Recording::from_camargo_csv("AB06.csv", &camargo).unwrap();
     let wanted = [8.0, 26.0, 30.0, 3.0, 11.0_f64].map(f64::to_radians);
