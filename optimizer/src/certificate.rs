@@ -28,6 +28,7 @@ mod torques;
 mod virtual_constraints;
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod simulation_tests;
 
 pub use check::Check;

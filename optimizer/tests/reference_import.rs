@@ -24,9 +24,9 @@ fn opensim(strides: usize) -> String {
         let (hip_r, knee_r, ankle_r) = leg(phase);
         let (hip_l, knee_l, ankle_l) = leg(phase + 0.5 * TAU);
         let force = if (phase / TAU).fract() < 0.6 { 700.0 } else { 0.0 };
-        text.push_str(&format!(
+        text.extend([format!(
             "{time:.4}\t-3.0\t{hip_r:.6}\t{knee_r:.6}\t{ankle_r:.6}\t{hip_l:.6}\t{knee_l:.6}\t{ankle_l:.6}\t-4.0\t{force:.1}\n"
-        ));
+        )]);
     }
     text
 }
@@ -94,7 +94,7 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
         let (_, gait) = golden_gait(subject, muscles);
         let text = motion_file(&gait, 2000.0).unwrap();
         let recording = Recording::from_opensim("gait.mot", &text, None, None).unwrap();
-        // The file has eight decimals.
+        // The file has eight decimals; linear between rows, 90 rad/s² leave h^2/8 qdd = 3e-6 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
         let strikes = HeelStrikes::Given(vec![0.0, end]);
         let reference = recording.reference("gait", &strikes, Walker::default()).unwrap();
@@ -105,7 +105,7 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
                 for i in 0..5 {
                     worst = worst.max((found[i] - q[2 + i]).abs());
                 }
-                assert!(worst < 2e-6, "domain {name} at {time}: {worst}");
+                assert!(worst < 3e-6, "domain {name} at {time}: {worst}");
             }
         }
         let middle = gait.coordinates_at(0.5 * gait.stride_time_s);
@@ -129,8 +129,8 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
     let mut own = "# one adult\ntime_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad\n".to_owned();
     for k in 0..40 {
         let time = f64::from(k) / 200.0;
-        camargo.push_str(&format!("{time},-30,-10,20,5,3,4,-2,-6\n"));
-        own.push_str(&format!("{time},0.1,0.2,0.3,0.4,0.5\n"));
+        camargo.extend([format!("{time},-30,-10,20,5,3,4,-2,-6\n")]);
+        own.extend([format!("{time},0.1,0.2,0.3,0.4,0.5\n")]);
     }
     let recording = Recording::from_camargo_csv("AB06.csv", &camargo).unwrap();
     let wanted = [8.0, 26.0, 30.0, 3.0, 11.0_f64].map(f64::to_radians);
@@ -182,7 +182,7 @@ fn malformed_files_get_line_column_and_reason() {
         ("no unit", changed("inDegrees=yes\n", ""), "line 5: the header has no inDegrees=yes or no"),
         ("odd unit", changed("inDegrees=yes", "inDegrees=grad"), "line 5: inDegrees=grad: expected yes or no"),
         ("wrong unit", changed("inDegrees=yes", "inDegrees=no"), "is the unit right?"),
-        ("cut in half", half, "line 124"),
+        ("cut in half", half, "line 117: 4 cells, but 10 columns"),
         ("rows missing", changed(&format!("{}\n", row(50)), ""), "line 3: nRows=221, but there are 220"),
         ("columns disagree", changed("nColumns=10", "nColumns=9"), "line 4: nColumns=9, but there are 10"),
         ("rows not a number", changed("nRows=221", "nRows=many"), "line 3: nRows=many"),

@@ -219,7 +219,7 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     let nobody = format!("a={a}&b={b}&answer=b&source=clinician&author=+&note=both+limp&key={UNKNOWN}");
     let refused = service.post_text(&path, FORM, &nobody).await;
-    is_page(&refused, unprocessable, "1 to 80 characters");
+    is_page(&refused, unprocessable, "1 to 80 printable characters");
     for kept in ["value=\"b\" checked", "value=\"clinician\" selected", "both limp</textarea>"] {
         assert!(refused.text.contains(kept), "{kept}");
     }

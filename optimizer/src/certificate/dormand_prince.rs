@@ -170,6 +170,7 @@ impl<'a, const N: usize, S: System<N>> Integrator<'a, N, S> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -178,7 +178,7 @@ impl<'a> HybridWalker<'a> {
                 if value <= 0.0 {
                     let from = share - 1.0 / GUARD_LOOKS as f64;
                     let guess = from + (share - from) * last / (last - value);
-                    let event = self.refine(control, system, &step, guess * step.length)?;
+                    let event = refine(control, system, &step, guess * step.length)?;
                     watch(d, elapsed + event.length, &walker_part(&event.end));
                     return Ok((elapsed + event.length, event.end));
                 }
@@ -189,31 +189,30 @@ impl<'a> HybridWalker<'a> {
         }
         Err(Fall::GuardMissed { domain: name, elapsed_s: elapsed, planned_s: planned })
     }
+}
 
-    /// A step from the same start that ends on the guard, by Newton's method on its length.
-    fn refine<const N: usize, S: System<N>>(
-        &self,
-        control: &Control<'_>,
-        system: &S,
-        step: &Step<N>,
-        guess: f64,
-    ) -> Result<Step<N>, Fall> {
-        let name = control.domain.name();
-        let failed = |e: StepError| not_integrable(name, &e.to_string());
-        let singular = || failed(StepError::Singular);
-        let mut length = guess.clamp(0.0, step.length);
-        for _ in 0..EVENT_REFINEMENTS {
-            let x = walker_part(&step.retake(system, length).map_err(failed)?.end);
-            let value = control.guard.value(control, &x).ok_or_else(singular)?;
-            let gradient = control.guard.gradient(control, &x).ok_or_else(singular)?;
-            let rate = gradient.dot(&control.derivative(&x).ok_or_else(singular)?);
-            if rate >= 0.0 {
-                return Err(not_integrable(name, "the event that ends it is only grazed"));
-            }
-            length = (length - value / rate).clamp(0.0, step.length);
+/// A step from the same start that ends on the guard, by Newton's method on its length.
+fn refine<const N: usize, S: System<N>>(
+    control: &Control<'_>,
+    system: &S,
+    step: &Step<N>,
+    guess: f64,
+) -> Result<Step<N>, Fall> {
+    let name = control.domain.name();
+    let failed = |e: StepError| not_integrable(name, &e.to_string());
+    let singular = || failed(StepError::Singular);
+    let mut length = guess.clamp(0.0, step.length);
+    for _ in 0..EVENT_REFINEMENTS {
+        let x = walker_part(&step.retake(system, length).map_err(failed)?.end);
+        let value = control.guard.value(control, &x).ok_or_else(singular)?;
+        let gradient = control.guard.gradient(control, &x).ok_or_else(singular)?;
+        let rate = gradient.dot(&control.derivative(&x).ok_or_else(singular)?);
+        if rate >= 0.0 {
+            return Err(not_integrable(name, "the event that ends it is only grazed"));
         }
-        step.retake(system, length).map_err(failed)
+        length = (length - value / rate).clamp(0.0, step.length);
     }
+    step.retake(system, length).map_err(failed)
 }
 
 fn not_integrable(domain: &'static str, reason: &str) -> Fall {

@@ -64,6 +64,7 @@ pub(super) fn reset_by_state(model: &WalkerModel, opens: Domain, x: &State) -> O
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::walking::{CYCLE, kinetic_energy};

@@ -31,7 +31,7 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
         return Err(format!("is named {:?}", trajectory.name));
     }
     let points = trajectory.q.len();
-    if points < 3 || points % 2 == 0 {
+    if points < 3 || points.is_multiple_of(2) {
         return Err(format!("{points} points, expected an odd number from 3"));
     }
     let contacts = domain.contact_rows();

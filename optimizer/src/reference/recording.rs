@@ -131,16 +131,13 @@ impl Recording {
     ) -> Result<Self, ModelError> {
         let angle = |name: &str| table.column(name).map(|c| c.into_iter().map(|v| v * scale).collect::<Vec<f64>>());
         let pelvis = angle("pelvis_tilt")?;
-        let lumbar = match table.find("lumbar_extension") {
-            Some(column) => {
-                steps.push("trunk lean = -(pelvis_tilt + lumbar_extension)".to_owned());
-                steps.push("hips from the trunk = hip_flexion - lumbar_extension".to_owned());
-                column.into_iter().map(|v| v * scale).collect()
-            }
-            None => {
-                steps.push("no lumbar_extension: the pelvis stands for the trunk, hips as recorded".to_owned());
-                vec![0.0; table.len()]
-            }
+        let lumbar = if let Some(column) = table.find("lumbar_extension") {
+            steps.push("trunk lean = -(pelvis_tilt + lumbar_extension)".to_owned());
+            steps.push("hips from the trunk = hip_flexion - lumbar_extension".to_owned());
+            column.into_iter().map(|v| v * scale).collect()
+        } else {
+            steps.push("no lumbar_extension: the pelvis stands for the trunk, hips as recorded".to_owned());
+            vec![0.0; table.len()]
         };
         steps.push("knee flexion = -knee_angle".to_owned());
         let rows = 0..table.len();

@@ -1,18 +1,24 @@
 //! The command line. Data goes to stdout, progress and logs to stderr.
 
 mod body;
+mod certify;
 mod config;
+mod convert;
+mod gait_file;
 mod logging;
 mod numbers;
 mod out_file;
 mod output;
 mod problem;
 mod record;
+mod reference;
+mod reproduce;
 mod serve;
 mod solve;
 pub mod study;
 mod sweep;
 mod tune;
+mod unattended;
 mod worker;
 
 use crate::error::Error;
@@ -55,10 +61,18 @@ enum Command {
     Worker(worker::Worker),
     /// Tune a gait unattended: propose, optimise, compare by Gait RMSE, repeat.
     Tune(tune::Tune),
+    /// Repeat the paper's comparison: gaits tuned with and without muscles, with a report.
+    Reproduce(reproduce::Reproduce),
     /// Optimise one gait.
     Solve(solve::Solve),
     /// Optimise one gait for each row of a table of actions.
     Sweep(sweep::Sweep),
+    /// Examine a gait independently of its optimisation: residuals, closed loop, stability.
+    Certify(certify::Certify),
+    /// Write a gait for OpenSim or for the device.
+    Convert(convert::Convert),
+    /// Make a reference gait from a recording.
+    Reference(reference::Reference),
     /// Check the audit trail.
     Audit(record::Audit),
     /// Show the settings of the service.
@@ -98,8 +112,12 @@ pub fn run() -> ExitCode {
         Command::Serve(serve) => runtime.block_on(serve.run(&settings)).map(|()| Ended::Done),
         Command::Worker(worker) => runtime.block_on(worker.run()).map(|()| Ended::Done),
         Command::Tune(tune) => runtime.block_on(tune.run()),
+        Command::Reproduce(reproduce) => runtime.block_on(reproduce.run()),
         Command::Solve(solve) => runtime.block_on(solve.run()),
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
+        Command::Certify(certify) => runtime.block_on(certify.run()).map(|()| Ended::Done),
+        Command::Reference(reference) => reference.run().map(|()| Ended::Done),
+        Command::Convert(convert) => convert.run().map(|()| Ended::Done),
         Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
         Command::Config(config) => config.run().map(|()| Ended::Done),
         Command::Openapi => openapi::text().map_err(|e| Error::Internal(e.to_string())).map(|text| {

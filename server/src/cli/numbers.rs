@@ -27,7 +27,7 @@ pub(super) fn subject(text: &str) -> Result<u32, String> {
     text.parse().map_err(|_| "known: 1, 2".to_owned())
 }
 
-fn whole<T: FromStr + PartialOrd + Display + Copy>(text: &str, least: T, most: T) -> Result<T, String> {
+pub(super) fn whole<T: FromStr + PartialOrd + Display + Copy>(text: &str, least: T, most: T) -> Result<T, String> {
     match text.trim().parse::<T>() {
         Ok(value) if value >= least && value <= most => Ok(value),
         _ => Err(format!("allowed is a whole number from {least} to {most}")),

@@ -27,6 +27,9 @@ pub(super) struct ProblemFlags {
     /// {"regularisation": {"activation_bend": 0}, "limits": {"speed_min_m_s": 1.1}}.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
     /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
     #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh, allow_hyphen_values = true)]
     mesh: Option<Mesh>,
@@ -59,12 +62,20 @@ impl ProblemFlags {
         settings.mesh = self.mesh.unwrap_or(settings.mesh);
         settings.validate()?;
         let (subject, muscles) = (self.body.subject()?, self.muscles.is_on());
-        Ok(GaitProblem { subject, device, bounds, muscles, settings, reference: ReferenceGait::builtin()? })
+        let reference = match &self.reference {
+            Some(path) => ReferenceGait::from_json(&path.display().to_string(), &read(path)?)?,
+            None => ReferenceGait::builtin()?,
+        };
+        Ok(GaitProblem { subject, device, bounds, muscles, settings, reference })
     }
 
     /// The files that are read.
     pub(super) fn inputs(&self) -> Vec<&Path> {
-        [&self.device, &self.settings, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
+        [&self.device, &self.settings, &self.reference, &self.warm]
+            .into_iter()
+            .flatten()
+            .map(PathBuf::as_path)
+            .collect()
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {

@@ -6,6 +6,7 @@ use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal};
 use crate::error::Error;
 use clap::Args;
+use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, BoundAtLimit, Explanation, Relaxation};
 use gait_optimizer::{SolveError, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve};
 use indicatif::ProgressBar;
@@ -34,13 +35,18 @@ pub(super) struct Solve {
     /// Where no gait is found: say why, and which bound, relaxed alone, gives one. Solves up to eight times per bound.
     #[arg(long)]
     explain: bool,
+    /// Examine a converged gait as `certify` does; with --json the certificate is its member `certificate`.
+    #[arg(long)]
+    certify: bool,
 }
 
-/// The figures, and why there is no gait where that was asked.
+/// The figures; where it was asked for, the certificate of the gait, or why there is none.
 #[derive(Debug, Serialize)]
-struct Answer<'a> {
+struct Figures<'a> {
     #[serde(flatten)]
     report: &'a SolveReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certificate: Option<&'a Certificate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     explanation: Option<&'a Explanation>,
 }
@@ -74,12 +80,27 @@ impl Solve {
         .await
         .map_err(|e| Error::Internal(e.to_string()))??;
         bar.finish_and_clear();
+        let converged = outcome.report.status == SolveStatus::Converged;
+        let certificate = if self.certify && converged {
+            let gait = outcome.gait.clone();
+            let examined = tokio::task::spawn_blocking(move || certify(&gait)).await;
+            Some(examined.map_err(|e| Error::Internal(e.to_string()))??)
+        } else {
+            None
+        };
         // The figures first: whatever becomes of the file, they are not lost.
         if self.json {
-            let answer = Answer { report: &outcome.report, explanation: explanation.as_ref() };
-            data(&serde_json::to_string_pretty(&answer).map_err(|e| Error::Internal(e.to_string()))?)?;
+            let figures = Figures {
+                report: &outcome.report,
+                certificate: certificate.as_ref(),
+                explanation: explanation.as_ref(),
+            };
+            data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
             data(&for_people(&outcome, explanation.as_ref()))?;
+            if let Some(certificate) = &certificate {
+                data(&super::certify::for_people(certificate))?;
+            }
         }
         if outcome.report.status == SolveStatus::Cancelled {
             return Ok(Ended::Interrupted);

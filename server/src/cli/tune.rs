@@ -4,24 +4,15 @@ use super::Ended;
 use super::body::{Body, Switch};
 use super::numbers::{seed, trials, workers};
 use super::output::{data, tell};
-use super::serve::{cores_or, interrupted};
+use super::serve::cores_or;
+use super::unattended::{self, Lines, Run, action_line};
 use crate::error::Error;
-use crate::store::audit::Actor;
-use crate::store::studies::{Study, StudyState};
-use crate::store::trials::Trial;
-use crate::store::{Store, commit, studies, trials as trial_rows};
+use crate::store::{Store, commit};
 use crate::studies::catalogue;
-use crate::studies::director::Director;
-use crate::studies::plan::{self, NewStudy};
-use crate::studies::standing::Standing;
+use crate::studies::plan::NewStudy;
 use crate::studies::summary::{self, Summary};
-use crate::workers::{GaitSolver, InProcess};
 use clap::Args;
-use gait_optimizer::TunedBounds;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::fmt::Write;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 #[derive(Debug, Args)]
 pub(super) struct Tune {
@@ -52,43 +43,10 @@ impl Tune {
         let subject = self.body.subject()?;
         let workers = cores_or(self.workers);
         let store = Store::open(&self.database).await?;
-        let study = self.study(&store, subject, workers).await?;
-
-        let engine = InProcess::new(workers, Arc::new(GaitSolver));
-        let director = Director::new(store.clone(), Arc::new(engine), Some(study.id));
-        let work = tokio::spawn({
-            let director = director.clone();
-            async move { director.run().await }
-        });
-        let ended = tokio::select! {
-            ended = follow(&director, &study, self.json) => Some(ended),
-            () = interrupted() => None,
-        };
-        director.stop();
-        work.await.map_err(|e| Error::Internal(e.to_string()))??;
-        let mut reader = store.read().await?;
-        let study = studies::get(&mut reader, study.id).await?;
-        let standing = Standing::read(&mut reader, study).await?;
-        drop(reader);
-        store.close().await;
-        let interrupted = ended.is_none();
-        if let Some(ended) = ended {
-            ended?;
-        }
-        self.print(&summary::of(&standing).map_err(Error::Learner)?)?;
-        if interrupted {
-            let done = standing.trials.len() - standing.open();
-            tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
-            return Ok(Ended::Interrupted);
-        }
-        Ok(Ended::Done)
-    }
-
-    /// The unfinished study of the same kind in the database, or a new one.
-    async fn study(&self, store: &Store, body: gait_optimizer::Subject, workers: usize) -> Result<Study, Error> {
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
-        let subject = catalogue::subject_with(&mut writer, body).await?;
+        let subject = catalogue::subject_with(&mut writer, subject).await?;
+        commit(writer).await?;
         let new = NewStudy {
             muscles: self.muscles.is_on(),
             trial_budget: self.trials,
@@ -96,19 +54,18 @@ impl Tune {
             seed: self.seed,
             ..NewStudy::of(subject.id)
         };
-        let wanted = plan::checked(&mut writer, new.clone()).await?;
-        let unfinished =
-            studies::active(&mut writer).await?.into_iter().find(|study| study.plan.tries_the_same_as(&wanted));
-        let study = if let Some(study) = unfinished {
-            let done = trial_rows::counts(&mut writer, study.id).await?;
-            let ended = done.total - done.open;
-            tell(&format!("going on with study {}: {ended} of {} trials", study.id, self.trials));
-            study
-        } else {
-            plan::create(&mut writer, &Actor::terminal(), new).await?
-        };
-        commit(writer).await?;
-        Ok(study)
+        let study = unattended::study(&store, new).await?;
+        let lines = if self.json { Lines::Progress } else { Lines::Data };
+        let ran = unattended::run(&store, &study, workers, lines).await;
+        store.close().await;
+        let Run { standing, interrupted } = ran?;
+        self.print(&summary::of(&standing).map_err(Error::Learner)?)?;
+        if interrupted {
+            let done = standing.trials.len() - standing.open();
+            tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
+            return Ok(Ended::Interrupted);
+        }
+        Ok(Ended::Done)
     }
 
     fn print(&self, summary: &Summary) -> Result<(), Error> {
@@ -130,96 +87,4 @@ impl Tune {
         tell(&format!("look at it: gaitwright serve --database {}", self.database.display()));
         Ok(())
     }
-}
-
-/// Shows progress until the study ends.
-async fn follow(director: &Director, study: &Study, json: bool) -> Result<(), Error> {
-    let bar = ProgressBar::new(u64::from(study.plan.trial_budget));
-    let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
-    if let Ok(style) = ProgressStyle::with_template(style) {
-        bar.set_style(style.progress_chars("=> "));
-    }
-    let mut pulse = director.pulse();
-    let mut progress = director.board().listen();
-    let mut shown = std::collections::HashSet::new();
-    loop {
-        let mut reader = director.store().read().await?;
-        let present = studies::get(&mut reader, study.id).await?;
-        let rows = trial_rows::of_study(&mut reader, study.id).await?;
-        drop(reader);
-        for trial in rows.iter().filter(|trial| !trial.state.is_open()) {
-            if shown.insert(trial.id) {
-                let line = trial_line(trial, &rows);
-                bar.suspend(|| {
-                    if json {
-                        tell(&line);
-                        return Ok(());
-                    }
-                    data(&line)
-                })?;
-            }
-        }
-        bar.set_position(shown.len() as u64);
-        match present.state {
-            StudyState::Running => {}
-            StudyState::Finished => {
-                bar.finish_and_clear();
-                return Ok(());
-            }
-            // Nobody answers or starts anything here.
-            StudyState::Draft | StudyState::Waiting | StudyState::Paused | StudyState::Stopped => {
-                bar.finish_and_clear();
-                return Err(Error::conflict(format!(
-                    "the study is {}: {}",
-                    present.state.as_str(),
-                    present.state_reason
-                )));
-            }
-        }
-        loop {
-            tokio::select! {
-                changed = pulse.changed() => {
-                    changed.map_err(|e| Error::Internal(e.to_string()))?;
-                    break;
-                }
-                iteration = progress.recv() => if let Ok(p) = iteration {
-                    bar.set_message(format!(
-                        "trial {}: iteration {}, objective {:.4}, violation {:.1e}",
-                        p.number, p.record.iteration, p.record.objective, p.record.constraint_violation
-                    ));
-                },
-            }
-        }
-    }
-}
-
-fn trial_line(trial: &Trial, all: &[Trial]) -> String {
-    let mut line = format!("{:>4}  {:<13}", trial.number, trial.state.as_str());
-    // Writing to a String cannot fail.
-    let _ = describe(&mut line, trial, all);
-    line
-}
-
-fn describe(line: &mut String, trial: &Trial, all: &[Trial]) -> std::fmt::Result {
-    if let (Some(rmse), Some(cost)) = (trial.gait_rmse_rad, trial.cost_of_transport) {
-        write!(line, "  RMSE {rmse:.4} rad  cost {cost:.4}")?;
-    }
-    if let (Some(iterations), Some(seconds)) = (trial.iterations, trial.seconds_total) {
-        write!(line, "  {iterations:>4} iterations {seconds:>6.1} s")?;
-    }
-    match summary::number_of(trial.warm_started_from, all) {
-        Some(from) => write!(line, "  from {from:<4}")?,
-        None => line.push_str("  cold     "),
-    }
-    write!(line, "  {}", action_line(&trial.action))?;
-    if !trial.message.is_empty() {
-        write!(line, "\n      {}", trial.message)?;
-    }
-    Ok(())
-}
-
-fn action_line(action: &TunedBounds) -> String {
-    let parts: Vec<String> =
-        TunedBounds::NAMES.iter().zip(action.to_array()).map(|(name, value)| format!("{name}={value}")).collect();
-    parts.join(" ")
 }

@@ -7,6 +7,7 @@
 pub mod archive;
 pub mod audit;
 pub mod backup;
+pub mod certificates;
 pub mod consents;
 pub mod devices;
 mod error;

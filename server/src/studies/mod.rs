@@ -13,6 +13,7 @@ pub mod command;
 pub mod comparison;
 pub mod consent;
 pub mod director;
+pub mod examination;
 pub mod history;
 pub mod lifecycle;
 mod next_step;

@@ -3,6 +3,7 @@
 
 mod audit;
 mod blind;
+mod certificates;
 mod comparison;
 mod devices;
 mod events;
@@ -60,6 +61,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(gaits::get))
         .routes(routes!(gaits::get_csv))
         .routes(routes!(motion::get))
+        .routes(routes!(certificates::get, certificates::create))
         // scripts of the lab
         .routes(routes!(scripts::ask))
         .routes(routes!(scripts::tell))

@@ -1,5 +1,6 @@
 //! Pages for people: rendered on the server, usable without scripts.
 
+mod certificate;
 mod compare;
 pub mod error;
 mod format;
@@ -27,6 +28,7 @@ pub fn routes() -> Router<AppState> {
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
         .route("/trials/{id}", get(gait::get))
+        .route("/trials/{id}/certify", post(certificate::post))
         .route("/rate", get(rate::list))
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))

@@ -1,0 +1,63 @@
+//! `gaitwright certify`: an independent examination of a gait.
+
+use super::gait_file::read_gait;
+use super::output::data;
+use crate::error::Error;
+use clap::Args;
+use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(super) struct Certify {
+    /// A file of `solve --out`, or a gait as the service gives it.
+    #[arg(value_name = "GAIT.json")]
+    gait: PathBuf,
+    /// Print the certificate as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Certify {
+    /// A gait that does not pass is an answer, not an error.
+    pub(super) async fn run(self) -> Result<(), Error> {
+        let gait = read_gait(&self.gait)?;
+        let certificate =
+            tokio::task::spawn_blocking(move || certify(&gait)).await.map_err(|e| Error::Internal(e.to_string()))??;
+        if self.json {
+            let text = serde_json::to_string_pretty(&certificate).map_err(|e| Error::Internal(e.to_string()))?;
+            data(&text)
+        } else {
+            data(&for_people(&certificate))
+        }
+    }
+}
+
+/// The whole certificate as text.
+pub(super) fn for_people(certificate: &Certificate) -> String {
+    let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
+    lines.extend(certificate.objections.iter().map(|objection| format!("  objection: {objection}")));
+    for check in &certificate.checks {
+        let (value, limit) = (check.value_in_words(), check.limit_in_words());
+        lines.push(format!("  {}: {value} (allowed: {limit}; {})", check.name, check.place));
+    }
+    if let Some(map) = &certificate.return_map {
+        lines.push(format!(
+            "  largest multiplier {:.4e} (by differences {:.4e}), zero dynamics {:.4e}: {}",
+            map.largest,
+            map.largest_by_differences,
+            map.zero_dynamics,
+            if map.is_stable() { "stable" } else { "unstable" }
+        ));
+        lines.push(format!(
+            "  from the gait to the periodic motion {:.1e} rad, rad/s; orbit followed for {STRIDES} strides",
+            map.fixed_point_distance
+        ));
+    }
+    if let Some(pushes) = certificate.pushes {
+        lines.push(format!(
+            "  pushes recovered within {RECOVERY_STRIDES} strides: {:.2} m/s forwards, {:.2} m/s backwards",
+            pushes.forwards_m_s, pushes.backwards_m_s
+        ));
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,50 @@
+//! `gaitwright convert`: a gait for other programs.
+
+use super::gait_file::read_gait;
+use super::out_file::OutFile;
+use super::output::data;
+use crate::error::Error;
+use clap::{Args, ValueEnum};
+use gait_optimizer::export::{ControllerFile, motion_file};
+use std::path::PathBuf;
+
+/// What a gait is converted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// OpenSim motion file (.mot), degrees, OpenSim's signs.
+    Mot,
+    /// Controller file for the device: curves, phase, set points of the prosthetic joints; explains its fields.
+    Controller,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Convert {
+    /// A file of `solve --out`, or a gait as the service gives it.
+    #[arg(value_name = "GAIT.json")]
+    gait: PathBuf,
+    /// What to convert to.
+    #[arg(long, value_enum)]
+    to: Form,
+    /// Samples per second, 10 to 5000.
+    #[arg(long, value_name = "HZ", default_value = "200", allow_negative_numbers = true)]
+    rate_hz: f64,
+    /// Where to write it; default: stdout.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Convert {
+    pub(super) fn run(self) -> Result<(), Error> {
+        let gait = read_gait(&self.gait)?;
+        let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.gait])).transpose()?;
+        let text = match self.to {
+            Form::Mot => motion_file(&gait, self.rate_hz)?,
+            Form::Controller => serde_json::to_string_pretty(&ControllerFile::new(&gait, self.rate_hz)?)
+                .map_err(|e| Error::Internal(e.to_string()))?,
+        };
+        match out {
+            Some(out) => out.write(&text),
+            None => data(text.trim_end()),
+        }
+    }
+}

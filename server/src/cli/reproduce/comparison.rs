@@ -1,0 +1,263 @@
+//! With muscles against without, per subject and seed; as tables and in words.
+
+use crate::studies::history::Milestone;
+use gait_optimizer::{Gait, ReferenceGait};
+use std::fmt::Write;
+
+/// The five coordinates of Gait RMSE.
+pub(super) const COORDINATES: [&str; 5] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R"];
+
+/// Joint angles over the stride at 0, 1, ..., 100 %, rad.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Curve(pub(super) Vec<[f64; 5]>);
+
+impl Curve {
+    pub(super) fn of(gait: &Gait) -> Self {
+        Self::sampled(|fraction| {
+            let q = gait.coordinates_at(fraction * gait.stride_time_s);
+            std::array::from_fn(|i| q[2 + i])
+        })
+    }
+
+    pub(super) fn of_reference(reference: &ReferenceGait) -> Self {
+        Self(reference.angles_rad.clone())
+    }
+
+    fn sampled(at: impl Fn(f64) -> [f64; 5]) -> Self {
+        Self((0..=100).map(|percent| at(f64::from(percent) / 100.0)).collect())
+    }
+}
+
+/// What a study came to.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Outcome {
+    pub(super) subject: u32,
+    pub(super) muscles: bool,
+    pub(super) seed: u64,
+    pub(super) trials: usize,
+    pub(super) converged: usize,
+    /// Sum of the solves' wall times.
+    pub(super) seconds: f64,
+    /// Gait RMSE of the best action after 1, 2, ... results, rad; none before the first gait.
+    pub(super) by_iteration: Vec<Option<f64>>,
+    pub(super) best_trial: Option<u32>,
+    pub(super) best_rmse_rad: Option<f64>,
+    pub(super) best_cost_of_transport: Option<f64>,
+    pub(super) best_bounds: Option<String>,
+    pub(super) curve: Option<Curve>,
+    pub(super) reference: Curve,
+}
+
+/// Fills the iterations between milestones: a recommendation holds until the next one.
+pub(super) fn by_iteration(milestones: &[Milestone], results: usize) -> Vec<Option<f64>> {
+    (1..=results)
+        .map(|iteration| {
+            let before = |m: &&Milestone| m.iteration as usize <= iteration;
+            milestones.iter().filter(before).next_back().and_then(|m| m.gait_rmse_rad)
+        })
+        .collect()
+}
+
+/// Whether muscles gave the lower Gait RMSE, for one subject and seed.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Verdict {
+    pub(super) subject: u32,
+    pub(super) seed: u64,
+    /// Iterations at which both studies had a gait.
+    pub(super) compared: usize,
+    /// Of these, how often muscles gave the lower Gait RMSE.
+    pub(super) lower: usize,
+    /// Gait RMSE of the final best actions without and with muscles, rad.
+    pub(super) last: Option<(f64, f64)>,
+}
+
+impl Verdict {
+    /// "Throughout the tuning process", as the paper says.
+    pub(super) fn throughout(&self) -> bool {
+        self.compared > 0 && self.lower == self.compared
+    }
+
+    pub(super) fn sentence(&self) -> String {
+        let last = self.last.map_or_else(
+            || "no final gait in both".to_owned(),
+            |(without, with)| format!("at the end {with:.4} rad with, {without:.4} rad without"),
+        );
+        format!(
+            "subject {}, seed {}: muscles give the lower Gait RMSE at {} of {} iterations{}; {last}",
+            self.subject,
+            self.seed,
+            self.lower,
+            self.compared,
+            if self.throughout() { " (throughout)" } else { "" }
+        )
+    }
+}
+
+/// One verdict per pair of studies.
+pub(super) fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
+    let partner =
+        |plain: &Outcome| outcomes.iter().find(|o| o.muscles && (o.subject, o.seed) == (plain.subject, plain.seed));
+    outcomes
+        .iter()
+        .filter(|outcome| !outcome.muscles)
+        .filter_map(|plain| partner(plain).map(|muscles| (plain, muscles)))
+        .map(|(plain, muscles)| {
+            let both: Vec<(f64, f64)> = plain
+                .by_iteration
+                .iter()
+                .zip(&muscles.by_iteration)
+                .filter_map(|(p, m)| Some(((*p)?, (*m)?)))
+                .collect();
+            Verdict {
+                subject: plain.subject,
+                seed: plain.seed,
+                compared: both.len(),
+                lower: both.iter().filter(|(without, with)| with < without).count(),
+                last: plain.best_rmse_rad.zip(muscles.best_rmse_rad),
+            }
+        })
+        .collect()
+}
+
+/// How firm the answer is over all pairs.
+pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
+    let throughout = verdicts.iter().filter(|v| v.throughout()).count();
+    let at_the_end = verdicts.iter().filter(|v| v.last.is_some_and(|(without, with)| with < without)).count();
+    let pairs = verdicts.len();
+    let paper = "The paper's statement, lower Gait RMSE with muscles throughout the tuning process,";
+    let answer = match throughout {
+        _ if pairs == 0 => "cannot be judged: there is no pair of studies",
+        all if all == pairs => "holds in every pair",
+        0 => "holds in no pair",
+        _ => "holds in some pairs only: local optima decide",
+    };
+    format!("{paper} {answer} ({throughout} of {pairs}; at the end muscles are lower in {at_the_end} of {pairs}).")
+}
+
+fn cell(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
+fn variant(outcome: &Outcome) -> String {
+    format!("{},{},{}", outcome.subject, outcome.seed, if outcome.muscles { "on" } else { "off" })
+}
+
+/// Gait RMSE of the best action by iteration.
+pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
+    let mut text = "subject,seed,muscles,iteration,best_gait_rmse_rad\n".to_owned();
+    for outcome in outcomes {
+        for (index, rmse) in outcome.by_iteration.iter().enumerate() {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{},{},{}", variant(outcome), index + 1, cell(*rmse));
+        }
+    }
+    text
+}
+
+/// One row per study.
+pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
+    let mut text = "subject,seed,muscles,trials,converged,best_trial,best_gait_rmse_rad,best_cost_of_transport,\
+                    solve_seconds,best_bounds\n"
+        .to_owned();
+    for o in outcomes {
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{},{:.1},{}",
+            variant(o),
+            o.trials,
+            o.converged,
+            o.best_trial.map_or_else(String::new, |number| number.to_string()),
+            cell(o.best_rmse_rad),
+            cell(o.best_cost_of_transport),
+            o.seconds,
+            o.best_bounds.as_deref().unwrap_or("")
+        );
+    }
+    text
+}
+
+/// Final joint angles, and the reference.
+pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
+    let columns = COORDINATES.map(|name| format!("{name}_rad")).join(",");
+    let mut text = format!("subject,seed,muscles,percent,{columns}\n");
+    let mut rows = |who: &str, curve: &Curve| {
+        for (percent, angles) in curve.0.iter().enumerate() {
+            let _ = writeln!(text, "{who},{percent},{}", angles.map(|a| a.to_string()).join(","));
+        }
+    };
+    if let Some(first) = outcomes.first() {
+        rows("reference,,", &first.reference);
+    }
+    for outcome in outcomes {
+        if let Some(curve) = &outcome.curve {
+            rows(&variant(outcome), curve);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(muscles: bool, seed: u64, by_iteration: Vec<Option<f64>>) -> Outcome {
+        Outcome {
+            subject: 1,
+            muscles,
+            seed,
+            trials: by_iteration.len(),
+            converged: by_iteration.len(),
+            seconds: 1.0,
+            best_rmse_rad: by_iteration.last().copied().flatten(),
+            by_iteration,
+            best_trial: Some(1),
+            best_cost_of_transport: Some(0.06),
+            best_bounds: None,
+            curve: None,
+            reference: Curve(Vec::new()),
+        }
+    }
+
+    #[test]
+    fn only_iterations_with_both_gaits_count() {
+        let outcomes = [
+            outcome(false, 1, vec![None, Some(0.8), Some(0.7), Some(0.5)]),
+            outcome(true, 1, vec![Some(0.9), Some(0.7), Some(0.6), Some(0.6)]),
+            outcome(false, 2, vec![Some(0.8), Some(0.8)]),
+            outcome(true, 2, vec![Some(0.7), Some(0.6)]),
+        ];
+        let found = verdicts(&outcomes);
+        assert_eq!((found[0].compared, found[0].lower, found[0].throughout()), (3, 2, false));
+        assert_eq!(found[0].last, Some((0.5, 0.6)));
+        assert!(found[1].throughout());
+        let words = conclusion(&found);
+        assert!(
+            words.contains("some pairs only") && words.contains("(1 of 2; at the end muscles are lower in 1 of 2)")
+        );
+        assert!(conclusion(&found[1..]).contains("holds in every pair"));
+        assert!(conclusion(&[]).contains("cannot be judged"));
+    }
+
+    #[test]
+    fn a_recommendation_holds_until_the_next_one() {
+        let milestone = |iteration, rmse| Milestone {
+            iteration,
+            trial_id: crate::store::TrialId::fresh(),
+            number: iteration,
+            gait_rmse_rad: rmse,
+            cost_of_transport: None,
+        };
+        let found = by_iteration(&[milestone(2, Some(0.9)), milestone(4, Some(0.5))], 5);
+        assert_eq!(found, [None, Some(0.9), Some(0.9), Some(0.5), Some(0.5)]);
+    }
+
+    #[test]
+    fn tables_have_a_row_per_iteration_and_study() {
+        let outcomes = [outcome(false, 1, vec![None, Some(0.5)])];
+        assert_eq!(
+            iterations_csv(&outcomes),
+            "subject,seed,muscles,iteration,best_gait_rmse_rad\n1,1,off,1,\n1,1,off,2,0.5\n"
+        );
+        assert!(studies_csv(&outcomes).ends_with("\n1,1,off,2,2,1,0.5,0.06,1.0,\n"));
+    }
+}

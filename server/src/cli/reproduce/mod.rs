@@ -1,0 +1,171 @@
+//! `gaitwright reproduce`: the paper's comparison of gaits with and without muscles, unattended.
+
+mod comparison;
+mod report;
+
+use super::Ended;
+use super::numbers::{seed, trials, whole};
+use super::out_file::OutFile;
+use super::output::{data, tell};
+use super::unattended::{self, Lines, Run};
+use crate::error::Error;
+use crate::store::studies::{self, Study, StudyState};
+use crate::store::{Store, commit, gaits};
+use crate::studies::catalogue;
+use crate::studies::choice::best_trial;
+use crate::studies::history;
+use crate::studies::plan::{self, NewStudy};
+use crate::studies::standing::Standing;
+use clap::{Args, ValueEnum};
+use comparison::{Curve, Outcome};
+use gait_optimizer::Subject;
+use std::path::PathBuf;
+
+/// Subjects of the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Subjects {
+    /// Female, 1.727 m, 65.7 kg.
+    #[value(name = "1")]
+    First,
+    /// Male, 1.803 m, 75 kg.
+    #[value(name = "2")]
+    Second,
+    /// One after the other.
+    Both,
+}
+
+impl Subjects {
+    fn numbers(self) -> &'static [u32] {
+        match self {
+            Self::First => &[1],
+            Self::Second => &[2],
+            Self::Both => &[1, 2],
+        }
+    }
+}
+
+fn seeds(text: &str) -> Result<u64, String> {
+    whole(text, 1, 100)
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Reproduce {
+    /// Which subjects of the paper.
+    #[arg(long, value_enum, default_value = "both")]
+    subject: Subjects,
+    /// Trials of each study.
+    #[arg(long, default_value = "30", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
+    trials: u32,
+    /// First seed; both studies of a subject have the same.
+    #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
+    seed: u64,
+    /// How many seeds in a row: local optima can turn the comparison either way.
+    #[arg(long, default_value = "3", value_name = "NUMBER", value_parser = seeds, allow_negative_numbers = true)]
+    seeds: u64,
+    /// Folder of record, report and tables; what is finished in it is not done again.
+    #[arg(long, default_value = "reproduction", value_name = "FOLDER")]
+    folder: PathBuf,
+}
+
+impl Reproduce {
+    /// Two studies per subject and seed, one trial at a time: reproducible bit for bit.
+    pub(super) async fn run(self) -> Result<Ended, Error> {
+        let cannot = |e: std::io::Error| Error::Malformed(format!("cannot make {}: {e}", self.folder.display()));
+        std::fs::create_dir_all(&self.folder).map_err(cannot)?;
+        let files = ["report.html", "iterations.csv", "studies.csv", "angles.csv"];
+        let files: Vec<OutFile> =
+            files.iter().map(|name| OutFile::open(&self.folder.join(name), &[])).collect::<Result<_, _>>()?;
+        let store = Store::open(&self.folder.join("studies.db")).await?;
+        let outcomes = self.studies(&store).await;
+        store.close().await;
+        let Some(outcomes) = outcomes? else {
+            tell("interrupted; the same command goes on from there");
+            return Ok(Ended::Interrupted);
+        };
+        let texts = [
+            report::html(&outcomes, self.trials)?,
+            comparison::iterations_csv(&outcomes),
+            comparison::studies_csv(&outcomes),
+            comparison::angles_csv(&outcomes),
+        ];
+        for (file, text) in files.into_iter().zip(texts) {
+            file.write(&text)?;
+        }
+        for verdict in comparison::verdicts(&outcomes) {
+            data(&verdict.sentence())?;
+        }
+        data(&comparison::conclusion(&comparison::verdicts(&outcomes)))?;
+        tell(&format!("report: {}", self.folder.join("report.html").display()));
+        Ok(Ended::Done)
+    }
+
+    /// Every study in order; none when somebody stopped it.
+    async fn studies(&self, store: &Store) -> Result<Option<Vec<Outcome>>, Error> {
+        let mut outcomes = Vec::new();
+        for seed in self.seed..self.seed + self.seeds {
+            for &subject in self.subject.numbers() {
+                for muscles in [false, true] {
+                    let words = if muscles { "with" } else { "without" };
+                    tell(&format!("subject {subject}, {words} muscles, seed {seed}"));
+                    let (study, finished) = self.study(store, subject, muscles, seed).await?;
+                    let standing = if finished {
+                        Standing::read(&mut *store.read().await?, study).await?
+                    } else {
+                        let Run { standing, interrupted } = unattended::run(store, &study, 1, Lines::Progress).await?;
+                        if interrupted {
+                            return Ok(None);
+                        }
+                        standing
+                    };
+                    outcomes.push(outcome(store, subject, muscles, seed, &standing).await?);
+                }
+            }
+        }
+        Ok(Some(outcomes))
+    }
+
+    /// The study of the folder, and whether it is finished.
+    async fn study(&self, store: &Store, subject: u32, muscles: bool, seed: u64) -> Result<(Study, bool), Error> {
+        let mut writer = store.write().await?;
+        catalogue::ensure(&mut writer).await?;
+        let person = catalogue::subject_with(&mut writer, Subject::builtin(subject)?).await?;
+        let new = NewStudy { muscles, trial_budget: self.trials, seed, parallel_trials: 1, ..NewStudy::of(person.id) };
+        let wanted = plan::checked(&mut writer, new.clone()).await?;
+        // A folder holds at most two subjects, two variants and a hundred seeds of one number of trials.
+        let known = studies::page(&mut writer, None, 1000).await?;
+        commit(writer).await?;
+        let same = known
+            .into_iter()
+            .find(|study| study.state == StudyState::Finished && study.plan.tries_the_same_as(&wanted));
+        match same {
+            Some(study) => Ok((study, true)),
+            None => Ok((unattended::study(store, new).await?, false)),
+        }
+    }
+}
+
+/// What a study came to.
+async fn outcome(store: &Store, subject: u32, muscles: bool, seed: u64, standing: &Standing) -> Result<Outcome, Error> {
+    let milestones = history::of(standing).map_err(Error::Learner)?;
+    let best = best_trial(standing).map_err(Error::Learner)?.and_then(|id| standing.trial(id));
+    let reference = gait_optimizer::ReferenceGait::builtin()?;
+    let curve = match best {
+        Some(trial) => Some(Curve::of(&gaits::get(&mut *store.read().await?, trial.id).await?)),
+        None => None,
+    };
+    Ok(Outcome {
+        subject,
+        muscles,
+        seed,
+        trials: standing.trials.len(),
+        converged: standing.trials.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count(),
+        seconds: standing.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        by_iteration: comparison::by_iteration(&milestones, history::results(standing).len()),
+        best_trial: best.map(|trial| trial.number),
+        best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
+        best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
+        curve,
+        reference: Curve::of_reference(&reference),
+    })
+}

@@ -1,0 +1,171 @@
+//! A study that runs by itself from the command line: found or made, followed, run to its end.
+
+use super::output::{data, tell};
+use super::serve::interrupted;
+use crate::error::Error;
+use crate::store::audit::Actor;
+use crate::store::studies::{Study, StudyState};
+use crate::store::trials::Trial;
+use crate::store::{Store, commit, studies, trials as trial_rows};
+use crate::studies::director::Director;
+use crate::studies::plan::{self, NewStudy};
+use crate::studies::standing::Standing;
+use crate::studies::summary;
+use crate::workers::{GaitSolver, InProcess};
+use gait_optimizer::TunedBounds;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Write;
+use std::sync::Arc;
+
+/// Where a line per trial goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lines {
+    /// To stdout: they are the answer.
+    Data,
+    /// To stderr: the answer comes later.
+    Progress,
+}
+
+/// A study after its run.
+#[derive(Debug)]
+pub(super) struct Run {
+    /// How it stands.
+    pub(super) standing: Standing,
+    /// Somebody stopped it before its end.
+    pub(super) interrupted: bool,
+}
+
+/// The unfinished study of the same kind in the database, or a new one.
+pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> {
+    let mut writer = store.write().await?;
+    let wanted = plan::checked(&mut writer, new.clone()).await?;
+    let unfinished =
+        studies::active(&mut writer).await?.into_iter().find(|study| study.plan.tries_the_same_as(&wanted));
+    let study = if let Some(study) = unfinished {
+        let done = trial_rows::counts(&mut writer, study.id).await?;
+        let ended = done.total - done.open;
+        tell(&format!("going on with study {}: {ended} of {} trials", study.id, study.plan.trial_budget));
+        study
+    } else {
+        plan::create(&mut writer, &Actor::terminal(), new).await?
+    };
+    commit(writer).await?;
+    Ok(study)
+}
+
+/// Runs a study until it ends or somebody stops it.
+pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lines) -> Result<Run, Error> {
+    let engine = InProcess::new(workers, Arc::new(GaitSolver));
+    let director = Director::new(store.clone(), Arc::new(engine), Some(study.id));
+    let work = tokio::spawn({
+        let director = director.clone();
+        async move { director.run().await }
+    });
+    let ended = tokio::select! {
+        ended = follow(&director, study, lines) => Some(ended),
+        () = interrupted() => None,
+    };
+    director.stop();
+    work.await.map_err(|e| Error::Internal(e.to_string()))??;
+    let mut reader = store.read().await?;
+    let study = studies::get(&mut reader, study.id).await?;
+    let standing = Standing::read(&mut reader, study).await?;
+    let interrupted = ended.is_none();
+    if let Some(ended) = ended {
+        ended?;
+    }
+    Ok(Run { standing, interrupted })
+}
+
+/// Shows progress until the study ends.
+async fn follow(director: &Director, study: &Study, lines: Lines) -> Result<(), Error> {
+    let bar = ProgressBar::new(u64::from(study.plan.trial_budget));
+    let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
+    if let Ok(style) = ProgressStyle::with_template(style) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    let mut pulse = director.pulse();
+    let mut progress = director.board().listen();
+    let mut shown = std::collections::HashSet::new();
+    loop {
+        let mut reader = director.store().read().await?;
+        let present = studies::get(&mut reader, study.id).await?;
+        let rows = trial_rows::of_study(&mut reader, study.id).await?;
+        drop(reader);
+        for trial in rows.iter().filter(|trial| !trial.state.is_open()) {
+            if shown.insert(trial.id) {
+                let line = trial_line(trial, &rows);
+                bar.suspend(|| match lines {
+                    Lines::Data => data(&line),
+                    Lines::Progress => {
+                        tell(&line);
+                        Ok(())
+                    }
+                })?;
+            }
+        }
+        bar.set_position(shown.len() as u64);
+        match present.state {
+            StudyState::Running => {}
+            StudyState::Finished => {
+                bar.finish_and_clear();
+                return Ok(());
+            }
+            // Nobody answers or starts anything here.
+            StudyState::Draft | StudyState::Waiting | StudyState::Paused | StudyState::Stopped => {
+                bar.finish_and_clear();
+                return Err(Error::conflict(format!(
+                    "the study is {}: {}",
+                    present.state.as_str(),
+                    present.state_reason
+                )));
+            }
+        }
+        loop {
+            tokio::select! {
+                changed = pulse.changed() => {
+                    changed.map_err(|e| Error::Internal(e.to_string()))?;
+                    break;
+                }
+                iteration = progress.recv() => if let Ok(p) = iteration {
+                    bar.set_message(format!(
+                        "trial {}: iteration {}, objective {:.4}, violation {:.1e}",
+                        p.number, p.record.iteration, p.record.objective, p.record.constraint_violation
+                    ));
+                },
+            }
+        }
+    }
+}
+
+fn trial_line(trial: &Trial, all: &[Trial]) -> String {
+    let mut line = format!("{:>4}  {:<13}", trial.number, trial.state.as_str());
+    // Writing to a String cannot fail.
+    let _ = describe(&mut line, trial, all);
+    line
+}
+
+fn describe(line: &mut String, trial: &Trial, all: &[Trial]) -> std::fmt::Result {
+    if let (Some(rmse), Some(cost)) = (trial.gait_rmse_rad, trial.cost_of_transport) {
+        write!(line, "  RMSE {rmse:.4} rad  cost {cost:.4}")?;
+    }
+    if let (Some(iterations), Some(seconds)) = (trial.iterations, trial.seconds_total) {
+        write!(line, "  {iterations:>4} iterations {seconds:>6.1} s")?;
+    }
+    match summary::number_of(trial.warm_started_from, all) {
+        Some(from) => write!(line, "  from {from:<4}")?,
+        None => line.push_str("  cold     "),
+    }
+    write!(line, "  {}", action_line(&trial.action))?;
+    if !trial.message.is_empty() {
+        write!(line, "\n      {}", trial.message)?;
+    }
+    Ok(())
+}
+
+/// An action as in `--bounds`.
+pub(super) fn action_line(action: &TunedBounds) -> String {
+    let parts: Vec<String> =
+        TunedBounds::NAMES.iter().zip(action.to_array()).map(|(name, value)| format!("{name}={value}")).collect();
+    parts.join(" ")
+}

@@ -1,0 +1,62 @@
+//! Certificates: an examination of a trial's gait that is independent of its optimisation.
+
+use crate::access::{Read, Run};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::Once;
+use crate::store::{TrialId, certificates, trials};
+use crate::studies::examination;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gait_optimizer::certificate::Certificate;
+
+/// `GET /trials/{id}/certificate`: as it was made.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/certificate",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "The certificate: `passed`, `objections`, `checks`, the stride-to-stride map and pushes", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+) -> Result<Json<Certificate>, Error> {
+    let mut reader = app.read().await?;
+    trials::get(&mut reader, id).await?;
+    let missing = || Error::NotFound { what: "certificate of trial".to_owned(), id: id.to_string() };
+    certificates::find(&mut reader, id).await?.map(Json).ok_or_else(missing)
+}
+
+/// `POST /trials/{id}/certificate`: makes it, where it is not made yet.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/certificate",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial; its gait has converged")),
+    responses((status = 200, description = "The certificate; making it takes some seconds", body = Object)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    once: Once<Run>,
+) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let begun = examination::begin(&mut *app.read().await?, id).await?;
+    let certificate = examination::certificate(begun).await?;
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    examination::record(&mut writer, &once.actor, id, &certificate).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &certificate).await
+}

@@ -1,0 +1,61 @@
+//! The certificate on a gait's page, and the button that asks for it.
+
+use super::error::PageError;
+use crate::access::Run;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::store::{TrialId, commit};
+use crate::studies::examination;
+use axum::extract::State;
+use axum::response::Redirect;
+use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
+
+/// A certificate in words.
+pub(super) struct Shown {
+    /// Every check is within its limit, and the gait is stable.
+    pub(super) passed: bool,
+    /// Why not.
+    pub(super) objections: Vec<String>,
+    /// Figures of the closed loop: meaning and value.
+    pub(super) figures: Vec<(&'static str, String)>,
+    /// Every check.
+    pub(super) checks: Vec<Check>,
+}
+
+impl Shown {
+    pub(super) fn new(certificate: Certificate) -> Self {
+        let mut figures = Vec::new();
+        if let Some(map) = &certificate.return_map {
+            figures.push(("Largest Poincaré multiplier", format!("{:.3e}", map.largest)));
+            figures.push(("The same by differences", format!("{:.3e}", map.largest_by_differences)));
+            figures.push(("Multiplier of the zero dynamics", format!("{:.3e}", map.zero_dynamics)));
+            figures.push((
+                "From the gait to the periodic motion, rad, rad/s",
+                format!("{:.1e}", map.fixed_point_distance),
+            ));
+        }
+        if let Some(pushes) = certificate.pushes {
+            let words = format!(
+                "{:.2} m/s forwards, {:.2} m/s backwards, within {RECOVERY_STRIDES} strides",
+                pushes.forwards_m_s, pushes.backwards_m_s
+            );
+            figures.push(("Pushes at the hip that are recovered", words));
+        }
+        Self { passed: certificate.passed, objections: certificate.objections, figures, checks: certificate.checks }
+    }
+}
+
+/// `POST /trials/{id}/certify`.
+pub(super) async fn post(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+) -> Result<Redirect, PageError> {
+    let begun = examination::begin(&mut *app.read().await.map_err(crate::error::Error::from)?, id).await?;
+    let certificate = examination::certificate(begun).await?;
+    let mut writer = app.write().await?;
+    examination::record(&mut writer, &may.caller.actor, id, &certificate).await?;
+    commit(writer).await?;
+    Ok(Redirect::to(&format!("/trials/{id}#certificate")))
+}

@@ -1,0 +1,64 @@
+//! The certificate of a trial's gait: made when somebody asks for it, then kept.
+
+use crate::error::Error;
+use crate::store::audit::{self, Actor};
+use crate::store::trials::TrialState;
+use crate::store::{Connection, TrialId, Writer, certificates, gaits, trials};
+use gait_optimizer::Gait;
+use gait_optimizer::certificate::{Certificate, certify};
+use serde_json::json;
+
+/// What there is to begin with.
+#[derive(Debug)]
+pub enum Examination {
+    /// It was made before.
+    Made(Certificate),
+    /// The gait to examine.
+    Ahead(Box<Gait>),
+}
+
+/// Looks for the certificate of a trial's gait.
+///
+/// # Errors
+/// [`Error::Conflict`] when the trial has no converged gait, or what the database reports.
+pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Examination, Error> {
+    if let Some(certificate) = certificates::find(reader, trial).await? {
+        return Ok(Examination::Made(certificate));
+    }
+    let found = trials::get(reader, trial).await?;
+    if found.state != TrialState::Converged {
+        let state = found.state.as_str();
+        return Err(Error::conflict(format!("trial {} is {state}: only a converged gait is examined", found.number)));
+    }
+    Ok(Examination::Ahead(Box::new(gaits::get(reader, trial).await?)))
+}
+
+/// The certificate; a new one takes some seconds of processor time, outside any transaction.
+///
+/// # Errors
+/// When the gait is not well-formed.
+pub async fn certificate(examination: Examination) -> Result<Certificate, Error> {
+    match examination {
+        Examination::Made(certificate) => Ok(certificate),
+        Examination::Ahead(gait) => Ok(tokio::task::spawn_blocking(move || certify(&gait))
+            .await
+            .map_err(|e| Error::Internal(e.to_string()))??),
+    }
+}
+
+/// Keeps a certificate.
+///
+/// # Errors
+/// What the database reports.
+pub async fn record(
+    writer: &mut Writer,
+    actor: &Actor,
+    trial: TrialId,
+    certificate: &Certificate,
+) -> Result<(), Error> {
+    if certificates::keep(writer, trial, certificate).await? {
+        let detail = json!({ "passed": certificate.passed, "objections": certificate.objections });
+        audit::append(writer, actor, "trial.certify", &format!("trial {trial}"), &detail).await?;
+    }
+    Ok(())
+}

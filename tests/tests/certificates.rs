@@ -1,0 +1,117 @@
+//! Certificates, conversions and references, through the command line and the service, with the real optimizer on a
+//! coarse mesh.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gait_optimizer::Mesh;
+use gait_optimizer::export::ControllerFile;
+use gaitwright::store::studies::StudyState;
+use gaitwright::workers::GaitSolver;
+use gaitwright_tests::cli;
+use gaitwright_tests::service::Service;
+use serde_json::{Value, json};
+use std::path::Path;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
+
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let output = cli::run(BINARY, folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(folder: &Path, arguments: &[&str], expected: &str) {
+    let before = cli::files(folder);
+    let output = cli::run(BINARY, folder, arguments);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains(expected), "{text}");
+    assert!(output.stdout.is_empty());
+    assert_eq!(cli::files(folder), before, "something was left behind");
+}
+
+#[test]
+fn a_gait_is_solved_certified_and_converted() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let solve = ["solve", "--muscles", "off", "--mesh", "2,2,3,5", "--certify", "--json", "--out", "gait.json"];
+    let figures: Value = serde_json::from_str(&done(folder, &solve)).unwrap();
+    assert_eq!(figures["status"], "converged");
+    let certificate = &figures["certificate"];
+    assert_eq!(certificate["passed"].as_bool(), Some(certificate["objections"].as_array().unwrap().is_empty()));
+    assert!(certificate["return_map"]["largest"].as_f64().unwrap() < 1.0);
+
+    // The same gait from its file, and alone as the service gives it.
+    let again: Value = serde_json::from_str(&done(folder, &["certify", "gait.json", "--json"])).unwrap();
+    assert_eq!(&again, certificate);
+    let outcome: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("gait.json")).unwrap()).unwrap();
+    std::fs::write(folder.join("alone.json"), outcome["gait"].to_string()).unwrap();
+    let text = done(folder, &["certify", "alone.json"]);
+    assert!(text.starts_with("certificate: ") && text.contains("largest multiplier"), "{text}");
+
+    done(folder, &["convert", "alone.json", "--to", "mot", "--rate-hz", "1000", "--out", "gait.mot"]);
+    let end = outcome["gait"]["stride_time_s"].as_f64().unwrap() - 1e-6;
+    let strikes = format!("0,{end}");
+    let reference = ["reference", "gait.mot", "--name", "our own", "--heel-strikes-s", &strikes, "--out", "own.json"];
+    done(folder, &reference);
+    // Measured against itself, a gait is no farther away than its interpolation.
+    let warm = ["--warm", "gait.json", "--mesh", "2,2,3,5", "--muscles", "off", "--json"];
+    let against = [&["solve", "--reference", "own.json"][..], &warm].concat();
+    let figures: Value = serde_json::from_str(&done(folder, &against)).unwrap();
+    assert!(figures["gait_rmse_rad"].as_f64().unwrap() < 0.02, "{}", figures["gait_rmse_rad"]);
+
+    let controller = done(folder, &["convert", "gait.json", "--to", "controller"]);
+    assert_eq!(ControllerFile::from_json(&controller).unwrap().domains.len(), 8);
+    refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "rate_hz = 0");
+    let mut broken = outcome["gait"].clone();
+    broken["domains"].as_array_mut().unwrap().pop();
+    std::fs::write(folder.join("broken.json"), broken.to_string()).unwrap();
+    refused(folder, &["certify", "broken.json"], "number of domains = 7");
+}
+
+#[test]
+fn what_is_no_gait_or_recording_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    refused(folder, &["certify", "nowhere.json"], "cannot read nowhere.json");
+    std::fs::write(folder.join("list.json"), "[1, 2]").unwrap();
+    refused(folder, &["certify", "list.json"], "list.json: not a gait");
+    refused(folder, &["convert", "list.json", "--to", "controller"], "list.json: not a gait");
+    std::fs::write(folder.join("walk.mot"), "walk\nendheader\ntime\n").unwrap();
+    let reference = ["reference", "walk.mot", "--name", "x", "--out", "r.json"];
+    refused(folder, &reference, "walk.mot, line 2: the header has no inDegrees=yes or no");
+    refused(folder, &["solve", "--reference", "list.json"], "list.json: not a reference gait");
+}
+
+#[tokio::test]
+async fn a_trial_gets_its_certificate_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
+    let study = service
+        .study(|new| {
+            new.muscles = false;
+            new.trial_budget = 1;
+            new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await.remove(0);
+    let address = format!("/api/v1/trials/{}/certificate", trial.id);
+    assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
+    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    assert!(page.contains("has not been examined yet") && page.contains("Examine it"), "{page}");
+
+    let made = service.post(&address, &json!({})).await;
+    assert_eq!(made.status, StatusCode::OK, "{}", made.text);
+    let certificate = made.json();
+    assert_eq!(certificate["passed"].as_bool(), Some(certificate["objections"].as_array().unwrap().is_empty()));
+    assert_eq!(service.fetch(&address).await.json(), certificate);
+    assert_eq!(service.post(&address, &json!({})).await.json(), certificate);
+    let audit = service.fetch("/api/v1/audit").await.text;
+    assert_eq!(audit.matches("trial.certify").count(), 1, "{audit}");
+    let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+    let word = if certificate["passed"] == true { ">passed<" } else { ">failed<" };
+    assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");
+    service.stop().await;
+}
