@@ -20,11 +20,11 @@ fn muscles(gait: &Gait) -> impl Iterator<Item = &MuscleTrajectory> {
 }
 
 /// Values of one muscle in one domain, at every `stride`-th point.
-fn lines<'a>(
-    gait: &'a Gait,
+fn lines(
+    gait: &Gait,
     pick: fn(&MuscleTrajectory) -> &Vec<[f64; 10]>,
     stride: usize,
-) -> impl Iterator<Item = Vec<f64>> + 'a {
+) -> impl Iterator<Item = Vec<f64>> + '_ {
     muscles(gait).flat_map(move |trajectory| {
         (0..10).map(move |m| pick(trajectory).iter().step_by(stride).map(|values| values[m]).collect())
     })

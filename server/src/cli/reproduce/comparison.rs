@@ -53,7 +53,7 @@ pub(super) fn by_iteration(milestones: &[Milestone], results: usize) -> Vec<Opti
     (1..=results)
         .map(|iteration| {
             let before = |m: &&Milestone| m.iteration as usize <= iteration;
-            milestones.iter().filter(before).next_back().and_then(|m| m.gait_rmse_rad)
+            milestones.iter().rfind(before).and_then(|m| m.gait_rmse_rad)
         })
         .collect()
 }
