@@ -2,104 +2,22 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
-use gaitwright::store::StudyId;
-use gaitwright::store::studies::StudyState;
-use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::service::Service;
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
-use std::path::Path;
-use std::time::{Duration, Instant};
+use gaitwright_tests::large::{self, TRIALS};
+use std::time::Duration;
 
-const TRIALS: u32 = 10_000;
 const LIMIT: Duration = Duration::from_millis(200);
-
-/// Fills a finished study with trials like its first ones.
-async fn fill(database: &Path, study: StudyId) {
-    let options = SqliteConnectOptions::new().filename(database).foreign_keys(true);
-    let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
-    let mut writer = pool.begin().await.unwrap();
-    sqlx::query(
-        "with recursive n(i) as (select 4 union all select i + 1 from n where i < ?1)
-         insert into trials (id, study_id, number, action_index, action, reason, best_before, state, status,
-             gait_rmse_rad, cost_of_transport, objective, max_violation, iterations, seconds_total, report, violations,
-             created_at, started_at, finished_at)
-         select printf('01890000-0000-7000-8000-%012d', i), study_id, i, i % 11664, action, reason, id, state, status,
-             gait_rmse_rad + i / 1e6, cost_of_transport, objective, max_violation, iterations, seconds_total, report,
-             violations, created_at, started_at, finished_at
-         from n join trials on study_id = ?2 and number = 1",
-    )
-    .bind(TRIALS)
-    .bind(study.to_string())
-    .execute(&mut *writer)
-    .await
-    .unwrap();
-    sqlx::query(
-        "insert into feedback (id, study_id, kind, trial_a, category, source, author, created_at)
-         select printf('01890001-0000-7000-8000-%012d', number), study_id, 'label', id, 1, 'convergence', 'x', created_at from trials
-         where study_id = ?1 and number > 3",
-    )
-    .bind(study.to_string())
-    .execute(&mut *writer)
-    .await
-    .unwrap();
-    sqlx::query(
-        "insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
-         select printf('01890002-0000-7000-8000-%012d', t.number), t.study_id, 'preference', f.id, t.id, 'clinician', 'x', t.created_at
-         from trials t join trials f on f.study_id = t.study_id and f.number = 1
-         where t.study_id = ?1 and t.number > 3",
-    )
-    .bind(study.to_string())
-    .execute(&mut *writer)
-    .await
-    .unwrap();
-    sqlx::query("update studies set trial_budget = 10000").execute(&mut *writer).await.unwrap();
-    writer.commit().await.unwrap();
-    pool.close().await;
-}
 
 #[tokio::test]
 async fn ten_thousand_trials_slow_no_page_and_no_list() {
     let folder = tempfile::tempdir().unwrap();
-    let database = folder.path().join("a.db");
-    let service = Service::start(&database, Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
-    service.wait_for(study, &[StudyState::Finished]).await;
-    let trial = service.trials(study).await[0].id;
-    service.stop().await;
-    fill(&database, study).await;
-
-    let service = Service::start(&database, Analytic::default(), 1).await;
-    let api = format!("/api/v1/studies/{study}");
-    let mut slow = Vec::new();
-    for path in [
-        "/".to_owned(),
-        format!("/studies/{study}"),
-        format!("/studies/{study}/live"),
-        format!("/studies/{study}/compare"),
-        format!("/trials/{trial}"),
-        "/api/v1/studies".to_owned(),
-        api.clone(),
-        format!("{api}/trials?after=9000"),
-        format!("{api}/preferences?after=9000&limit=200"),
-        format!("{api}/raters"),
-        "/api/v1/audit".to_owned(),
-        "/metrics".to_owned(),
-    ] {
-        let mut fastest = Duration::MAX;
-        for _ in 0..3 {
-            let begun = Instant::now();
-            let answer = service.fetch(&path).await;
-            fastest = fastest.min(begun.elapsed());
-            assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
-            assert!(answer.text.len() < 2_000_000, "{path}: {} bytes", answer.text.len());
-        }
-        println!("{:>6.1} ms  {}", fastest.as_secs_f64() * 1e3, path.replace(&study.to_string(), "STUDY"));
-        if fastest > LIMIT {
-            slow.push(format!("{path}: {fastest:?}"));
-        }
+    let (service, study, trial) = large::service(&folder.path().join("a.db")).await;
+    let times = large::times(&service, study, trial).await;
+    for (path, time) in &times {
+        println!("{:>6.1} ms  {path}", time.as_secs_f64() * 1e3);
     }
+    let slow: Vec<_> = times.iter().filter(|(_, time)| *time > LIMIT).collect();
     assert!(slow.is_empty(), "{slow:?}");
+    let api = format!("/api/v1/studies/{study}");
     // Every trial can be had, page by page.
     let (mut after, mut seen) = (0, 0);
     loop {

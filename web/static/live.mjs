@@ -25,6 +25,9 @@ if (live) {
         if (focused) {
           /** @type {HTMLElement | null} */ (live.querySelector(`button[value="${focused}"]`))?.focus();
         }
+      } else if (answer.status === 409) {
+        // The subject withdrew: what is on this page is not shown any more.
+        location.reload();
       }
     } finally {
       pending = false;

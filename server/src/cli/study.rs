@@ -28,7 +28,7 @@ impl Export {
         let packed = match pool.begin().await {
             // One transaction: every table as of the same instant.
             Ok(mut reader) => match studies::get(&mut reader, self.study).await {
-                Ok(_) => match consents::may_leave(&mut reader, self.study).await {
+                Ok(_) => match consents::may_be_shown(&mut reader, self.study).await {
                     Ok(()) => archive::pack(&mut reader, self.study).await,
                     Err(error) => Err(error),
                 },

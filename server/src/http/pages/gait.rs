@@ -1,14 +1,14 @@
 //! A trial and its gait.
 
-use super::certificate::Shown;
+use super::certificate;
 use super::error::{Page, page};
 use super::format::{self, Bound, words};
 use super::gait_charts::{self, Drawn};
 use crate::access::{Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
 use crate::store::{StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
@@ -29,14 +29,14 @@ struct GaitPage {
     from: Option<(TrialId, u32)>,
     has_gait: bool,
     may_run: bool,
-    certificate: Option<Shown>,
+    certificate: Option<certificate::InWords>,
     charts: Vec<Drawn>,
     phases: [(&'static str, &'static str); 4],
     trial: Trial,
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<TrialId>) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -51,7 +51,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<
         Err(error) => return Err(error.into()),
     };
     let iterations = if gait.is_some() { gaits::iterations(&mut reader, id).await? } else { Vec::new() };
-    let certificate = certificates::find(&mut reader, id).await?.map(Shown::new);
+    let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     drop(reader);
     let has_gait = gait.is_some();
     let charts = tokio::task::spawn_blocking(move || {

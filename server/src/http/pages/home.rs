@@ -9,7 +9,7 @@ use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::TrialCounts;
-use crate::store::{Connection, StudyId, studies, subjects, trials};
+use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
 use askama::Template;
 use axum::extract::State;
 use serde::Deserialize;
@@ -40,6 +40,7 @@ struct Row {
     state: String,
     best_rmse: Option<String>,
     waits_for_answer: bool,
+    withdrawn: bool,
 }
 
 /// `GET /`.
@@ -59,7 +60,9 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(Before
 async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
     let counts = trials::counts(db, study.id).await?;
     let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
-    let best_rmse = trials::smallest_rmse(db, study.id).await?.map(|rmse| format!("{rmse:.4}"));
+    let withdrawn = consents::is_withdrawn(db, study.id).await?;
+    let best_rmse = if withdrawn { None } else { trials::smallest_rmse(db, study.id).await? };
+    let best_rmse = best_rmse.map(|rmse| format!("{rmse:.4}"));
     let waits_for_answer = study.state == StudyState::Waiting && study.plan.feedback_mode == FeedbackMode::Human;
-    Ok(Row { state: words(study.state.as_str()), study, subject, counts, best_rmse, waits_for_answer })
+    Ok(Row { state: words(study.state.as_str()), study, subject, counts, best_rmse, waits_for_answer, withdrawn })
 }

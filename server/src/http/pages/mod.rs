@@ -12,6 +12,7 @@ mod rate;
 mod reference;
 mod sign_in;
 mod study;
+mod subject;
 
 use super::AppState;
 use axum::Router;
@@ -27,6 +28,10 @@ pub fn routes() -> Router<AppState> {
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
+        .route("/subjects", get(subject::list))
+        .route("/subjects/{id}", get(subject::get))
+        .route("/subjects/{id}/consent", post(subject::consent))
+        .route("/subjects/{id}/withdraw", post(subject::withdraw))
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/rate", get(rate::list))

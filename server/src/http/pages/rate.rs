@@ -20,6 +20,7 @@ struct RatePage {
     studies: Vec<(StudyId, String)>,
     nothing: bool,
     saved: Option<u32>,
+    others: bool,
 }
 
 #[derive(Template)]
@@ -36,6 +37,8 @@ pub(super) struct Before {
     #[serde(default)]
     nothing: bool,
     saved: Option<u32>,
+    #[serde(default)]
+    others: bool,
 }
 
 /// `GET /rate`: the studies that may ask for a comparison.
@@ -50,7 +53,7 @@ pub(super) async fn list(_: May<Rate>, State(app): State<AppState>, Params(befor
         // Names can say what is tuned: a rater sees the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
-    page(&RatePage { studies, nothing: before.nothing, saved: before.saved })
+    page(&RatePage { studies, nothing: before.nothing, saved: before.saved, others: before.others })
 }
 
 /// `POST /rate/{id}`: takes the next pair.
@@ -95,5 +98,6 @@ pub(super) async fn answer(
     let (_, answered) = blind::answer(&mut writer, &may.caller, &token, &given).await?;
     commit(writer).await?;
     app.director.changed();
-    Ok(Redirect::to(&format!("/rate?saved={}", answered.number)))
+    let others = if answered.answered_by_others { "&others=true" } else { "" };
+    Ok(Redirect::to(&format!("/rate?saved={}{others}", answered.number)))
 }

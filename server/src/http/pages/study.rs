@@ -7,11 +7,13 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id};
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::plots::{Chart, Stroke};
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
+use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
-use crate::store::{StudyId, TrialId, commit, devices, events, reference_gaits, studies, subjects, trials};
+use crate::store::{StudyId, TrialId, commit, consents, devices, events, reference_gaits, studies, trials};
 use crate::studies::choice::{MANY, best_trial};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
@@ -28,11 +30,20 @@ use serde::Deserialize;
 #[template(path = "study.html")]
 struct StudyPage {
     study: Study,
-    subject: String,
+    subject: Subject,
     device: String,
     reference: String,
     live: String,
     last_event: i64,
+}
+
+/// The page of a study whose subject withdrew: what was tried, and nothing of what came of it.
+#[derive(Template)]
+#[template(path = "study_closed.html")]
+struct ClosedPage {
+    study: Study,
+    subject: Subject,
+    counts: TrialCounts,
 }
 
 /// The part that changes while the study runs.
@@ -103,18 +114,21 @@ const SHOWN: u32 = 200;
 pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let last_event = events::last(&mut reader, id).await?;
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
+    if consents::is_withdrawn(&mut reader, id).await? {
+        let counts = trials::counts(&mut reader, id).await?;
+        return page(&ClosedPage { study, subject, counts });
+    }
+    let last_event = events::last(&mut reader, id).await?;
     let device = devices::get(&mut reader, study.plan.device_id).await?.name;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     drop(reader);
     let live = read_live(&app, id).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
-    let subject = format!("{} ({} m, {} kg)", subject.pseudonym, subject.height_m, subject.body_mass_kg);
     page(&StudyPage { study, subject, device, reference, live, last_event })
 }
 
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
-pub(super) async fn live(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+pub(super) async fn live(_: May<Read>, State(app): State<AppState>, Shown(id): Shown<StudyId>) -> Page {
     page(&read_live(&app, id).await?)
 }
 
