@@ -200,7 +200,8 @@ async fn a_database_that_cannot_be_written_is_named_with_what_it_needs() {
     refused(&["tune", "--database", "missing/a.db"], "cannot open the database missing/a.db");
     // Root may write everywhere, so a folder stands in the way of the write-ahead log.
     let folder = tempfile::tempdir().unwrap();
-    Store::open(&folder.path().join("a.db")).await.unwrap().close().await;
+    Store::open(&folder.path().join("made.db")).await.unwrap().close().await;
+    std::fs::copy(folder.path().join("made.db"), folder.path().join("a.db")).unwrap();
     std::fs::create_dir(folder.path().join("a.db-wal")).unwrap();
     let output = gaitwright(folder.path(), &["tune", "--database", "a.db"]);
     let text = String::from_utf8_lossy(&output.stderr);

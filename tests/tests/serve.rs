@@ -64,6 +64,16 @@ fn the_first_start_prints_a_link_that_signs_in_once() {
     assert!(!second.head.to_lowercase().contains("set-cookie"), "{}", second.head);
 }
 
+#[test]
+fn logs_are_json_where_that_is_set() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "log_format = \"json\"\n").unwrap();
+    let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    let line: serde_json::Value = serde_json::from_str(process.said.last().unwrap()).unwrap();
+    assert_eq!((&line["level"], &line["fields"]["workers"]), (&"INFO".into(), &1.into()), "{line}");
+    assert!(line["timestamp"].is_string() && line["target"].as_str().unwrap().starts_with("gaitwright"), "{line}");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_term_signal_ends_it_in_order() {
