@@ -8,12 +8,10 @@
 //! between neighbouring points.
 
 use gait_optimizer::gait::MuscleTrajectory;
+use gait_optimizer::metrics::{activation_alternations, alternations};
 use gait_optimizer::settings::Regularisation;
 use gait_optimizer::{CancelToken, Gait, GaitProblem, SolveOptions, Subject, WarmStart, solve};
 use std::error::Error;
-
-/// Steps below this are no alternation.
-const STEP: f64 = 0.005;
 
 fn muscles(gait: &Gait) -> impl Iterator<Item = &MuscleTrajectory> {
     gait.domains.iter().filter_map(|domain| domain.muscles.as_ref())
@@ -35,15 +33,6 @@ fn bend(lines: impl Iterator<Item = Vec<f64>>) -> f64 {
     let squares: Vec<f64> =
         lines.flat_map(|l| l.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2)).collect::<Vec<_>>()).collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
-}
-
-fn steps(line: &[f64]) -> Vec<f64> {
-    line.windows(2).map(|w| w[1] - w[0]).collect()
-}
-
-fn alternations(lines: impl Iterator<Item = Vec<f64>>) -> usize {
-    let alternate = |s: &&[f64]| s[0] * s[1] < 0.0 && s[1] * s[2] < 0.0 && s.iter().all(|step| step.abs() > STEP);
-    lines.map(|line| steps(&line).windows(3).filter(alternate).count()).sum()
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -77,7 +66,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             muscles(&outcome.gait).flat_map(|trajectory| trajectory.activation.iter().flatten().copied()).collect();
         let mean = activations.iter().sum::<f64>() / activations.len().max(1) as f64;
         let activation = |stride| lines(&outcome.gait, |m| &m.activation, stride);
-        let largest_step = activation(1).flat_map(|line| steps(&line)).fold(0.0f64, |a, s| a.max(s.abs()));
+        let largest_step = activation(1)
+            .flat_map(|line| line.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>())
+            .fold(0.0f64, f64::max);
         let r = &outcome.report;
         println!(
             "{name},{:?},{},{:.6},{:.6},{:.4},{mean:.4},{:.5},{:.5},{:.4},{},{},{largest_step:.3}",
@@ -89,8 +80,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             bend(activation(1)),
             bend(activation(2)),
             bend(lines(&outcome.gait, |m| &m.fibre_velocity, 1)),
-            alternations(activation(1)),
-            alternations(activation(2)),
+            activation_alternations(&outcome.gait),
+            activation(2).map(|line| alternations(&line)).sum::<usize>(),
         );
         warm.get_or_insert(outcome.warm_start);
     }

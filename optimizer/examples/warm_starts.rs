@@ -51,7 +51,12 @@ fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Resul
 
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
-    if values.is_empty() { f64::NAN } else { values[values.len() / 2] }
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => f64::NAN,
+        odd if odd % 2 == 1 => values[middle],
+        _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -99,7 +99,8 @@ impl TunedBounds {
     pub fn parse(text: &str) -> Result<Self, ModelError> {
         let mut bounds = Self::default();
         let mut seen: Vec<&str> = Vec::new();
-        for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
+        let items = (!text.trim().is_empty()).then(|| text.split(',').map(str::trim));
+        for item in items.into_iter().flatten() {
             let malformed = |reason: &str| ModelError::Malformed {
                 what: format!("bounds item {item:?}"),
                 reason: reason.to_owned(),

@@ -1,6 +1,7 @@
-//! Figures of a gait: Gait RMSE against a reference.
+//! Figures of a gait: Gait RMSE against a reference, smoothness of its activations.
 
 use crate::gait::Gait;
+use crate::muscle::MUSCLE_COUNT;
 use crate::reference::ReferenceGait;
 
 /// Equidistant times of the stride at which gait and reference are compared.
@@ -29,4 +30,25 @@ pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
     }
     let parts = squares.map(|s| (s / RMSE_SAMPLES as f64).sqrt());
     GaitRmse { total: parts.iter().sum(), parts }
+}
+
+/// A step of an activation below this is no part of an alternation.
+const ALTERNATING_STEP: f64 = 0.005;
+
+/// How often a curve alternates: three steps in a row of changing sign, each above 0.005.
+pub fn alternations(curve: &[f64]) -> usize {
+    let steps: Vec<f64> = curve.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let alternate =
+        |s: &&[f64]| s[0] * s[1] < 0.0 && s[1] * s[2] < 0.0 && s.iter().all(|step| step.abs() > ALTERNATING_STEP);
+    steps.windows(3).filter(alternate).count()
+}
+
+/// How often the muscles' activations alternate from mesh point to mesh point within the domains.
+pub fn activation_alternations(gait: &Gait) -> usize {
+    let muscles = gait.domains.iter().filter_map(|domain| domain.muscles.as_ref());
+    muscles
+        .flat_map(|trajectory| {
+            (0..MUSCLE_COUNT).map(|m| alternations(&trajectory.activation.iter().map(|all| all[m]).collect::<Vec<_>>()))
+        })
+        .sum()
 }

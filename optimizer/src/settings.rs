@@ -209,9 +209,7 @@ pub struct Regularisation {
     /// |v_ce/V|²: without it fibre velocities alternate between points and midpoints.
     pub fibre_velocity: f64,
     /// |s_(k-1) - 2 s_k + s_(k+1)|² of the activations at neighbouring points of a domain: damps their alternation from
-    /// point to point (`examples/activation_smoothness.rs`). Absent from [`GaitSettings::reference_problem`]. 0 where a
-    /// document has other weights but not this one, so that records of versions without it mean what they meant.
-    #[serde(default)]
+    /// point to point (`examples/activation_smoothness.rs`). Absent from [`GaitSettings::reference_problem`].
     pub activation_bend: f64,
 }
 
@@ -286,10 +284,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_document_of_weights_without_a_bend_has_none() {
-        let old = r#"{"regularisation": {"torque": 0.003, "activation": 0.003, "fibre_velocity": 0.01}}"#;
-        assert_eq!(serde_json::from_str::<GaitSettings>(old).unwrap(), GaitSettings::reference_problem());
-        assert_eq!(serde_json::from_str::<GaitSettings>("{}").unwrap(), GaitSettings::default());
+    fn what_is_not_given_has_its_default() {
+        for same in ["{}", r#"{"regularisation": {"torque": 0.003}}"#] {
+            assert_eq!(serde_json::from_str::<GaitSettings>(same).unwrap(), GaitSettings::default(), "{same}");
+        }
+        let reference = r#"{"regularisation": {"activation_bend": 0}}"#;
+        assert_eq!(serde_json::from_str::<GaitSettings>(reference).unwrap(), GaitSettings::reference_problem());
         assert_ne!(GaitSettings::default(), GaitSettings::reference_problem());
     }
 }

@@ -4,9 +4,10 @@
 
 mod golden_gaits;
 
-use gait_optimizer::metrics::gait_rmse;
+use gait_optimizer::gait_problem::gait_of;
+use gait_optimizer::metrics::{activation_alternations, gait_rmse};
 use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
-use golden_gaits::{golden, golden_gait, numbers};
+use golden_gaits::{golden, golden_gait, golden_with, numbers};
 
 #[test]
 fn residuals_of_the_golden_gaits() {
@@ -73,5 +74,30 @@ fn gait_rmse_of_the_golden_gaits() {
         for (ours, theirs) in rmse.parts.iter().zip(numbers(&golden.data["gait_rmse_parts"])) {
             assert!((ours - theirs).abs() < 1e-9, "{ours} {theirs}");
         }
+    }
+}
+
+/// The programme of the golden gaits lets activations alternate from mesh point to mesh point; the default one does not.
+#[test]
+fn activations_do_not_alternate_with_the_default_weights() {
+    for subject in [1, 2] {
+        let (problem, zigzag) = golden_gait(subject, true);
+        assert!(activation_alternations(&zigzag) >= 10, "{}", activation_alternations(&zigzag));
+        let golden = golden_with(&problem.settings, subject, true);
+        let settings = NlpSettings {
+            tolerance: 1e-6,
+            mu_initial: 1e-6 / 11.0,
+            bound_push: 1e-9,
+            bound_fraction: 1e-9,
+            bound_multiplier_start: BoundMultiplierStart::Centred,
+            ..NlpSettings::default()
+        };
+        let result =
+            nlp::solve(&golden.programme, &StartPoint::Cold(golden.x), &settings, &mut |_| {}, &|| false).unwrap();
+        assert_eq!(result.status, NlpStatus::Converged);
+        let gait = gait_of(&problem, &golden.programme, &result.x);
+        assert_eq!(activation_alternations(&gait), 0, "after {} iterations", result.iterations);
+        let theirs = golden.data["obj"].as_f64().unwrap();
+        assert!(result.objective > theirs && result.objective < 1.01 * theirs, "{} {theirs}", result.objective);
     }
 }

@@ -1,4 +1,4 @@
-//! Names that people write: of users, tokens, authors, studies.
+//! What people write: names of users, tokens, authors, studies; notes and reasons.
 
 use crate::error::Error;
 
@@ -21,9 +21,53 @@ pub(crate) fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a
     Ok(trimmed)
 }
 
+/// A note: of more than one line, or nothing.
+///
+/// # Errors
+/// [`Error::Invalid`] for more than `longest` characters, and for characters that neither print nor part lines.
+pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error> {
+    let length = text.chars().count();
+    if length > longest {
+        return Err(Error::invalid(field, length, &format!("at most {longest} characters")));
+    }
+    let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
+    match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {
+        Some(c) => Err(Error::invalid(field, c.escape_unicode().to_string(), "characters that print, and line breaks")),
+        None => Ok(()),
+    }
+}
+
+/// Why something is done: a note that is not empty, without the space around it. `what` follows the allowed range.
+///
+/// # Errors
+/// As [`note`].
+pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a str, Error> {
+    const LONGEST: usize = 2000;
+    let text = text.trim();
+    if text.is_empty() {
+        return Err(Error::invalid(field, text, &format!("1 to {LONGEST} characters{what}")));
+    }
+    note(field, text, LONGEST)?;
+    Ok(text)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::name;
+    use super::{name, note, reason};
+
+    #[test]
+    fn notes_have_lines_but_no_other_control_characters() {
+        for good in ["", "the left foot scuffed\r\n\ttwice", "Ünal-Řehoř"] {
+            note("note", good, 40).unwrap();
+        }
+        for (bad, why) in [("a\0b", "u{0}"), ("a\u{202e}b", "u{202e}"), ("a\u{1b}[1m", "u{1b}"), ("12345678901", "11")]
+        {
+            let refusal = note("note", bad, 10).unwrap_err().to_string();
+            assert!(refusal.contains(why), "{refusal}");
+        }
+        assert_eq!(reason("reason", " scuffed ", "").unwrap(), "scuffed");
+        assert!(reason("reason", " \n", ": why").unwrap_err().to_string().contains("1 to 2000 characters: why"));
+    }
 
     #[test]
     fn what_prints_is_a_name() {

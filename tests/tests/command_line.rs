@@ -47,6 +47,7 @@ fn an_unknown_subject_is_refused_with_the_known_ones() {
 fn malformed_bounds_are_refused_by_name() {
     refused(&["solve", "--bounds", "a9=1"], "unknown value \"a9\"");
     refused(&["solve", "--bounds", "a5"], "expected NAME=VALUE");
+    refused(&["solve", "--bounds", "a1=20,"], "expected NAME=VALUE");
     refused(&["solve", "--bounds", "a5=high"], "the value is not a number");
     refused(&["solve", "--bounds", "a5=0.1,a5=0.2"], "given twice");
     refused(&["solve", "--bounds", "a1=1000"], "a1 = 1000 is outside the allowed range [1, 100]");
@@ -100,10 +101,12 @@ fn a_table_of_actions_is_checked_whole_before_anything_is_solved() {
 #[test]
 fn a_warm_start_file_of_another_kind_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("x.json"), "{\"report\": 3}").unwrap();
-    let output = gaitwright(folder.path(), &["solve", "--warm", "x.json"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("x.json: not a file of `gaitwright solve --out`"));
+    for other in [r#"{"report": 3}"#, "[1, 2, 3, 4]"] {
+        std::fs::write(folder.path().join("x.json"), other).unwrap();
+        let output = gaitwright(folder.path(), &["solve", "--warm", "x.json"]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&output.stderr).contains("x.json: not a file of `gaitwright solve --out`"));
+    }
 }
 
 #[test]

@@ -198,12 +198,12 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
 
     // Elsewhere, where the subject withdraws after a first study came in.
     let other = gaitwright::store::Store::open(&folder.path().join("b.db")).await.unwrap();
-    import(&other, &archives[0]).await.unwrap();
+    import(&other, &archive::open(&archives[0]).unwrap()).await.unwrap();
     other.close().await;
     drop(other);
     let other = Service::start_as_is(&folder.path().join("b.db"), Analytic::default(), 1).await;
     assert_eq!(other.post(&path, &withdraw).await.status, StatusCode::OK);
-    let refused = import(&other.store, &archives[1]).await.unwrap_err().to_string();
+    let refused = import(&other.store, &archive::open(&archives[1]).unwrap()).await.unwrap_err().to_string();
     assert!(refused.contains("withdrew consent") && refused.contains("nothing was changed"), "{refused}");
     other.stop().await;
 }

@@ -71,6 +71,7 @@ async fn subjects_are_made_listed_and_refused() {
         ("pseudonym", json!("jane@example.org"), "no address"),
         ("pseudonym", json!("1980-02-03"), "no date"),
         ("pseudonym", json!(" "), "1 to 40"),
+        ("notes", json!("bell\u{7}"), "characters that print"),
     ] {
         let answer = service.post("/api/v1/subjects", &with(field, value.clone())).await;
         is_problem(&answer, StatusCode::UNPROCESSABLE_ENTITY, invalid, detail);
@@ -217,6 +218,8 @@ async fn preferences_are_given_read_back_and_taken_back() {
     is_problem(&service.post(&path, &itself).await, unprocessable, "/problems/invalid-field", "itself");
     let unknown = json!({"trial_a": converged[0], "trial_b": "01890000-0000-7000-8000-000000000000", "answer": "a"});
     is_problem(&service.post(&path, &unknown).await, StatusCode::NOT_FOUND, "/problems/not-found", "trial");
+    let ghost = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "a", "note": "a\u{0}b"});
+    is_problem(&service.post(&path, &ghost).await, unprocessable, "/problems/invalid-field", "note");
     let neither = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "both"});
     is_problem(&service.post(&path, &neither).await, StatusCode::BAD_REQUEST, "/problems/malformed", "answer");
     let other = finished(&service, 2).await;

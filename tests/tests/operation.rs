@@ -46,13 +46,13 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     let other = Service::start(&folder.path().join("b.db"), Analytic::default(), 1).await;
     let own = other.study(|new| (new.trial_budget, new.seed) = (3, 5)).await;
     other.wait_for(own, &[StudyState::Finished]).await;
-    let refused = import(&other.store, &file).await.unwrap_err().to_string();
+    let refused = import(&other.store, &archive::open(&file).unwrap()).await.unwrap_err().to_string();
     assert!(refused.contains("nothing was changed"), "the pseudonym is taken by another subject there: {refused}");
     other.stop().await;
 
     let fresh = Store::open(&folder.path().join("c.db")).await.unwrap();
-    assert_eq!(import(&fresh, &file).await.unwrap(), study);
-    assert!(import(&fresh, &file).await.unwrap_err().to_string().contains("already"));
+    assert_eq!(import(&fresh, &archive::open(&file).unwrap()).await.unwrap(), study);
+    assert!(import(&fresh, &archive::open(&file).unwrap()).await.unwrap_err().to_string().contains("already"));
     for place in [30, file.len() / 2, file.len() - 1] {
         let mut changed = file.clone();
         changed[place] ^= 1;

@@ -16,7 +16,12 @@ pub(crate) struct Golden {
     pub(crate) data: Value,
 }
 
+/// As a point of the programme that the golden gaits solve.
 pub(crate) fn golden(subject: u32, muscles: bool) -> Golden {
+    golden_with(&GaitSettings::reference_problem(), subject, muscles)
+}
+
+pub(crate) fn golden_with(settings: &GaitSettings, subject: u32, muscles: bool) -> Golden {
     let letter = if muscles { "m" } else { "n" };
     let path = format!("{}/tests/data/golden_s{subject}_{letter}.json", env!("CARGO_MANIFEST_DIR"));
     let data: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
@@ -25,7 +30,7 @@ pub(crate) fn golden(subject: u32, muscles: bool) -> Golden {
         &Device::ampro3().unwrap(),
         &TunedBounds::default(),
         muscles,
-        &GaitSettings::reference_problem(),
+        settings,
         &ReferenceGait::builtin().unwrap(),
     )
     .unwrap();

@@ -88,7 +88,7 @@ impl ProblemFlags {
 
     pub(super) fn warm_start(&self) -> Result<Option<WarmStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let outcome: SolveOutcome = serde_json::from_str(&read(path)?).map_err(|e| {
+        let outcome: SolveOutcome = document::read(read(path)?.as_bytes()).map_err(|e| {
             Error::Malformed(format!("{}: not a file of `gaitwright solve --out`: {e}", path.display()))
         })?;
         Ok(Some(outcome.warm_start))

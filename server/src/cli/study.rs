@@ -2,6 +2,7 @@
 
 use super::record::exists;
 use crate::error::Error;
+use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
 use crate::store::{Store, StoreError, StudyId, archive, backup, commit, consents, events, gaits, studies};
 use crate::studies::choice::best_to_show;
@@ -59,8 +60,10 @@ impl Import {
     pub(super) async fn run(self) -> Result<(), Error> {
         let file = std::fs::read(&self.from)
             .map_err(|e| Error::Malformed(format!("cannot read {}: {e}", self.from.display())))?;
+        // Before a record is made for it.
+        let archive = archive::open(&file).map_err(|e| Error::Malformed(e.to_string()))?;
         let store = Store::open(&self.database).await?;
-        let done = import(&store, &file).await;
+        let done = import(&store, &archive).await;
         store.close().await;
         println!("{}", done?);
         Ok(())
@@ -70,9 +73,8 @@ impl Import {
 /// Writes the study of an archive into a record.
 ///
 /// # Errors
-/// [`Error::Malformed`] for a file that is no whole archive, [`Error::Conflict`] when the study is there.
-pub async fn import(store: &Store, file: &[u8]) -> Result<StudyId, Error> {
-    let archive = archive::open(file).map_err(|e| Error::Malformed(e.to_string()))?;
+/// [`Error::Conflict`] when the study is there or does not fit.
+pub async fn import(store: &Store, archive: &Archive) -> Result<StudyId, Error> {
     let study = archive.study()?;
     let mut writer = store.write().await?;
     match studies::get(&mut writer, study).await {
@@ -80,7 +82,7 @@ pub async fn import(store: &Store, file: &[u8]) -> Result<StudyId, Error> {
         Err(StoreError::Missing { .. }) => {}
         Err(other) => return Err(other.into()),
     }
-    archive::unpack(&mut writer, &archive)
+    archive::unpack(&mut writer, archive)
         .await
         .map_err(|e| Error::conflict(format!("the archive does not fit this record, nothing was changed: {e}")))?;
     let present = studies::get(&mut writer, study).await?;

@@ -31,19 +31,26 @@ pub async fn of_file(from: &Path, to: &Path) -> StoreResult<()> {
 /// [`StoreError::NewerSchema`], [`StoreError::Damaged`] with what the database found.
 pub async fn check(file: &Path) -> StoreResult<()> {
     let pool = open_read_only(file).await?;
-    let found = check_open(&pool, file).await;
+    let found = check_open(&pool).await;
     pool.close().await;
     found
 }
 
-/// A connection to read a file that another process may own.
+/// A connection to read a record that another process may own.
 ///
 /// # Errors
-/// When it cannot be opened.
+/// When it cannot be opened, [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
 pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
     file_kind::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
-    Ok(SqlitePoolOptions::new().max_connections(1).connect_with(options).await?)
+    let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
+    let refusal = match migrations::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error)) {
+        Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it holds no record yet".to_owned() },
+        Ok(_) => return Ok(pool),
+        Err(error) => error,
+    };
+    pool.close().await;
+    Err(refusal)
 }
 
 /// Writes a compact copy to a new file and checks the copy.
@@ -53,11 +60,15 @@ pub(super) async fn into_file(pool: &SqlitePool, to: &Path) -> StoreResult<()> {
         return Err(StoreError::Open { path: to.to_owned(), source });
     }
     sqlx::query("vacuum into ?").bind(to.to_string_lossy().into_owned()).execute(pool).await?;
-    check(to).await
+    let whole = check(to).await;
+    if whole.is_err() {
+        // A copy that is not whole is none.
+        let _ = std::fs::remove_file(to);
+    }
+    whole
 }
 
-async fn check_open(pool: &SqlitePool, file: &Path) -> StoreResult<()> {
-    migrations::check_version(pool, file).await?;
+async fn check_open(pool: &SqlitePool) -> StoreResult<()> {
     let damaged = |reason: String| StoreError::Damaged { what: "database file", reason };
     let integrity: String = sqlx::query("pragma integrity_check").fetch_one(pool).await?.try_get(0)?;
     if integrity != "ok" {

@@ -37,14 +37,19 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
 pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult<i64> {
     let known = FILES[FILES.len() - 1].0;
     let found = version(pool).await?;
-    if found == 0
-        && let Some(table) = sqlx::query("select name from sqlite_master where name not glob '_sqlx*' limit 1")
-            .fetch_optional(pool)
-            .await?
-    {
-        let table: String = table.try_get(0)?;
-        let reason = format!("it is another program's, with a table {table:?}");
-        return Err(StoreError::NotADatabase { path: path.to_owned(), reason });
+    let foreign = |reason| Err(StoreError::NotADatabase { path: path.to_owned(), reason });
+    if found == 0 {
+        // The list of migrations alone is what a process leaves that was killed while it made the file.
+        let other = "select name from sqlite_master where type = 'table' and name not glob '_sqlx*' limit 1";
+        if let Some(row) = sqlx::query(other).fetch_optional(pool).await? {
+            return foreign(format!("it is another program's, with a table {:?}", row.try_get::<String, _>(0)?));
+        }
+    } else {
+        let first = "select description from _sqlx_migrations where version = 1";
+        let first: Option<String> = sqlx::query_scalar(first).fetch_optional(pool).await?;
+        if first.as_deref() != Some(FILES[0].1) {
+            return foreign("it is another program's, with migrations of its own".to_owned());
+        }
     }
     if found > known {
         return Err(StoreError::NewerSchema { path: path.to_owned(), found, known });

@@ -85,6 +85,7 @@ impl Store {
     }
 
     async fn open_owned(path: &Path, owner: File) -> StoreResult<Self> {
+        refuse_unchanged(path).await?;
         let options = SqliteConnectOptions::new()
             .filename(path)
             .create_if_missing(true)
@@ -143,6 +144,22 @@ pub async fn commit(writer: Writer) -> StoreResult<()> {
 /// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].
 pub type Connection = SqliteConnection;
 
+/// Refuses the file of another program, or of a newer version of this one, before a connection that may write touches it.
+async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
+    if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
+        return Ok(());
+    }
+    let options = SqliteConnectOptions::new().filename(path).read_only(true);
+    let Ok(pool) = SqlitePoolOptions::new().max_connections(1).connect_with(options).await else { return Ok(()) };
+    let checked = migrations::check_version(&pool, path).await;
+    pool.close().await;
+    match checked {
+        Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),
+        // What cannot be read without writing, such as a journal to be rolled back, is seen by the next connection.
+        _ => Ok(()),
+    }
+}
+
 /// The file next to the record whose name ends so.
 fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -152,7 +169,8 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 
 /// The locked file, and whether it was made for this.
 fn take_ownership(path: &Path) -> StoreResult<(File, bool)> {
-    let lock = beside(path, ".lock");
+    // One file has one lock, whatever link it is opened through.
+    let lock = beside(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
     let made = !lock.exists();
     let file = OpenOptions::new()
         .create(true)

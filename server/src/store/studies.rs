@@ -6,6 +6,7 @@ use super::{
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
@@ -193,6 +194,16 @@ pub struct Study {
     pub updated_at: Instant,
 }
 
+/// Settings as a study recorded them, with every weight there was. Before there was one on the bend of activations, none
+/// was meant; a new study that does not name it has the default instead.
+fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
+    let mut document: Value = json::from_text("gait_settings", text)?;
+    if let Some(weights) = document.get_mut("regularisation").and_then(Value::as_object_mut) {
+        weights.entry("activation_bend").or_insert_with(|| 0.0.into());
+    }
+    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "gait_settings", reason: e.to_string() })
+}
+
 /// Adds a study.
 ///
 /// # Errors
@@ -369,7 +380,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             device_id: row.try_get("device_id")?,
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,
-            gait_settings: json::column(row, "gait_settings")?,
+            gait_settings: recorded_settings(row.try_get("gait_settings")?)?,
             solve_options: json::column(row, "solve_options")?,
             base_bounds: json::column(row, "base_bounds")?,
             search_space: json::column(row, "search_space")?,
@@ -390,4 +401,18 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
         created_at: row.try_get("created_at")?,
         updated_at: row.try_get("updated_at")?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_of_before_the_weight_on_bends_mean_none() {
+        let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
+            "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
+        assert_eq!(recorded_settings(old).unwrap(), GaitSettings::reference_problem());
+        let new = serde_json::to_string(&GaitSettings::default()).unwrap();
+        assert_eq!(recorded_settings(&new).unwrap(), GaitSettings::default());
+    }
 }

@@ -62,9 +62,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
         return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
     }
     let author = printable::name("author", answer.author.as_deref().unwrap_or(&caller.name), 80)?;
-    if answer.note.chars().count() > 2000 {
-        return Err(Error::invalid("note", answer.note.chars().count(), "at most 2000 characters"));
-    }
+    printable::note("note", &answer.note, 2000)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
     let said = match answer.answer {
         Verdict::A => Said::Preference { winner: a, loser: b },
@@ -116,10 +114,7 @@ pub async fn retract(
         return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = reason.trim();
-    if reason.is_empty() || reason.chars().count() > 2000 {
-        return Err(Error::invalid("reason", reason, "1 to 2000 characters: why it is taken back"));
-    }
+    let reason = printable::reason("reason", reason, ": why it is taken back")?;
     if !feedback::retract(writer, &row, author, reason).await? {
         return Err(Error::conflict("this answer was taken back already"));
     }
@@ -129,8 +124,12 @@ pub async fn retract(
     Ok(feedback::get(writer, id).await?)
 }
 
-async fn comparable(writer: &mut Writer, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
-    let trial = trials::get(writer, id).await?;
+/// A trial of the study whose gait converged; `field` named it.
+///
+/// # Errors
+/// [`Error::NotFound`], or [`Error::Invalid`] for a trial of another study and for one without a gait.
+pub async fn comparable(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
+    let trial = trials::get(db, id).await?;
     if trial.study_id != study {
         return Err(Error::invalid(field, id.to_string(), "a trial of this study"));
     }

@@ -3,6 +3,7 @@
 use super::lifecycle::{self, Act};
 use super::plan;
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::studies::{FeedbackMode, Limits, Study, StudyState};
 use crate::store::{StudyId, Writer, events, studies};
@@ -36,8 +37,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
     let study = studies::get(writer, id).await?;
     let name = match change.name.as_deref().map(str::trim) {
         None => study.plan.name.clone(),
-        Some(name) if (1..=120).contains(&name.chars().count()) => name.to_owned(),
-        Some(name) => return Err(Error::invalid("name", name, "1 to 120 characters")),
+        Some(name) => printable::name("name", name, 120)?.to_owned(),
     };
     let limits = Limits {
         name,

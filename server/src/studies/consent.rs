@@ -2,6 +2,7 @@
 
 use super::command;
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::consents::{self, Consent, ConsentKind};
 use crate::store::{SubjectId, TrialId, Writer, studies, subjects};
@@ -30,7 +31,7 @@ pub struct Withdrawal {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field.
 pub async fn give(writer: &mut Writer, actor: &Actor, id: SubjectId, new: &NewConsent) -> Result<Consent, Error> {
-    let form = checked("form", &new.form)?;
+    let form = printable::reason("form", &new.form, "")?;
     subjects::get(writer, id).await?;
     let row = consents::append(writer, id, ConsentKind::Given, form, actor).await?;
     audit::append(writer, actor, "subject.consent", &format!("subject {id}"), &json!({ "form": form })).await?;
@@ -48,7 +49,7 @@ pub async fn withdraw(
     id: SubjectId,
     why: &Withdrawal,
 ) -> Result<(Consent, Vec<TrialId>), Error> {
-    let reason = checked("reason", &why.reason)?;
+    let reason = printable::reason("reason", &why.reason, "")?;
     subjects::get(writer, id).await?;
     let before = consents::of_subject(writer, id).await?;
     if before.last().is_some_and(|last| last.kind == ConsentKind::Withdrawn) {
@@ -63,12 +64,4 @@ pub async fn withdraw(
     let detail = json!({ "reason": reason, "stopped": stopped });
     audit::append(writer, actor, "subject.withdraw", &format!("subject {id}"), &detail).await?;
     Ok((row, cancelled))
-}
-
-fn checked<'a>(field: &str, text: &'a str) -> Result<&'a str, Error> {
-    let text = text.trim();
-    if text.is_empty() || text.chars().count() > 2000 {
-        return Err(Error::invalid(field, text.chars().count(), "1 to 2000 characters"));
-    }
-    Ok(text)
 }

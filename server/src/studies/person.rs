@@ -1,6 +1,7 @@
 //! Adding a subject: one way in for the form and the REST interface.
 
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::subjects::{self, PSEUDONYM_UNIQUE, Subject};
 use crate::store::{OnConstraint, Writer};
@@ -32,9 +33,7 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result
     let pseudonym = new.pseudonym.trim();
     check_pseudonym(pseudonym)?;
     let body = Body::new(new.height_m, new.body_mass_kg)?;
-    if new.notes.chars().count() > 4000 {
-        return Err(Error::invalid("notes", new.notes.chars().count(), "at most 4000 characters"));
-    }
+    printable::note("notes", &new.notes, 4000)?;
     let subject = subjects::insert(writer, pseudonym, body, &new.notes)
         .await
         .on_constraint(PSEUDONYM_UNIQUE, || Error::conflict(format!("there is a subject {pseudonym:?} already")))?;

@@ -8,6 +8,7 @@ use super::comparison::{by_gait_rmse, partners};
 use super::standing::Standing;
 use crate::access::Caller;
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit;
 use crate::store::feedback::{Said, Source, Voice};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
@@ -41,9 +42,7 @@ pub enum Suggestion {
 /// # Errors
 /// [`Error::Conflict`] when the study gives out no trial now, [`Error::Invalid`] for the worker's name.
 pub async fn suggest(db: &mut Connection, study: StudyId, worker: &str) -> Result<Suggestion, Error> {
-    if worker.trim().is_empty() || worker.chars().count() > 80 {
-        return Err(Error::invalid("worker", worker, "1 to 80 characters"));
-    }
+    let worker = printable::name("worker", worker, 80)?;
     let study = studies::get(db, study).await?;
     if study.plan.evaluation != Evaluation::Script {
         return Err(Error::conflict(
@@ -183,9 +182,7 @@ pub async fn hear(db: &mut Connection, id: TrialId, tell: &Tell) -> Result<Heard
 
 fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
     let reason = tell.reason.trim();
-    if reason.chars().count() > 2000 {
-        return Err(Error::invalid("reason", reason.chars().count(), "at most 2000 characters"));
-    }
+    printable::note("reason", reason, 2000)?;
     for (field, value) in [("gait_rmse_rad", tell.gait_rmse_rad), ("cost_of_transport", tell.cost_of_transport)] {
         if value.is_some_and(|value| !(0.0..1e6).contains(&value)) {
             return Err(Error::invalid(field, json!(value), "0 to 1e6"));

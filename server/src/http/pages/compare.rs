@@ -15,7 +15,7 @@ use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
 use crate::store::{
-    FeedbackId, StoreError, StudyId, TrialId, commit, feedback, gaits, reference_gaits, studies, trials,
+    Connection, FeedbackId, StoreError, StudyId, TrialId, commit, feedback, gaits, reference_gaits, studies, trials,
 };
 use crate::studies::answer::{self, Answer, Verdict};
 use crate::studies::choice::MANY;
@@ -107,6 +107,9 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         .filter(|trial| trial.state == TrialState::Converged)
         .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
         .collect();
+    if refused.is_none() {
+        check(&mut reader, id, &choice).await?;
+    }
     let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
     let (a, b) = match (choice.a, choice.b, question) {
         (Some(a), Some(b), _) => (Some(a), Some(b)),
@@ -142,6 +145,19 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         })
     });
     page(&ComparePage { study: standing.study, trials, a, b, charts, key: FeedbackId::fresh(), saved, typed, refused })
+}
+
+/// Refuses what the address asks to compare and cannot be compared.
+async fn check(reader: &mut Connection, study: StudyId, choice: &Choice) -> Result<(), Error> {
+    for (field, trial) in [("a", choice.a), ("b", choice.b)] {
+        if let Some(trial) = trial {
+            answer::comparable(reader, study, field, trial).await?;
+        }
+    }
+    if choice.a.is_some() && choice.a == choice.b {
+        return Err(Error::invalid("b", choice.b.map(|b| b.to_string()), "another trial than a"));
+    }
+    Ok(())
 }
 
 /// The form as typed, so that a refused one comes back as it was.

@@ -4,6 +4,7 @@ use super::draw::draw;
 use super::{skipped_pairs, unsafe_trials};
 use crate::access::{Caller, secret};
 use crate::error::Error;
+use crate::printable;
 use crate::store::audit;
 use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
@@ -126,9 +127,7 @@ pub async fn answer(
     if given.answer == Said::Withdrawn {
         return Err(Error::invalid("answer", "withdrawn", "what a rater can say"));
     }
-    if given.note.chars().count() > 2000 {
-        return Err(Error::invalid("note", given.note.chars().count(), "at most 2000 characters"));
-    }
+    printable::note("note", &given.note, 2000)?;
     if given.response_ms.is_some_and(|ms| ms < 0) {
         return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));
     }
@@ -193,10 +192,7 @@ pub async fn unblind(
 ) -> Result<Vec<Presentation>, Error> {
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
-    let reason = reason.trim();
-    if reason.is_empty() || reason.chars().count() > 2000 {
-        return Err(Error::invalid("reason", reason, "1 to 2000 characters: why blindness ends"));
-    }
+    let reason = printable::reason("reason", reason, ": why blindness ends")?;
     let mut shown = presentations::of_study(writer, study).await?;
     shown.retain(|shown| shown.rater == rater);
     if shown.is_empty() {
