@@ -128,6 +128,8 @@ async fn browser_pages_fit_a_tablet_and_a_phone() {
         format!("/studies/{study}"),
         format!("/studies/{study}/compare"),
         format!("/trials/{trial}"),
+        "/subjects".into(),
+        format!("/subjects/{}", site.service.subject().await),
     ] {
         let page = browser.open(&format!("{}{path}", site.origin)).await;
         for width in [1280, 768, 360] {

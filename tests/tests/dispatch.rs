@@ -180,7 +180,7 @@ async fn a_result_that_is_brought_twice(mut rig: Rig) {
         engine: rig.engine(Worker::Steady).await,
         change: Change::Twice,
         held: Mutex::default(),
-        once: AtomicBool::new(true),
+        holds_back: AtomicBool::new(false),
     };
     let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
     let study = started(&service).await;
@@ -193,7 +193,7 @@ async fn a_result_that_comes_late(mut rig: Rig) {
         engine: rig.engine(Worker::Steady).await,
         change: Change::Late,
         held: Mutex::default(),
-        once: AtomicBool::new(true),
+        holds_back: AtomicBool::new(true),
     };
     let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
     let study = started(&service).await;
@@ -267,39 +267,39 @@ struct Changed {
     engine: Arc<dyn Dispatch>,
     change: Change,
     held: Mutex<VecDeque<News>>,
-    /// Nothing was held back yet.
-    once: AtomicBool,
+    /// What is held waits until another attempt is under way.
+    holds_back: AtomicBool,
 }
 
 impl Changed {
     async fn changed(&self) -> News {
         loop {
-            if matches!(self.change, Change::Twice)
+            if !self.holds_back.load(Ordering::SeqCst)
                 && let Some(news) = self.held.lock().unwrap().pop_front()
             {
                 return news;
             }
             let news = self.engine.next().await;
-            match (self.change, &news) {
-                (Change::Twice, News::Ended { attempt, worker, finding, .. }) => {
-                    let (worker, finding, receipt) = (worker.clone(), finding.clone(), Receipt::not_needed());
-                    let again = News::Ended { attempt: *attempt, worker, finding, receipt };
-                    self.held.lock().unwrap().push_back(again);
+            let attempt = match &news {
+                News::Started { attempt, .. } | News::Iterated { attempt, .. } | News::Ended { attempt, .. } => {
+                    *attempt
                 }
-                (Change::Late, News::Ended { attempt, .. })
-                    if attempt.number == 1 && self.once.load(Ordering::SeqCst) =>
-                {
-                    // A broker brings what is not signed for again.
-                    let mut held = self.held.lock().unwrap();
+            };
+            let mut held = self.held.lock().unwrap();
+            match (self.change, &news) {
+                (Change::Twice, News::Ended { worker, finding, .. }) => {
+                    let (worker, finding, receipt) = (worker.clone(), finding.clone(), Receipt::not_needed());
+                    held.push_back(News::Ended { attempt, worker, finding, receipt });
+                }
+                (Change::Late, News::Ended { .. }) if attempt.number == 1 && self.holds_back.load(Ordering::SeqCst) => {
+                    // A broker brings again what is not signed for.
                     held.clear();
                     held.push_back(news);
                     continue;
                 }
-                (Change::Late, News::Iterated { attempt, .. }) if attempt.number == 2 => {
-                    let late = self.held.lock().unwrap().pop_front();
-                    self.once.fetch_and(late.is_none(), Ordering::SeqCst);
-                    // The iteration that is left out for it is missed by nobody.
-                    return late.unwrap_or(news);
+                (Change::Late, _) if attempt.number == 2 && self.holds_back.swap(false, Ordering::SeqCst) => {
+                    held.push_back(news);
+                    continue;
                 }
                 _ => {}
             }

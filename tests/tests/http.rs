@@ -306,6 +306,17 @@ async fn a_study_is_paused_resumed_and_stopped_and_refuses_what_makes_no_sense()
 }
 
 #[tokio::test]
+async fn a_reason_without_end_is_refused() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| new.start = false).await;
+    let path = format!("/api/v1/studies/{study}/start");
+    let refused = service.post(&path, &json!({"reason": "x".repeat(2001)})).await;
+    is_problem(&refused, StatusCode::UNPROCESSABLE_ENTITY, "/problems/invalid-field", "reason");
+    assert_eq!(service.post(&path, &json!({"reason": "x".repeat(2000)})).await.status, StatusCode::OK);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn a_trial_is_cancelled_and_run_again() {
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(std::time::Duration::from_millis(20));

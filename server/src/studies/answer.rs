@@ -39,9 +39,11 @@ pub struct Answer {
     pub source: Option<Source>,
     /// Name or pseudonym of who says so; by default the name of the caller.
     #[serde(default)]
+    #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
     /// Free text.
     #[serde(default)]
+    #[schema(max_length = 2000)]
     pub note: String,
 }
 

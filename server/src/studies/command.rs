@@ -21,8 +21,12 @@ pub struct Done {
 /// Does it, if it is possible where the study stands.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Conflict`] with what is possible instead.
+/// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long, or [`Error::Conflict`] with what is possible
+/// instead.
 pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
+    if reason.chars().count() > 2000 {
+        return Err(Error::invalid("reason", reason.chars().count(), "at most 2000 characters"));
+    }
     let study = studies::get(writer, id).await?;
     let cancelled = if act == Act::Stop {
         stop(writer, &study, reason).await?

@@ -15,6 +15,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 pub struct NewConsent {
     /// Which version of which form.
+    #[schema(min_length = 1, max_length = 2000)]
     pub form: String,
 }
 
@@ -23,6 +24,7 @@ pub struct NewConsent {
 #[serde(deny_unknown_fields)]
 pub struct Withdrawal {
     /// Why, as far as the subject says.
+    #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
 }
 

@@ -15,13 +15,17 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 pub struct NewSubject {
     /// Site-given pseudonym: never a name.
+    #[schema(min_length = 1, max_length = 40)]
     pub pseudonym: String,
     /// Body height, m.
+    #[schema(minimum = 1.4, maximum = 2.2)]
     pub height_m: f64,
     /// Body mass, kg.
+    #[schema(minimum = 35, maximum = 160)]
     pub body_mass_kg: f64,
     /// Free text.
     #[serde(default)]
+    #[schema(max_length = 4000)]
     pub notes: String,
 }
 

@@ -127,6 +127,7 @@ pub struct Tell {
     pub outcome: Outcome,
     /// Why not: required when there is none, 1 to 2000 characters.
     #[serde(default)]
+    #[schema(max_length = 2000)]
     pub reason: String,
     /// Gait RMSE, rad: required for a gait when Gait RMSE answers the comparisons.
     #[serde(default)]

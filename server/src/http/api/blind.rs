@@ -167,6 +167,7 @@ pub(super) struct Unblind {
     /// The rater.
     rater: String,
     /// Why: 1 to 2000 characters.
+    #[schema(min_length = 1, max_length = 2000)]
     reason: String,
 }
 

@@ -143,6 +143,7 @@ pub(super) async fn create(
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Retract {
+    #[schema(min_length = 1, max_length = 2000)]
     reason: String,
     /// By default the name of the caller.
     #[serde(default)]

@@ -129,6 +129,7 @@ pub(super) async fn create(
 pub(super) struct Why {
     /// At most 2000 characters; may be left out.
     #[serde(default)]
+    #[schema(max_length = 2000)]
     reason: String,
 }
 

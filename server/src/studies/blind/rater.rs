@@ -29,6 +29,7 @@ pub struct RaterAnswer {
     pub response_ms: Option<i64>,
     /// Free text, at most 2000 characters.
     #[serde(default)]
+    #[schema(max_length = 2000)]
     pub note: String,
 }
 
