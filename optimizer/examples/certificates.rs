@@ -56,6 +56,14 @@ fn print(certificate: &Certificate, all: bool) {
             map.fixed_point_distance, map.fixed_point_residual
         );
     }
+    if let Some(map) = &certificate.free_hip_return_map {
+        println!(
+            "   hip velocity left alone: largest {:.6} (variational), {:.6} (differences), relative difference {:.1e}",
+            map.largest,
+            map.largest_by_differences,
+            map.disagreement()
+        );
+    }
     if let Some(pushes) = certificate.pushes {
         println!(
             "   pushes recovered: {:.2} m/s forwards, {:.2} m/s backwards",

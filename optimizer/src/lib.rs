@@ -9,6 +9,7 @@ pub mod bounds;
 pub mod certificate;
 pub mod cold_start;
 pub mod device;
+pub mod emg;
 pub mod explanation;
 pub mod export;
 pub mod gait;
@@ -20,6 +21,7 @@ pub mod reference;
 pub mod settings;
 pub mod solve;
 pub mod subject;
+mod table;
 pub mod walking;
 
 pub use bounds::TunedBounds;

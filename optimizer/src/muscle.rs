@@ -1,7 +1,9 @@
 //! Hill-type muscle-tendon units (Geyer & Herr 2010) and their attachment to the walker.
 
 pub mod curves;
+pub mod parameters;
 pub mod unit;
 
 pub use curves::{CurveValue, force_length, force_velocity, tendon_force};
+pub use parameters::{MuscleOverride, MuscleParameters};
 pub use unit::{Attachment, MUSCLE_COUNT, MUSCLES, Muscle};

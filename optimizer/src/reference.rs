@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 mod matching;
 mod recording;
 mod strides;
-mod table;
 
 pub use matching::{distance, nearest};
 pub use recording::{AngleUnit, Recording};

@@ -1,5 +1,10 @@
 //! Settings of the gait problem that are not tuned by the learner: mesh, limits, objective weights.
 
+mod naturalness;
+
+pub use naturalness::Naturalness;
+
+use crate::muscle::MuscleParameters;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
@@ -258,6 +263,12 @@ pub struct GaitSettings {
     pub limits: GaitLimits,
     /// Regularisation of the objective.
     pub regularisation: Regularisation,
+    /// Wishes beyond the paper.
+    #[serde(skip_serializing_if = "Naturalness::is_off")]
+    pub naturalness: Naturalness,
+    /// How the subject's muscles differ from the published table.
+    #[serde(skip_serializing_if = "MuscleParameters::is_published")]
+    pub muscles: MuscleParameters,
 }
 
 impl GaitSettings {
@@ -274,7 +285,9 @@ impl GaitSettings {
     pub fn validate(&self) -> Result<(), ModelError> {
         self.mesh.validate()?;
         self.limits.validate()?;
-        self.regularisation.validate()
+        self.regularisation.validate()?;
+        self.naturalness.validate()?;
+        self.muscles.validate()
     }
 }
 
@@ -291,5 +304,17 @@ mod tests {
         let reference = r#"{"regularisation": {"activation_bend": 0}}"#;
         assert_eq!(serde_json::from_str::<GaitSettings>(reference).unwrap(), GaitSettings::reference_problem());
         assert_ne!(GaitSettings::default(), GaitSettings::reference_problem());
+    }
+
+    #[test]
+    fn what_is_off_is_not_written() {
+        let text = serde_json::to_string(&GaitSettings::default()).unwrap();
+        assert!(!text.contains("naturalness") && !text.contains("muscles"), "{text}");
+        let wished: GaitSettings = serde_json::from_str(r#"{"naturalness": {"trailing_load_share": 0.3}}"#).unwrap();
+        let again: GaitSettings = serde_json::from_str(&serde_json::to_string(&wished).unwrap()).unwrap();
+        assert_eq!(wished, again);
+        let refused: GaitSettings = serde_json::from_str(r#"{"naturalness": {"reference_weight": -1}}"#).unwrap();
+        let refusal = refused.validate().unwrap_err().to_string();
+        assert_eq!(refusal, "naturalness.reference_weight = -1 is outside the allowed range [0, 100]");
     }
 }

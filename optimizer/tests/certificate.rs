@@ -30,6 +30,10 @@ fn golden_gaits_pass() {
         if map.largest > 1e-5 {
             assert!(map.disagreement() < 1e-3, "{} {}", map.largest, map.largest_by_differences);
         }
+        let free = certificate.free_hip_return_map.unwrap();
+        // With the hip velocity left alone the speed is what is left of a disturbance: stable, and no accident of rounding.
+        assert!((0.3..0.9).contains(&free.largest), "{}", free.largest);
+        assert!(free.disagreement() < 1e-5, "{} {}", free.largest, free.largest_by_differences);
         let pushes = certificate.pushes.unwrap();
         assert!(pushes.forwards_m_s > 0.05 && pushes.backwards_m_s > 0.05, "{pushes:?}");
         let orbit = certificate.checks.iter().find(|c| c.name.starts_with("orbit error, angles")).unwrap();

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
 use gait_optimizer::explanation::explain;
+use gait_optimizer::gait::{Axis, Side};
+use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{
     CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
@@ -39,6 +41,35 @@ fn cold_then_warm() {
     assert_eq!((warm.report.status, warm.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
     assert!(warm.report.iterations < report.iterations, "{} {}", warm.report.iterations, report.iterations);
     assert!(warm.report.attempts.iter().map(|a| a.chosen).eq([true]));
+}
+
+/// The force under the trailing toe at the first and last point of a double-support domain, N.
+fn trailing_force(outcome: &SolveOutcome, domain: usize) -> (f64, f64) {
+    let domain = &outcome.gait.domains[domain];
+    let row = domain.contact_rows.iter().position(|r| r.axis == Axis::Z && r.side == Side::Left).unwrap();
+    let forces = &domain.contact_forces;
+    (forces[0][row], forces.last().unwrap()[row])
+}
+
+#[test]
+fn wishes_beyond_the_paper_are_met() {
+    let mut wished = problem("");
+    wished.settings.naturalness = Naturalness { reference_weight: 0.1, trailing_load_share: 0.4 };
+    let found = solved(&wished, Some(&COLD.warm_start), 400);
+    assert_eq!(found.report.status, SolveStatus::Converged);
+    assert!(found.report.gait_rmse_rad < COLD.report.gait_rmse_rad, "nearer to the reference");
+    assert!(found.report.cost_of_transport > COLD.report.cost_of_transport, "nothing is for free");
+    // 0.4 of the weight of the first subject with the device at heel strike, half of it at the end of DS2, nothing at
+    // toe-off.
+    let load = 0.4 * 73.15 * 9.81;
+    let (ds2, ds3) = (trailing_force(&found, 0), trailing_force(&found, 1));
+    assert!(ds2.0 > 0.999 * load && ds2.1 > 0.499 * load && ds3.0 > 0.499 * load, "{ds2:?} {ds3:?} {load}");
+    assert!(ds3.1.abs() < 1e-3, "{ds3:?}");
+    let free = (trailing_force(&COLD, 0), trailing_force(&COLD, 1));
+    assert!(
+        free.0.1 < 0.5 * load || free.1.0 < 0.5 * load,
+        "the weight changes feet early where it may: {free:?} {load}"
+    );
 }
 
 /// No posture meets these bounds, so the convex part of a cold start has no solution. The gait problem is tried all the

@@ -79,7 +79,7 @@ impl Service {
         let director = Director::new(store.clone(), engine, None);
         let work = tokio::spawn({
             let director = director.clone();
-            async move { director.run().await.unwrap() }
+            async move { Box::pin(director.run()).await.unwrap() }
         });
         Self { store, director, access: Arc::new(Access::without_sign_in()), work }
     }

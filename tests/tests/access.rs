@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 26] = [
+const PAGES: [(&str, Option<Right>); 29] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -137,6 +137,9 @@ const PAGES: [(&str, Option<Right>); 26] = [
     ("post /subjects/{id}/withdraw", Some(Right::Run)),
     ("get /trials/{id}", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),
+    ("get /references", Some(Right::Read)),
+    ("post /references", Some(Right::Run)),
+    ("get /references/{id}", Some(Right::Read)),
     ("get /rate", Some(Right::Rate)),
     ("post /rate/{id}", Some(Right::Rate)),
     ("get /rate/pair/{token}", Some(Right::Rate)),

@@ -102,6 +102,15 @@ async fn a_trial_gets_its_certificate_once() {
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     assert!(page.contains("has not been examined yet") && page.contains("Examine it"), "{page}");
 
+    let motion = service.fetch(&format!("/api/v1/trials/{}/gait.mot?rate_hz=100", trial.id)).await;
+    assert!(motion.text.contains("inDegrees=yes") && motion.text.contains("knee_angle_l"), "{}", motion.text);
+    let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
+    assert_eq!(ControllerFile::from_json(&controller.text).unwrap().domains.len(), 8);
+    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("controller-"));
+    let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json?rate_hz=1", trial.id)).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+    assert!(refused.text.contains("rate_hz") && page.contains("/controller.json"), "{}", refused.text);
+
     let made = service.post(&address, &json!({})).await;
     assert_eq!(made.status, StatusCode::OK, "{}", made.text);
     let certificate = made.json();

@@ -202,6 +202,7 @@ async fn what_is_answered_has_the_properties_that_the_description_names() {
         ("/devices/{id}", &device),
         ("/reference-gaits", ""),
         ("/reference-gaits/{id}", &reference),
+        ("/subjects/{id}/reference-gaits", &subject),
         ("/studies", ""),
         ("/studies/{id}", &study),
         ("/studies/{id}", &script),

@@ -48,13 +48,13 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn who_thinks_long_gets_the_same_trials_and_does_not_wait_for_them() {
-    let (at_once, _) = tuned(Duration::ZERO).await;
-    let (thoughtful, workers) = tuned(Duration::from_millis(1500)).await;
+    let (at_once, _) = Box::pin(tuned(Duration::ZERO)).await;
+    let (thoughtful, workers) = Box::pin(tuned(Duration::from_millis(1500))).await;
     assert_eq!(at_once.len(), 7);
     assert_eq!(thoughtful, at_once);
     assert!(workers.iter().any(|worker| worker == "prepared"), "{workers:?}");
     // Somewhere in the middle of a solve, which goes on for the trial that asks for it.
-    assert_eq!(tuned(Duration::from_millis(60)).await.0, at_once);
+    assert_eq!(Box::pin(tuned(Duration::from_millis(60))).await.0, at_once);
 }
 
 #[tokio::test(flavor = "multi_thread")]

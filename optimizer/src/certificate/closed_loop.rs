@@ -3,7 +3,7 @@
 use super::check::{Check, Place, Quantity, Worst};
 use super::control::{State, split};
 use super::hybrid_walker::{Fall, HybridWalker, Passage};
-use super::limits::{Limits, depth_below_ground};
+use super::limits::{CONTACT_THRESHOLD_N, FRICTION_THRESHOLD_N, Limits, depth_below_ground};
 use crate::body::PointState;
 use crate::gait::Gait;
 use crate::gait::motion::instant;
@@ -14,9 +14,10 @@ pub const STRIDES: usize = 20;
 
 const ORBIT_ANGLE: Quantity = Quantity::judged("orbit error, angles", "rad", 5e-3);
 const ORBIT_RATE: Quantity = Quantity::judged("orbit error, rates", "rad/s", 0.05);
-// Contact may be crossed by what a force plate does not resolve, 3 % of a light walker's weight.
-const NORMAL_FORCE: Quantity = Quantity::judged("unilateral contact", "N", 20.0);
-const FRICTION: Quantity = Quantity::judged("friction cone", "N", 20.0);
+// The optimum unloads the trailing foot wholly, at the edge of contact and friction: the simulated one crosses it by the
+// mesh error. It may, as far as nobody could tell that foot from one in the air.
+const NORMAL_FORCE: Quantity = Quantity::judged("unilateral contact", "N", CONTACT_THRESHOLD_N);
+const FRICTION: Quantity = Quantity::judged("friction cone", "N", FRICTION_THRESHOLD_N);
 const TORQUE: Quantity = Quantity::judged("torques", "N m", 5.0);
 const ANGLE: Quantity = Quantity::judged("joint angles", "rad", 0.01);
 const SPEED: Quantity = Quantity::judged("velocities", "rad/s", 0.2);

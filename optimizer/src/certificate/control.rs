@@ -1,7 +1,7 @@
 //! The walker of one domain under feedback linearisation: accelerations, and their derivatives by the state.
 //!
 //! At a state the controller asks for `e'' = -2 eps e' - eps^2 e` of the outputs and, where the hip velocity is one, for
-//! `dp'' = -eps (dp' - v_hip)`. Contacts and outputs fix all nine accelerations in the fully actuated domains, whatever
+//! `dp'' = -eps (dp' - v_hip)`, or leaves the hip velocity alone, `dp'' = 0`. Contacts and outputs fix all nine accelerations in the fully actuated domains, whatever
 //! the torques; with one foot on the ground the three equations of motion without a torque (hip point and torso) give
 //! the contact forces too, and in SS1 the ninth acceleration. The torques follow ([`super::torques`]).
 
@@ -41,6 +41,8 @@ pub(super) struct Control<'a> {
     pub(super) contacts: Vec<Contact>,
     pub(super) constraints: VirtualConstraints,
     pub(super) guard: Guard,
+    /// How fast the hip velocity is brought back where it is an output, 1/s; 0: left alone.
+    pub(super) hip_gain: f64,
     /// Duration in the gait, s.
     pub(super) nominal_duration: f64,
 }
@@ -70,6 +72,7 @@ impl<'a> Control<'a> {
             contacts: Contact::of_domain(model, domain),
             constraints: VirtualConstraints::new(model, gait, d),
             guard: Guard::new(model, domain),
+            hip_gain: BANDWIDTH,
             nominal_duration: gait.domains[d].duration_s,
         }
     }
@@ -113,7 +116,7 @@ impl<'a> Control<'a> {
             for (angle, slope) in constraints.gradient.iter().enumerate() {
                 a[(row, 2 + angle)] = *slope;
             }
-            b[row] = -BANDWIDTH * (constraints.hip(&q, &qd, &[0.0; 9])[1] - wanted);
+            b[row] = -self.hip_gain * (constraints.hip(&q, &qd, &[0.0; 9])[1] - wanted);
             row += 1;
         }
         let forces = self.decided_forces();
@@ -202,7 +205,7 @@ impl<'a> Control<'a> {
         }
         if constraints.hip_velocity.is_some() {
             for (angle, slope) in constraints.gradient.iter().enumerate() {
-                by_state[(row, 11 + angle)] = BANDWIDTH * slope;
+                by_state[(row, 11 + angle)] = self.hip_gain * slope;
             }
             row += 1;
         }

@@ -93,6 +93,15 @@ impl<'a> HybridWalker<'a> {
         Self { tolerance, ..self.clone() }
     }
 
+    /// The same whose hip velocity nobody brings back: where it is an output, the controller keeps whatever it is.
+    pub(super) fn with_free_hip_velocity(&self) -> Self {
+        let mut walker = self.clone();
+        for control in &mut walker.controls {
+            control.hip_gain = 0.0;
+        }
+        walker
+    }
+
     /// One domain from a state to its event and through the reset.
     pub(super) fn passage(&self, d: usize, start: &State, watch: Watch<'_>) -> Result<Passage, Fall> {
         let control = &self.controls[d];

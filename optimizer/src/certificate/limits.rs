@@ -5,6 +5,11 @@ use crate::body::{PointState, WalkerModel};
 use crate::gait::{Axis, FootPoint, Gait, Side};
 use crate::walking::{ContactRow, Domain};
 
+/// A gait laboratory takes a foot to be on the ground from this vertical force on; less decides nothing, N.
+pub(super) const CONTACT_THRESHOLD_N: f64 = 20.0;
+/// What that force carries by friction (coefficient 0.6), N.
+pub(super) const FRICTION_THRESHOLD_N: f64 = 12.0;
+
 /// Ranges of the walker's coordinates, velocities and torques.
 #[derive(Debug, Clone)]
 pub(super) struct Limits {

@@ -4,7 +4,7 @@ use super::check::{Place, Quantity, Worst};
 use super::residuals::{Findings, GridPoint, Measured};
 use crate::gait::MuscleTrajectory;
 use crate::gait::motion::MuscleInstant;
-use crate::muscle::{MUSCLES, force_length, force_velocity, tendon_force};
+use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
 
 const FORCE: Measured = Measured::new("C5-C7 fibre and tendon in equilibrium", "F_max", 1e-6, None);
 const VELOCITY: Measured = Measured::new("C8 fibre velocity", "l_opt/s", 1e-4, Some(0.5));
@@ -13,10 +13,15 @@ const RANGE: Measured = Measured::new("C5-C8 activations, fibre lengths and velo
 const RESET: Quantity = Quantity::judged("C8 continuity of fibre lengths", "l_opt", 1e-6);
 
 /// Measures one grid point.
-pub(super) fn note(point: &GridPoint<'_>, muscles: &MuscleInstant, worst: &mut Findings) {
+pub(super) fn note(
+    point: &GridPoint<'_>,
+    table: &[Muscle; MUSCLE_COUNT],
+    muscles: &MuscleInstant,
+    worst: &mut Findings,
+) {
     let (mut force_error, mut velocity_error, mut excess) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
     let mut torque = [0.0; 4];
-    for (m, muscle) in MUSCLES.iter().enumerate() {
+    for (m, muscle) in table.iter().enumerate() {
         let (length, velocity) = (muscles.fibre_length[m], muscles.fibre_velocity[m]);
         let tendon = muscle.unit_length(&point.instant.q) - length * muscle.optimal_length_m;
         let pulled = tendon_force(tendon / muscle.slack_length_m - 1.0).value;

@@ -2,7 +2,7 @@
 
 use super::check::{Check, Place, Quantity, Worst};
 use super::contact::Contact;
-use super::limits::{Limits, depth_below_ground};
+use super::limits::{FRICTION_THRESHOLD_N, Limits, depth_below_ground};
 use super::muscle_residuals;
 use super::virtual_constraints::VirtualConstraints;
 use crate::body::{InverseDynamics, PointState, WalkerModel};
@@ -41,7 +41,7 @@ const OUTPUT_RATE: Measured = Measured::new("C2 virtual constraints, rate", "rad
 const HIP_POSITION: Measured = Measured::new("C2 hip position", "m", 1e-6, Some(1e-3));
 const HIP_VELOCITY: Measured = Measured::new("C2 hip velocity", "m/s", 1e-6, Some(0.02));
 const NORMAL_FORCE: Measured = Measured::new("C3 unilateral contact", "N", 1e-3, Some(5.0));
-const FRICTION: Measured = Measured::new("C3 friction cone", "N", 1e-3, Some(20.0));
+const FRICTION: Measured = Measured::new("C3 friction cone", "N", 1e-3, Some(FRICTION_THRESHOLD_N));
 const DEPTH: Measured = Measured::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
 const CLEARANCE: Measured = Measured::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
 const ANGLE: Measured = Measured::new("C4 joint angles (a6, a7, a8)", "rad", 1e-6, Some(0.01));
@@ -94,6 +94,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 /// Everything measured on a well-formed gait without simulating it.
 pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
     let limits = Limits::new(gait);
+    let table = gait.settings.muscles.muscles(&gait.subject);
     let mut worst = Findings::default();
     for (d, trajectory) in gait.domains.iter().enumerate() {
         let domain = DomainResiduals {
@@ -117,7 +118,7 @@ pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
             domain.outputs(&point, share, &mut worst);
             domain.limits(&point, share, &mut worst);
             if let Some(muscles) = &point.instant.muscles {
-                muscle_residuals::note(&point, muscles, &mut worst);
+                muscle_residuals::note(&point, &table, muscles, &mut worst);
             }
         }
         domain.reset(&mut worst);

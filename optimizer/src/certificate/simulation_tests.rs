@@ -4,6 +4,7 @@ use super::control::{BANDWIDTH, Control, State, join, split};
 use super::dormand_prince::System;
 use super::hybrid_walker::HybridWalker;
 use super::limits::Limits;
+use super::return_map::return_map;
 use crate::body::{Chain, GRAVITY, PointState, WalkerModel};
 use crate::gait::motion::instant;
 use crate::walking::kinetic_energy;
@@ -104,6 +105,27 @@ fn contacts_hold_and_outputs_are_driven_as_asked() {
         }
         assert!(rest.iter().all(|value| value.abs() < 1e-4), "{} {rest:?}", control.domain.name());
     }
+}
+
+#[test]
+fn a_change_of_speed_alone_becomes_what_the_zero_dynamics_say() {
+    let model = model();
+    let walker = HybridWalker::new(&model, gait());
+    let start = join(&gait().domains[0].q[0], &gait().domains[0].qd[0]);
+    let (periodic, regulated) = return_map(&walker, &start).unwrap();
+    let free_walker = walker.with_free_hip_velocity();
+    let (periodic, free) = return_map(&free_walker, &periodic).unwrap();
+    // Faster by a thousandth in every velocity: contacts and virtual constraints hold as before.
+    let changed = |share: f64| {
+        let x = State::from_fn(|i, _| if i < 9 { periodic[i] } else { periodic[i] * (1.0 + share) });
+        free_walker.after_stride(&x).unwrap()
+    };
+    let rates = periodic.rows(9, 9);
+    let carried = (changed(1e-3) - changed(-1e-3)).rows(9, 9) / 2e-3;
+    let multiplier = carried.dot(&rates) / rates.norm_squared();
+    assert!((multiplier - free.zero_dynamics).abs() < 1e-3 * free.zero_dynamics.abs());
+    // The hip velocity is brought back in six of the eight domains: next to nothing of a change is left.
+    assert!(regulated.zero_dynamics.abs() < 1e-2 * multiplier);
 }
 
 /// Kinetic and potential energy, J.

@@ -1,7 +1,7 @@
 //! From a motion with torques to muscle states: forces by non-negative least squares, then tendon, fibre, activation.
 
 use crate::gait_problem::{GaitProgramme, PointVariables};
-use crate::muscle::{MUSCLE_COUNT, MUSCLES, force_length, force_velocity};
+use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
@@ -23,9 +23,9 @@ pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) 
             (0..domain.points).map(|k| plain.layout.point_variables(x_plain, d, k)).collect();
         let mut forces = Vec::with_capacity(points.len());
         for point in &mut points {
-            let force = distribute(point).unwrap_or([REST_FORCE; MUSCLE_COUNT]);
+            let force = distribute(&programme.muscles, point).unwrap_or([REST_FORCE; MUSCLE_COUNT]);
             for m in 0..MUSCLE_COUNT {
-                let muscle = &MUSCLES[m];
+                let muscle = &programme.muscles[m];
                 let tendon = muscle.slack_length_m * (1.0 + REFERENCE_STRAIN * force[m].sqrt());
                 point.fibre_length[m] =
                     ((muscle.unit_length(&point.q) - tendon) / muscle.optimal_length_m).clamp(0.35, 1.55);
@@ -36,12 +36,12 @@ pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) 
         for k in 0..points.len() {
             let (before, after) = (k.saturating_sub(1), (k + 1).min(points.len() - 1));
             for m in 0..MUSCLE_COUNT {
-                let speed = 0.5 * MUSCLES[m].max_speed;
+                let speed = 0.5 * programme.muscles[m].max_speed;
                 let change = points[after].fibre_length[m] - points[before].fibre_length[m];
                 let velocity = (change / (step * (after - before).max(1) as f64)).clamp(-speed, speed);
                 points[k].fibre_velocity[m] = velocity;
                 let capacity = force_length(points[k].fibre_length[m]).value
-                    * force_velocity(velocity / MUSCLES[m].max_speed).value;
+                    * force_velocity(velocity / programme.muscles[m].max_speed).value;
                 points[k].activation[m] = (forces[k][m] / capacity.max(0.05)).clamp(0.01, 0.95);
             }
         }
@@ -53,9 +53,9 @@ pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) 
 }
 
 /// `min |(A F - u)/100|^2 + w |F - rest|^2` over F >= 0 in units of F_max, u the four muscle-driven torques.
-fn distribute(point: &PointVariables) -> Option<[f64; MUSCLE_COUNT]> {
+fn distribute(muscles: &[Muscle; MUSCLE_COUNT], point: &PointVariables) -> Option<[f64; MUSCLE_COUNT]> {
     let mut a = [[0.0; MUSCLE_COUNT]; 4];
-    for (m, muscle) in MUSCLES.iter().enumerate() {
+    for (m, muscle) in muscles.iter().enumerate() {
         for attachment in muscle.attachments.iter().flatten() {
             let arm = attachment.at(point.q[attachment.coordinate]).arm;
             a[attachment.coordinate - 3][m] += arm * muscle.max_force_n / 100.0;

@@ -5,8 +5,9 @@ use super::layout::{FORCE, Layout, Q, QD, QDD, U};
 use super::rows::RowTable;
 use crate::bounds::TunedBounds;
 use crate::device::Device;
-use crate::muscle::{MUSCLE_COUNT, MUSCLES};
-use crate::settings::{GaitLimits, PerDomainKind};
+use crate::gait::Axis;
+use crate::muscle::{MUSCLE_COUNT, Muscle};
+use crate::settings::{GaitLimits, GaitSettings, PerDomainKind};
 use crate::walking::{CYCLE, DomainKind};
 
 /// Lower and upper bounds of the stored (scaled) variables.
@@ -49,8 +50,26 @@ fn of_kind(per: &PerDomainKind, kind: DomainKind) -> f64 {
     }
 }
 
+/// Least vertical force under the trailing foot, N, where a load falls linearly from heel strike to toe-off.
+fn trailing_load(kind: DomainKind, sigma: f64, at_heel_strike_n: f64) -> f64 {
+    match kind {
+        DomainKind::Ds2 => at_heel_strike_n * (1.0 - 0.5 * sigma),
+        DomainKind::Ds3 => at_heel_strike_n * 0.5 * (1.0 - sigma),
+        DomainKind::Ss2 | DomainKind::Ss1 => 0.0,
+    }
+}
+
 /// Bounds of all variables.
-pub fn variable_bounds(layout: &Layout, bounds: &TunedBounds, limits: &GaitLimits, device: &Device) -> VariableBounds {
+pub fn variable_bounds(
+    layout: &Layout,
+    bounds: &TunedBounds,
+    settings: &GaitSettings,
+    device: &Device,
+    muscles: &[Muscle; MUSCLE_COUNT],
+    weight_n: f64,
+) -> VariableBounds {
+    let limits = &settings.limits;
+    let load = settings.naturalness.trailing_load_share * weight_n;
     let mut lower = vec![f64::NEG_INFINITY; layout.variables];
     let mut upper = vec![f64::INFINITY; layout.variables];
     let mut set = |index: usize, low: f64, high: f64| {
@@ -97,11 +116,14 @@ pub fn variable_bounds(layout: &Layout, bounds: &TunedBounds, limits: &GaitLimit
             for (c, row) in contacts.iter().enumerate() {
                 let largest = limits.contact_force_max_n;
                 let (mut low, mut high) = match row.axis {
-                    crate::gait::Axis::X => (-largest, largest),
-                    crate::gait::Axis::Z => (0.0, largest),
+                    Axis::X => (-largest, largest),
+                    Axis::Z => (0.0, largest),
                 };
+                if row.axis == Axis::Z && row.side != CYCLE[d].stance {
+                    low = trailing_load(CYCLE[d].kind, domain.sigma(k), load);
+                }
                 if CYCLE[d].unloading_row() == Some(c) {
-                    low = limits.liftoff_force_n * (1.0 - domain.sigma(k));
+                    low = low.max(limits.liftoff_force_n * (1.0 - domain.sigma(k)));
                     if k == domain.last() {
                         (low, high) = (0.0, 0.0);
                     }
@@ -110,7 +132,7 @@ pub fn variable_bounds(layout: &Layout, bounds: &TunedBounds, limits: &GaitLimit
             }
             if layout.muscles {
                 for m in 0..MUSCLE_COUNT {
-                    let speed = MUSCLES[m].max_speed;
+                    let speed = muscles[m].max_speed;
                     set(p + domain.fibre_length() + m, limits.fibre_length_min, limits.fibre_length_max);
                     set(p + domain.fibre_velocity() + m, -speed, speed);
                     set(p + domain.activation() + m, 0.0, 1.0);

@@ -3,9 +3,10 @@
 
 use super::entries::Entries;
 use super::layout::{DomainLayout, PointVariables, Q, U};
+use super::programme::GaitProgramme;
 use super::rows::PointRows;
 use crate::muscle::unit::AttachmentValue;
-use crate::muscle::{CurveValue, MUSCLE_COUNT, MUSCLES, force_length, force_velocity, tendon_force};
+use crate::muscle::{CurveValue, MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
 
 const TORQUE_SCALE: f64 = 1.0 / 100.0;
 
@@ -23,8 +24,7 @@ struct MuscleState {
     max_speed: f64,
 }
 
-fn muscle_state(m: usize, point: &PointVariables) -> MuscleState {
-    let muscle = &MUSCLES[m];
+fn muscle_state(muscle: &Muscle, m: usize, point: &PointVariables) -> MuscleState {
     let joints = muscle
         .attachments
         .map(|a| a.map(|attachment| (attachment.coordinate, attachment.at(point.q[attachment.coordinate]))));
@@ -50,11 +50,11 @@ const fn torque_row(coordinate: usize) -> usize {
 }
 
 /// Values.
-pub(super) fn values(rows: &PointRows, point: &PointVariables, g: &mut [f64]) {
+pub(super) fn values(programme: &GaitProgramme, rows: &PointRows, point: &PointVariables, g: &mut [f64]) {
     let (Some(force), Some(torque)) = (rows.muscle_force, rows.muscle_torque) else { return };
     let mut driven = [0.0; 4];
     for m in 0..MUSCLE_COUNT {
-        let state = muscle_state(m, point);
+        let state = muscle_state(&programme.muscles[m], m, point);
         g[force + m] = point.activation[m] * state.length.value * state.velocity.value - state.tendon.value;
         for (coordinate, joint) in state.joints.iter().flatten() {
             driven[torque_row(*coordinate)] += joint.arm * state.max_force * state.tendon.value;
@@ -67,6 +67,7 @@ pub(super) fn values(rows: &PointRows, point: &PointVariables, g: &mut [f64]) {
 
 /// Jacobian.
 pub(super) fn jacobian(
+    programme: &GaitProgramme,
     layout: &DomainLayout,
     rows: &PointRows,
     point: &PointVariables,
@@ -78,7 +79,7 @@ pub(super) fn jacobian(
         out.jacobian(torque + i, p + U + i, TORQUE_SCALE);
     }
     for m in 0..MUSCLE_COUNT {
-        let state = muscle_state(m, point);
+        let state = muscle_state(&programme.muscles[m], m, point);
         let (fl, fv, fse) = (state.length, state.velocity, state.tendon);
         let s = point.activation[m];
         let row = force + m;
@@ -104,6 +105,7 @@ pub(super) fn jacobian(
 
 /// Hessian.
 pub(super) fn hessian(
+    programme: &GaitProgramme,
     layout: &DomainLayout,
     rows: &PointRows,
     point: &PointVariables,
@@ -113,7 +115,7 @@ pub(super) fn hessian(
 ) {
     let (Some(force), Some(torque)) = (rows.muscle_force, rows.muscle_torque) else { return };
     for m in 0..MUSCLE_COUNT {
-        let state = muscle_state(m, point);
+        let state = muscle_state(&programme.muscles[m], m, point);
         let (fl, fv, fse) = (state.length, state.velocity, state.tendon);
         let s = point.activation[m];
         let weight = multipliers[force + m];

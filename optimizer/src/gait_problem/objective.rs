@@ -9,7 +9,7 @@ use super::entries::Entries;
 use super::layout::{FORCE, Q, QD, QDD, U};
 use super::programme::GaitProgramme;
 use crate::body::{COORDINATES, GRAVITY, JOINTS};
-use crate::muscle::{MUSCLE_COUNT, MUSCLES};
+use crate::muscle::MUSCLE_COUNT;
 
 /// The parts of the objective, before their weights.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -37,7 +37,7 @@ fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, 
         .chain((0..COORDINATES).map(move |i| (QDD + i, acceleration)))
         .chain((0..layout.contacts).map(move |i| (FORCE + i, force)))
         .chain((0..muscles).flat_map(move |m| {
-            let v = MUSCLES[m].max_speed;
+            let v = programme.muscles[m].max_speed;
             [
                 (layout.activation() + m, weights.activation),
                 (layout.fibre_velocity() + m, weights.fibre_velocity / (v * v)),

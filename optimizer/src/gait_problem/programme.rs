@@ -9,10 +9,11 @@ use super::rows::RowTable;
 use super::zero_dynamics;
 use super::{contact_limits, fibres, hip_velocity, mechanics, muscle_forces, objective, outputs, stride, transitions};
 use crate::body::dynamics::LinkHessian;
-use crate::body::{ContactPoint, PointState, WalkerModel};
+use crate::body::{ContactPoint, GRAVITY, PointState, WalkerModel};
 use crate::bounds::TunedBounds;
 use crate::device::Device;
 use crate::gait::{Axis, FootPoint, Side};
+use crate::muscle::{MUSCLE_COUNT, Muscle};
 use crate::nlp::{EliminationBlocks, NonlinearProgram, SparsityPattern};
 use crate::reference::ReferenceGait;
 use crate::settings::{GaitSettings, Regularisation};
@@ -104,6 +105,8 @@ pub struct GaitProgramme {
     pub rows: RowTable,
     /// Weights of the objective.
     pub weights: ObjectiveWeights,
+    /// The subject's muscles.
+    pub muscles: [Muscle; MUSCLE_COUNT],
     pub(super) limits: ActiveLimits,
     pub(super) regularisation: Regularisation,
     pub(super) foot_points: [ContactPoint; 4],
@@ -152,7 +155,7 @@ fn reference_points(layout: &Layout, reference: &ReferenceGait, timing: &StrideT
 }
 
 impl GaitProgramme {
-    /// Builds the programme with the weights of the final phase (cost of transport 1, tracking 0).
+    /// Builds the programme with the weights of the final phase (cost of transport 1, tracking as the settings say).
     ///
     /// # Errors
     /// [`ModelError`] naming what is out of range.
@@ -168,6 +171,7 @@ impl GaitProgramme {
         settings.validate()?;
         reference.validate()?;
         let model = WalkerModel::new(subject, device)?;
+        let muscle_table = settings.muscles.muscles(subject);
         let layout = Layout::new(&settings.mesh, muscles);
         let mut rows = RowTable::new(&layout);
         set_row_bounds(&mut rows, &settings.limits, false);
@@ -189,11 +193,12 @@ impl GaitProgramme {
         let mut programme = Self {
             limits: ActiveLimits::new(&settings.limits, bounds),
             regularisation: settings.regularisation,
-            bounds: variable_bounds(&layout, bounds, &settings.limits, device),
+            bounds: variable_bounds(&layout, bounds, settings, device, &muscle_table, model.total_mass * GRAVITY),
+            muscles: muscle_table,
             settings: *settings,
             reference: reference.clone(),
             timing: EVEN_TIMING,
-            weights: ObjectiveWeights { cost_of_transport: 1.0, tracking: 0.0 },
+            weights: ObjectiveWeights { cost_of_transport: 1.0, tracking: settings.naturalness.reference_weight },
             structure: Arc::new(Structure::default()),
             model,
             layout,
@@ -378,7 +383,7 @@ impl GaitProgramme {
                 outputs::jacobian(self, &context, point_rows, &point, x, p, out);
                 hip_velocity::jacobian(&context, point_rows, p, out);
                 contact_limits::jacobian(self, &context, point_rows, &state, x, p, out);
-                muscle_forces::jacobian(context.layout, point_rows, &point, p, out);
+                muscle_forces::jacobian(self, context.layout, point_rows, &point, p, out);
             }
             let context = self.domain_context(x, d);
             zero_dynamics::jacobian(self, &context, rows, x, out);
@@ -401,7 +406,7 @@ impl GaitProgramme {
                 mechanics::write_link_hessian(&link, p, out);
                 outputs::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
                 hip_velocity::hessian(&context, point_rows, multipliers, out);
-                muscle_forces::hessian(context.layout, point_rows, &point, p, multipliers, out);
+                muscle_forces::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
             }
             let context = self.domain_context(x, d);
             zero_dynamics::hessian(&context, rows, multipliers, out);
@@ -497,7 +502,7 @@ impl NonlinearProgram for GaitProgramme {
                 outputs::values(self, &context, point_rows, &point, x, values);
                 hip_velocity::values(self, &context, point_rows, &point, x, values);
                 contact_limits::values(self, &context, point_rows, &point, &state, x, values);
-                muscle_forces::values(point_rows, &point, values);
+                muscle_forces::values(self, point_rows, &point, values);
             }
             let context = self.domain_context(x, d);
             zero_dynamics::values(self, &context, rows, x, values);

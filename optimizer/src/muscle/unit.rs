@@ -4,6 +4,7 @@
 //! straight, ankle 90 deg; larger = extended / plantarflexed. The length change uses `rho r0`, the torque `r0`, as
 //! published (rho stands in for pennation), so muscle power is not exactly joint power.
 
+use super::parameters::Joint;
 use crate::gait::Side;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -94,7 +95,23 @@ impl Attachment {
     }
 }
 
+impl Attachment {
+    /// The joint it crosses.
+    pub(super) fn joint(&self) -> Joint {
+        match self.coordinate {
+            KNEE_L => Joint::Knee,
+            ANKLE_L => Joint::Ankle,
+            _ => Joint::Hip,
+        }
+    }
+}
+
 impl Muscle {
+    /// Whether it spans a joint.
+    pub(super) fn spans(&self, joint: Joint) -> bool {
+        self.attachments.iter().flatten().any(|attachment| attachment.joint() == joint)
+    }
+
     /// Length of the unit, m.
     pub fn unit_length(&self, q: &[f64; 9]) -> f64 {
         self.optimal_length_m

@@ -1,7 +1,7 @@
 //! A recording of joint angles over several strides, in the walker's convention, with what was done to get there.
 
-use super::table::{Separator, Table, malformed};
 use crate::subject::ModelError;
+use crate::table::{Separator, Table, malformed};
 use std::f64::consts::PI;
 
 /// Largest angle of a recording, rad: a wrong unit exceeds it.

@@ -53,6 +53,12 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
             map.fixed_point_distance
         ));
     }
+    if let Some(map) = &certificate.free_hip_return_map {
+        lines.push(format!(
+            "  with the hip velocity left alone: largest multiplier {:.4} (by differences {:.4})",
+            map.largest, map.largest_by_differences
+        ));
+    }
     if let Some(pushes) = certificate.pushes {
         lines.push(format!(
             "  pushes recovered within {RECOVERY_STRIDES} strides: {:.2} m/s forwards, {:.2} m/s backwards",

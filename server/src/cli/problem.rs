@@ -13,6 +13,48 @@ use gait_optimizer::{
 };
 use std::path::{Path, PathBuf};
 
+/// Files that describe what differs from the built-in problem.
+#[derive(Debug, Clone, Args)]
+pub(super) struct ProblemFiles {
+    /// Device file (JSON); default: the built-in AMPRO3.
+    #[arg(long, value_name = "FILE")]
+    device: Option<PathBuf>,
+    /// Settings of the gait problem (JSON, only what differs from the defaults), as in
+    /// {"limits": {"speed_min_m_s": 1.1}, "muscles": {"sol": {"max_force_n": 3500}}}.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+}
+
+impl ProblemFiles {
+    pub(super) fn device(&self) -> Result<Device, Error> {
+        Ok(match &self.device {
+            Some(path) => Device::from_json(&read(path)?)?,
+            None => Device::ampro3()?,
+        })
+    }
+
+    /// Validated as far as they stand in the file.
+    pub(super) fn settings(&self) -> Result<GaitSettings, Error> {
+        let settings: GaitSettings = match &self.settings {
+            Some(path) => document::read(read(path)?.as_bytes())
+                .map_err(|e| Error::Malformed(format!("{}: not settings of the gait problem: {e}", path.display())))?,
+            None => GaitSettings::default(),
+        };
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    pub(super) fn reference(&self) -> Result<ReferenceGait, Error> {
+        Ok(match &self.reference {
+            Some(path) => ReferenceGait::from_json(&path.display().to_string(), &read(path)?)?,
+            None => ReferenceGait::builtin()?,
+        })
+    }
+}
+
 #[derive(Debug, Clone, Args)]
 pub(super) struct ProblemFlags {
     #[command(flatten)]
@@ -20,16 +62,8 @@ pub(super) struct ProblemFlags {
     /// With muscles (C1-C12) or without (C1-C4).
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
-    /// Device file (JSON); default: the built-in AMPRO3.
-    #[arg(long, value_name = "FILE")]
-    device: Option<PathBuf>,
-    /// Settings of the gait problem (JSON, only what differs from the defaults), as in
-    /// {"regularisation": {"activation_bend": 0}, "limits": {"speed_min_m_s": 1.1}}.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
-    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
+    #[command(flatten)]
+    files: ProblemFiles,
     /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
     #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh, allow_hyphen_values = true)]
     mesh: Option<Mesh>,
@@ -50,32 +84,18 @@ pub(super) struct ProblemFlags {
 impl ProblemFlags {
     /// The problem with these bounds, validated.
     pub(super) fn problem(&self, bounds: TunedBounds) -> Result<GaitProblem, Error> {
-        let device = match &self.device {
-            Some(path) => Device::from_json(&read(path)?)?,
-            None => Device::ampro3()?,
-        };
-        let mut settings = match &self.settings {
-            Some(path) => document::read(read(path)?.as_bytes())
-                .map_err(|e| Error::Malformed(format!("{}: not settings of the gait problem: {e}", path.display())))?,
-            None => GaitSettings::default(),
-        };
+        let (device, reference) = (self.files.device()?, self.files.reference()?);
+        let mut settings = self.files.settings()?;
         settings.mesh = self.mesh.unwrap_or(settings.mesh);
         settings.validate()?;
         let (subject, muscles) = (self.body.subject()?, self.muscles.is_on());
-        let reference = match &self.reference {
-            Some(path) => ReferenceGait::from_json(&path.display().to_string(), &read(path)?)?,
-            None => ReferenceGait::builtin()?,
-        };
         Ok(GaitProblem { subject, device, bounds, muscles, settings, reference })
     }
 
     /// The files that are read.
     pub(super) fn inputs(&self) -> Vec<&Path> {
-        [&self.device, &self.settings, &self.reference, &self.warm]
-            .into_iter()
-            .flatten()
-            .map(PathBuf::as_path)
-            .collect()
+        let ProblemFiles { device, settings, reference } = &self.files;
+        [device, settings, reference, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {

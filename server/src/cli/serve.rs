@@ -84,7 +84,7 @@ impl Serve {
         let app = router(AppState::new(director.clone(), Arc::new(access), hosts));
         let work = tokio::spawn({
             let director = director.clone();
-            async move { director.run().await }
+            async move { Box::pin(director.run()).await }
         });
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if let Some(secret) = link {

@@ -4,13 +4,15 @@ use super::Ended;
 use super::body::{Body, Switch};
 use super::numbers::{seed, trials, workers};
 use super::output::{data, tell};
+use super::problem::ProblemFiles;
 use super::serve::cores_or;
 use super::unattended::{self, Lines, action_line};
 use crate::error::Error;
+use crate::store::audit::Actor;
 use crate::store::{Store, commit};
-use crate::studies::catalogue;
 use crate::studies::plan::NewStudy;
 use crate::studies::summary::{self, Summary};
+use crate::studies::{catalogue, device, recording};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -21,6 +23,8 @@ pub(super) struct Tune {
     /// With muscles (C1-C12) or without (C1-C4).
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
+    #[command(flatten)]
+    files: ProblemFiles,
     /// How many trials.
     #[arg(long, default_value = "10", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
@@ -41,20 +45,27 @@ pub(super) struct Tune {
 impl Tune {
     pub(super) async fn run(self) -> Result<Ended, Error> {
         let subject = self.body.subject()?;
+        let (device, reference, gait_settings) =
+            (self.files.device()?, self.files.reference()?, self.files.settings()?);
         let workers = cores_or(self.workers);
         let store = Store::open(&self.database).await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         let subject = catalogue::subject_with(&mut writer, subject).await?;
+        let device = device::add(&mut writer, &Actor::terminal(), &device).await?;
+        let reference = recording::add(&mut writer, &Actor::terminal(), &reference).await?;
         commit(writer).await?;
         let new = NewStudy {
+            device_id: Some(device.id),
+            reference_gait_id: Some(reference.id),
+            gait_settings,
             muscles: self.muscles.is_on(),
             trial_budget: self.trials,
             parallel_trials: u32::try_from(workers).unwrap_or(1),
             seed: self.seed,
             ..NewStudy::of(subject.id)
         };
-        let study = unattended::study(&store, new).await?;
+        let study = Box::pin(unattended::study(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
         let ran = unattended::run(&store, &study, workers, lines).await;
         store.close().await;

@@ -73,7 +73,7 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
     let director = Director::new(store.clone(), Arc::new(engine), Some(study.id));
     let work = tokio::spawn({
         let director = director.clone();
-        async move { director.run().await }
+        async move { Box::pin(director.run()).await }
     });
     let ended = tokio::select! {
         ended = follow(&director, study, lines) => Some(ended),

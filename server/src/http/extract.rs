@@ -1,6 +1,6 @@
 //! Extractors whose refusals are problem documents.
 
-use super::BODY_LIMIT_BYTES;
+use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::document;
 use crate::error::Error;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
@@ -25,7 +25,9 @@ pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Re
 /// A body that could not be taken in.
 pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
     if status == StatusCode::PAYLOAD_TOO_LARGE {
-        Error::TooLarge(format!("the body is larger than {BODY_LIMIT_BYTES} bytes"))
+        Error::TooLarge(format!(
+            "the body is larger than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} where a recording is uploaded)"
+        ))
     } else {
         Error::Malformed(format!("the body cannot be read: {reason}"))
     }

@@ -25,5 +25,7 @@ pub use host::Hosts;
 pub use router::router;
 pub use state::{Access, AppState};
 
-/// Largest request body: the largest legitimate one is a reference gait.
+/// Largest request body.
 const BODY_LIMIT_BYTES: usize = 1 << 20;
+/// The same where a recording is uploaded: minutes of motion capture as text.
+const RECORDING_LIMIT_BYTES: usize = 16 << 20;

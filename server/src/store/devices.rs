@@ -21,16 +21,16 @@ pub struct Device {
     pub created_at: Instant,
 }
 
-/// The row with this very definition, added if it is not there yet.
+/// The row with this very definition, and whether it was added now.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<Device> {
+pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(Device, bool)> {
     let text = json::to_text("device", definition)?;
     let hash = json::sha256(text.as_bytes());
     let found = sqlx::query("select * from devices where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
     if let Some(row) = found {
-        return from_row(&row);
+        return Ok((from_row(&row)?, false));
     }
     let added = Device {
         id: DeviceId::fresh(),
@@ -46,7 +46,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
         .bind(added.created_at)
         .execute(db)
         .await?;
-    Ok(added)
+    Ok((added, true))
 }
 
 /// The device with this identifier.

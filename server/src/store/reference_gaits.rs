@@ -21,17 +21,17 @@ pub struct ReferenceGait {
     pub created_at: Instant,
 }
 
-/// The row with this very definition, added if it is not there yet.
+/// The row with this very definition, and whether it was added now.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<ReferenceGait> {
+pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(ReferenceGait, bool)> {
     let text = json::to_text("reference gait", definition)?;
     let hash = json::sha256(text.as_bytes());
     let found =
         sqlx::query("select * from reference_gaits where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
     if let Some(row) = found {
-        return from_row(&row);
+        return Ok((from_row(&row)?, false));
     }
     let added = ReferenceGait {
         id: ReferenceGaitId::fresh(),
@@ -47,7 +47,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
         .bind(added.created_at)
         .execute(db)
         .await?;
-    Ok(added)
+    Ok((added, true))
 }
 
 /// The reference gait with this identifier.

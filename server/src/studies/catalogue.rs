@@ -18,7 +18,7 @@ const PAPER: [(u32, &str, &str); 2] = [
 /// # Errors
 /// What the database reports.
 pub async fn device(db: &mut Connection) -> Result<Device, Error> {
-    Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?)
+    Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?.0)
 }
 
 /// The built-in reference gait of the record.
@@ -26,7 +26,7 @@ pub async fn device(db: &mut Connection) -> Result<Device, Error> {
 /// # Errors
 /// What the database reports.
 pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGait, Error> {
-    Ok(reference_gaits::ensure(db, &optimizer::ReferenceGait::builtin()?).await?)
+    Ok(reference_gaits::ensure(db, &optimizer::ReferenceGait::builtin()?).await?.0)
 }
 
 /// Adds what is missing of the built-in things.

@@ -76,7 +76,7 @@ impl Reproduce {
         let files: Vec<OutFile> =
             files.iter().map(|name| OutFile::open(&self.folder.join(name), &[])).collect::<Result<_, _>>()?;
         let store = Store::open(&self.folder.join("studies.db")).await?;
-        let outcomes = self.studies(&store).await;
+        let outcomes = Box::pin(self.studies(&store)).await;
         store.close().await;
         let Some(outcomes) = outcomes? else {
             tell("interrupted; the same command goes on from there");
@@ -107,7 +107,7 @@ impl Reproduce {
                 for muscles in [false, true] {
                     let words = if muscles { "with" } else { "without" };
                     tell(&format!("subject {subject}, {words} muscles, seed {seed}"));
-                    let (study, finished) = self.study(store, subject, muscles, seed).await?;
+                    let (study, finished) = Box::pin(self.study(store, subject, muscles, seed)).await?;
                     let standing = if finished {
                         Standing::read(&mut *store.read().await?, study).await?
                     } else {
@@ -145,7 +145,7 @@ impl Reproduce {
             .find(|study| study.state == StudyState::Finished && study.plan.tries_the_same_as(&wanted));
         match same {
             Some(study) => Ok((study, true)),
-            None => Ok((unattended::study(store, new).await?, false)),
+            None => Ok((Box::pin(unattended::study(store, new)).await?, false)),
         }
     }
 }

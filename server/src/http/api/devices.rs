@@ -1,14 +1,19 @@
-//! devices: read only; they come with the program.
+//! Devices: the built-in one, and those of data files.
 
-use crate::access::Read;
+use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
 use crate::http::may::May;
+use crate::http::once::OnceWith;
 use crate::store::DeviceId;
 use crate::store::devices::{self, Device};
+use crate::studies::device;
 use axum::Json;
 use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gait_optimizer::Device as Definition;
 
 /// `GET`: all of them.
 #[utoipa::path(
@@ -20,6 +25,28 @@ use axum::extract::State;
 )]
 pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<Device>>, Error> {
     Ok(Json(devices::all(&mut *app.read().await?).await?))
+}
+
+/// `POST`: adds the device of a data file. The very same file gives the device that is there already.
+#[utoipa::path(
+    post,
+    path = "/devices",
+    tag = "devices",
+    request_body(content = Object, description = "A device file, as `optimizer/data/README.md` describes it"),
+    responses((status = 201, description = "Added", body = Device)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    OnceWith(once, definition): OnceWith<Run, Definition>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let added = device::add(&mut writer, &once.actor, &definition).await?;
+    let location = format!("/api/v1/devices/{}", added.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &added).await
 }
 
 /// `GET {id}`.

@@ -7,6 +7,7 @@ mod certificates;
 mod comparison;
 mod devices;
 mod events;
+mod exports;
 mod gaits;
 pub mod health;
 mod history;
@@ -20,9 +21,15 @@ mod tokens;
 mod trials;
 mod users;
 
-use super::AppState;
-use utoipa_axum::router::OpenApiRouter;
+use super::{AppState, RECORDING_LIMIT_BYTES};
+use axum::extract::DefaultBodyLimit;
+use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
+
+/// Bodies that hold a recording.
+pub(super) fn recordings() -> DefaultBodyLimit {
+    DefaultBodyLimit::max(RECORDING_LIMIT_BYTES)
+}
 
 /// Every route below `/api/v1`.
 pub fn routes() -> OpenApiRouter<AppState> {
@@ -32,9 +39,10 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(subjects::get))
         .routes(routes!(subjects::consents, subjects::consent))
         .routes(routes!(subjects::withdraw))
-        .routes(routes!(devices::list))
+        .routes(routes!(reference_gaits::of_subject))
+        .routes(routes!(devices::list, devices::create))
         .routes(routes!(devices::get))
-        .routes(routes!(reference_gaits::list))
+        .routes(routes!(reference_gaits::list, reference_gaits::create).layer(recordings()))
         .routes(routes!(reference_gaits::get))
         // studies
         .routes(routes!(studies::list, studies::create))
@@ -60,6 +68,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::attempts))
         .routes(routes!(gaits::get))
         .routes(routes!(gaits::get_csv))
+        .routes(routes!(exports::motion_file))
+        .routes(routes!(exports::controller))
         .routes(routes!(motion::get))
         .routes(routes!(certificates::get, certificates::create))
         // scripts of the lab

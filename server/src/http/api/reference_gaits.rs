@@ -1,14 +1,18 @@
-//! reference gaits: read only; they come with the program.
+//! Reference gaits: the built-in one, and those made of recordings.
 
-use crate::access::Read;
+use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Id;
 use crate::http::may::May;
-use crate::store::ReferenceGaitId;
+use crate::http::once::OnceWith;
 use crate::store::reference_gaits::{self, ReferenceGait};
+use crate::store::{ReferenceGaitId, SubjectId, subjects};
+use crate::studies::recording::{self, Match, NewReferenceGait};
 use axum::Json;
 use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
 
 /// `GET`: all of them.
 #[utoipa::path(
@@ -20,6 +24,33 @@ use axum::extract::State;
 )]
 pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<ReferenceGait>>, Error> {
     Ok(Json(reference_gaits::all(&mut *app.read().await?).await?))
+}
+
+/// `POST`: makes one of a recording: cuts it at right heel strikes, averages its strides. The very same recording
+/// gives the reference gait that is there already.
+#[utoipa::path(
+    post,
+    path = "/reference-gaits",
+    tag = "reference-gaits",
+    request_body = NewReferenceGait,
+    responses((status = 201, description = "Imported; its provenance says what was done", body = ReferenceGait)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    OnceWith(once, new): OnceWith<Run, NewReferenceGait>,
+) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let definition = new.definition_aside().await?;
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let added = recording::add(&mut writer, &once.actor, &definition).await?;
+    let location = format!("/api/v1/reference-gaits/{}", added.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &added).await
 }
 
 /// `GET {id}`.
@@ -37,4 +68,23 @@ pub(super) async fn get(
     Id(id): Id<ReferenceGaitId>,
 ) -> Result<Json<ReferenceGait>, Error> {
     Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?))
+}
+
+/// `GET /subjects/{id}/reference-gaits`: all of them, the nearest to the subject in height and body mass first.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/reference-gaits",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "The nearest first; those that do not say whose they are come last", body = Vec<Match>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_subject(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+) -> Result<Json<Vec<Match>>, Error> {
+    let mut reader = app.read().await?;
+    let subject = subjects::get(&mut reader, id).await?;
+    Ok(Json(recording::matches(&mut reader, &subject.body()).await?))
 }

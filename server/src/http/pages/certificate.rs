@@ -35,6 +35,10 @@ impl InWords {
                 format!("{:.1e}", map.fixed_point_distance),
             ));
         }
+        if let Some(free) = &certificate.free_hip_return_map {
+            let words = format!("{:.3} (by differences {:.3})", free.largest, free.largest_by_differences);
+            figures.push(("Largest multiplier with the hip velocity left alone", words));
+        }
         if let Some(pushes) = certificate.pushes {
             let words = format!(
                 "{:.2} m/s forwards, {:.2} m/s backwards, within {RECOVERY_STRIDES} strides",

@@ -27,6 +27,8 @@ struct GaitPage {
     figures: Vec<(&'static str, String)>,
     bounds: Vec<Bound>,
     from: Option<(TrialId, u32)>,
+    /// Name of the reference gait.
+    reference: String,
     has_gait: bool,
     may_run: bool,
     certificate: Option<certificate::InWords>,
@@ -54,6 +56,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     drop(reader);
     let has_gait = gait.is_some();
+    let reference_name = reference.name.clone();
     let charts = tokio::task::spawn_blocking(move || {
         let mut charts = gait.map(|gait| gait_charts::of_gait(&gait, &reference)).unwrap_or_default();
         charts.extend(gait_charts::of_iterations(&iterations));
@@ -71,6 +74,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         figures: figures(&trial),
         bounds: format::bounds(&trial.action),
         from,
+        reference: reference_name,
         has_gait,
         may_run: may.caller.may(Run::NEEDED),
         certificate,

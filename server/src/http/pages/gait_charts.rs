@@ -14,7 +14,7 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    fn new(chart: &Chart, note: &'static str) -> Self {
+    pub(super) fn new(chart: &Chart, note: &'static str) -> Self {
         let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
         Self { title: chart.title.clone(), note, svg: chart.svg(), legend }
     }

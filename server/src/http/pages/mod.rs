@@ -10,11 +10,13 @@ mod home;
 mod new_study;
 mod rate;
 mod reference;
+mod reference_gaits;
 mod sign_in;
 mod study;
 mod subject;
 
 use super::AppState;
+use super::api::recordings;
 use axum::Router;
 use axum::routing::{get, post};
 
@@ -34,6 +36,8 @@ pub fn routes() -> Router<AppState> {
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/certify", post(certificate::post))
+        .route("/references", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
+        .route("/references/{id}", get(reference_gaits::get))
         .route("/rate", get(rate::list))
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))

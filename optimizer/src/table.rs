@@ -4,7 +4,7 @@ use crate::subject::ModelError;
 
 /// Named columns of equal length; the first is the time, s, strictly increasing.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Table {
+pub(crate) struct Table {
     what: String,
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
@@ -15,7 +15,7 @@ const FEWEST_ROWS: usize = 20;
 
 /// What separates the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Separator {
+pub(crate) enum Separator {
     /// Tabs or spaces, any number.
     Blank,
     /// One comma.
@@ -34,7 +34,7 @@ impl Separator {
 impl Table {
     /// Reads the lines after a header: the first has the names, the rest numbers; empty lines at the end are allowed.
     /// `first_line` is the number of the line of names in its file, `what` the file's name.
-    pub(super) fn read(
+    pub(crate) fn read(
         what: &str,
         lines: &[&str],
         first_line: usize,
@@ -92,28 +92,33 @@ impl Table {
     }
 
     /// Number of rows.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// Number of columns.
-    pub(super) fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.names.len()
     }
 
+    /// Names of the columns, that of the time first.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// The times, s.
-    pub(super) fn times(&self) -> Vec<f64> {
+    pub(crate) fn times(&self) -> Vec<f64> {
         self.rows.iter().map(|row| row[0]).collect()
     }
 
     /// A column by name, if it is there.
-    pub(super) fn find(&self, name: &str) -> Option<Vec<f64>> {
+    pub(crate) fn find(&self, name: &str) -> Option<Vec<f64>> {
         let column = self.names.iter().position(|n| n == name)?;
         Some(self.rows.iter().map(|row| row[column]).collect())
     }
 
     /// A column by name.
-    pub(super) fn column(&self, name: &str) -> Result<Vec<f64>, ModelError> {
+    pub(crate) fn column(&self, name: &str) -> Result<Vec<f64>, ModelError> {
         self.find(name).ok_or_else(|| ModelError::Malformed {
             what: self.what.clone(),
             reason: format!("column {name:?} is missing; there are {}", self.names.join(", ")),
@@ -122,7 +127,7 @@ impl Table {
 }
 
 /// An error at a place of a file; lines and columns count from 1.
-pub(super) fn malformed(what: &str, line: usize, column: Option<usize>, reason: String) -> ModelError {
+pub(crate) fn malformed(what: &str, line: usize, column: Option<usize>, reason: String) -> ModelError {
     let column = column.map_or_else(String::new, |column| format!(", column {column}"));
     ModelError::Malformed { what: format!("{what}, line {line}{column}"), reason }
 }

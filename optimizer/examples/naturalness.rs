@@ -1,0 +1,106 @@
+//! What each optional wish for a natural gait does: Gait RMSE, cost, solve time, and what a clinician looks at.
+//!
+//! `cargo run --release -p gait-optimizer --example naturalness -- [--subject 1] [--muscles off]`: one CSV row per set
+//! of settings, each solved cold with the default bounds.
+
+use gait_optimizer::gait::{Axis, DomainTrajectory, Side};
+use gait_optimizer::{CancelToken, Gait, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
+use std::error::Error;
+
+fn argument(name: &str, default: &str) -> String {
+    let arguments: Vec<String> = std::env::args().collect();
+    let place = arguments.iter().position(|a| a == name);
+    place.and_then(|i| arguments.get(i + 1)).cloned().unwrap_or_else(|| default.to_owned())
+}
+
+/// Settings by name.
+fn wishes() -> Vec<(&'static str, GaitSettings)> {
+    let with = |change: &dyn Fn(&mut GaitSettings)| {
+        let mut settings = GaitSettings::default();
+        change(&mut settings);
+        settings
+    };
+    let fast = |s: &mut GaitSettings| (s.limits.speed_min_m_s, s.limits.speed_max_m_s) = (1.2, 1.3);
+    // Perry and Burnfield 2010: double support of about 12 % of the stride per step, 0.13 s of 1.1 s.
+    let long_double_support =
+        |s: &mut GaitSettings| (s.limits.duration_min_s.ds2, s.limits.duration_min_s.ds3) = (0.06, 0.06);
+    let loaded = |s: &mut GaitSettings| s.naturalness.trailing_load_share = 0.5;
+    let tracking = |weight: f64| move |s: &mut GaitSettings| s.naturalness.reference_weight = weight;
+    vec![
+        ("none", GaitSettings::default()),
+        ("speed 1.2 to 1.3 m/s", with(&fast)),
+        ("double support of 0.12 s", with(&long_double_support)),
+        ("gradual weight transfer", with(&loaded)),
+        (
+            "gradual transfer in 0.12 s",
+            with(&|s| {
+                long_double_support(s);
+                loaded(s);
+            }),
+        ),
+        ("reference weight 0.01", with(&tracking(0.01))),
+        ("reference weight 0.1", with(&tracking(0.1))),
+        ("reference weight 1", with(&tracking(1.0))),
+        (
+            "all, reference weight 0.1",
+            with(&|s| {
+                fast(s);
+                long_double_support(s);
+                loaded(s);
+                tracking(0.1)(s);
+            }),
+        ),
+    ]
+}
+
+/// Largest flexion of a knee, degrees.
+fn peak_degrees(gait: &Gait, coordinate: usize) -> f64 {
+    let angles = gait.domains.iter().flat_map(|domain| domain.q.iter().map(|q| q[coordinate]));
+    angles.fold(f64::NEG_INFINITY, f64::max).to_degrees()
+}
+
+/// Share of the vertical force that the trailing foot carries in double support, mean over time.
+fn trailing_share(gait: &Gait) -> f64 {
+    let double_support = || gait.domains.iter().filter(|domain| domain.name.starts_with("DS"));
+    let stance = |domain: &DomainTrajectory| if domain.name.ends_with('R') { Side::Right } else { Side::Left };
+    let trailing: f64 = double_support().map(|d| impulse(d, |side| side != stance(d))).sum();
+    trailing / double_support().map(|d| impulse(d, |_| true)).sum::<f64>()
+}
+
+/// Vertical impulse under some feet, N s.
+fn impulse(domain: &DomainTrajectory, counts: impl Fn(Side) -> bool) -> f64 {
+    let rows = domain.contact_rows.iter().enumerate().filter(|(_, row)| row.axis == Axis::Z && counts(row.side));
+    let columns: Vec<usize> = rows.map(|(c, _)| c).collect();
+    let sum: f64 = domain.contact_forces.iter().flat_map(|forces| columns.iter().map(|&c| forces[c])).sum();
+    sum / domain.contact_forces.len() as f64 * domain.duration_s
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let subject = Subject::builtin(argument("--subject", "1").parse()?)?;
+    let muscles = argument("--muscles", "off") == "on";
+    println!(
+        "wish,status,gait_rmse_rad,cost_of_transport,iterations,seconds,speed_m_s,double_support_percent,\
+         trailing_share_percent,left_knee_peak_deg,right_knee_peak_deg"
+    );
+    for (name, settings) in wishes() {
+        let problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
+        let options = SolveOptions { threads: 2, ..SolveOptions::default() };
+        let outcome = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new())?;
+        let (gait, report) = (&outcome.gait, &outcome.report);
+        let double: f64 = gait.domains.iter().filter(|d| d.name.starts_with("DS")).map(|d| d.duration_s).sum();
+        println!(
+            "\"{name}\",{:?},{:.4},{:.5},{},{:.1},{:.3},{:.1},{:.1},{:.1},{:.1}",
+            report.status,
+            report.gait_rmse_rad,
+            report.cost_of_transport,
+            report.iterations,
+            report.seconds_total,
+            report.speed_m_s,
+            100.0 * double / gait.stride_time_s,
+            100.0 * trailing_share(gait),
+            peak_degrees(gait, 4),
+            peak_degrees(gait, 7),
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! The mean activity of a muscle over the gait cycle, and how far two of them are apart.
+
+use super::{CYCLE_POINTS, Envelope};
+use crate::reference::STRIDE_RANGE_S;
+use crate::subject::ModelError;
+use serde::{Deserialize, Serialize};
+
+/// Activity of one channel over the gait cycle at 0, 1, ..., 100 %, mean over strides.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CycleActivity {
+    /// Name of the channel.
+    pub channel: String,
+    /// Mean; in the unit of the recording, or in shares of the peak that it was divided by.
+    pub mean: Vec<f64>,
+    /// Standard deviation over strides; zero for one stride.
+    pub standard_deviation: Vec<f64>,
+    /// How many strides.
+    pub strides: usize,
+}
+
+impl CycleActivity {
+    /// Cuts an envelope at heel strikes (s, in order). Strides that are too short or too long to be walking, or not
+    /// wholly recorded, are left out.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] when no stride is left.
+    pub fn cut(envelope: &Envelope, heel_strikes_s: &[f64]) -> Result<Self, ModelError> {
+        let strides: Vec<(f64, f64)> = heel_strikes_s
+            .windows(2)
+            .map(|pair| (pair[0], pair[1]))
+            .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
+            .filter(|(start, end)| *start >= envelope.start_s && *end <= envelope.end_s())
+            .collect();
+        if strides.is_empty() {
+            let reason = format!(
+                "none of the {} strides lasts {} to {} s within the recording",
+                heel_strikes_s.len().saturating_sub(1),
+                STRIDE_RANGE_S.0,
+                STRIDE_RANGE_S.1
+            );
+            return Err(ModelError::Malformed { what: format!("channel {}", envelope.channel), reason });
+        }
+        let count = strides.len() as f64;
+        let (mut mean, mut standard_deviation) = (Vec::new(), Vec::new());
+        for point in 0..CYCLE_POINTS {
+            let share = point as f64 / (CYCLE_POINTS - 1) as f64;
+            let samples: Vec<f64> = strides.iter().map(|(a, b)| envelope.at(a + share * (b - a))).collect();
+            let middle = samples.iter().sum::<f64>() / count;
+            let squares: f64 = samples.iter().map(|sample| (sample - middle).powi(2)).sum();
+            mean.push(middle);
+            standard_deviation.push(if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 });
+        }
+        Ok(Self { channel: envelope.channel.clone(), mean, standard_deviation, strides: strides.len() })
+    }
+
+    /// Largest mean activity.
+    pub fn peak(&self) -> f64 {
+        self.mean.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// In shares of the peak of normal walking, so that another gait may exceed 1.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] when normal walking shows no activity.
+    pub fn normalised_by(&self, normal_walking: &Self) -> Result<Self, ModelError> {
+        let peak = normal_walking.peak();
+        if peak.is_nan() || peak <= 0.0 {
+            let reason = format!("normal walking peaks at {peak}: nothing to normalise by");
+            return Err(ModelError::Malformed { what: format!("channel {}", self.channel), reason });
+        }
+        let divided = |values: &[f64]| values.iter().map(|value| value / peak).collect();
+        Ok(Self { mean: divided(&self.mean), standard_deviation: divided(&self.standard_deviation), ..self.clone() })
+    }
+
+    /// Mean over the cycle.
+    pub fn average(&self) -> f64 {
+        self.mean.iter().sum::<f64>() / self.mean.len() as f64
+    }
+}
+
+/// EMG RMSE of a gait against normal walking: `sum_i sqrt(mean((s_i - n_i)^2))` over the channels of normal walking.
+/// (The paper prints the square only on the outside; without one inside, the mean may be negative.)
+///
+/// # Errors
+/// [`ModelError::Unknown`] for a channel that the gait lacks.
+pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<f64, ModelError> {
+    normal_walking
+        .iter()
+        .map(|normal| {
+            let same = gait.iter().find(|activity| activity.channel == normal.channel);
+            let activity = same.ok_or_else(|| ModelError::Unknown {
+                field: "channel".to_owned(),
+                value: normal.channel.clone(),
+                known: gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", "),
+            })?;
+            let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
+            Ok((squares / normal.mean.len() as f64).sqrt())
+        })
+        .sum()
+}

@@ -1,0 +1,214 @@
+//! Muscle parameters of a person: the published table, scaled to the person or overridden where better is known.
+
+use super::unit::{MUSCLE_COUNT, MUSCLES, Muscle};
+use crate::subject::{ModelError, Subject};
+use serde::{Deserialize, Serialize};
+
+/// Height and mass of the person that the published table describes (Geyer & Herr 2010).
+const TABLE_HEIGHT_M: f64 = 1.8;
+const TABLE_MASS_KG: f64 = 80.0;
+
+/// What is known better of one kind of muscle; what is absent stays as in the table.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MuscleOverride {
+    /// Maximum isometric force, N.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_force_n: Option<f64>,
+    /// Maximum shortening speed, optimal lengths per second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_speed: Option<f64>,
+    /// Optimal fibre length, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimal_length_m: Option<f64>,
+    /// Tendon slack length, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slack_length_m: Option<f64>,
+    /// Largest lever arm at the hip, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hip_lever_m: Option<f64>,
+    /// Largest lever arm at the knee, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub knee_lever_m: Option<f64>,
+    /// Largest lever arm at the ankle, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ankle_lever_m: Option<f64>,
+}
+
+/// How the muscles of a person differ from the published table; both legs alike.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MuscleParameters {
+    /// Whether lengths and lever arms are scaled by body height and forces by body mass, from the 1.8 m and 80 kg of
+    /// the table. Overrides count as they are.
+    pub scaled_to_body: bool,
+    /// Hamstrings.
+    pub ham: MuscleOverride,
+    /// Gluteus.
+    pub glu: MuscleOverride,
+    /// Hip flexors.
+    pub hfl: MuscleOverride,
+    /// Gastrocnemius.
+    pub gas: MuscleOverride,
+    /// Vasti.
+    pub vas: MuscleOverride,
+    /// Soleus.
+    pub sol: MuscleOverride,
+    /// Tibialis anterior.
+    pub ta: MuscleOverride,
+}
+
+impl MuscleParameters {
+    /// Whether the published table holds.
+    pub fn is_published(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn overrides(&self) -> [(&'static str, &MuscleOverride); 7] {
+        [
+            ("ham", &self.ham),
+            ("glu", &self.glu),
+            ("hfl", &self.hfl),
+            ("gas", &self.gas),
+            ("vas", &self.vas),
+            ("sol", &self.sol),
+            ("ta", &self.ta),
+        ]
+    }
+
+    /// Checks every number against its allowed range, and that lever arms are given only where the muscle has them.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        for (kind, given) in self.overrides() {
+            for (field, value, minimum, maximum) in [
+                ("max_force_n", given.max_force_n, 50.0, 20_000.0),
+                ("max_speed", given.max_speed, 2.0, 30.0),
+                ("optimal_length_m", given.optimal_length_m, 0.01, 0.3),
+                ("slack_length_m", given.slack_length_m, 0.02, 0.8),
+                ("hip_lever_m", given.hip_lever_m, 0.005, 0.2),
+                ("knee_lever_m", given.knee_lever_m, 0.005, 0.2),
+                ("ankle_lever_m", given.ankle_lever_m, 0.005, 0.2),
+            ] {
+                if let Some(value) = value {
+                    ModelError::check_range(&format!("muscles.{kind}.{field}"), value, minimum, maximum)?;
+                }
+            }
+            for (joint, lever) in given.levers() {
+                let spans = MUSCLES.iter().filter(|m| is_of(m, kind)).any(|m| m.spans(joint));
+                if let Some(value) = lever
+                    && !spans
+                {
+                    return Err(ModelError::Unknown {
+                        field: format!("muscles.{kind}.{}_lever_m", joint.name()),
+                        value: value.to_string(),
+                        known: format!("nothing: {kind} does not span the {}", joint.name()),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The ten muscles of a person.
+    pub fn muscles(&self, subject: &Subject) -> [Muscle; MUSCLE_COUNT] {
+        let (length, force) = if self.scaled_to_body {
+            (subject.height_m / TABLE_HEIGHT_M, subject.body_mass_kg / TABLE_MASS_KG)
+        } else {
+            (1.0, 1.0)
+        };
+        MUSCLES.map(|published| {
+            let given = self.overrides().into_iter().find(|(kind, _)| is_of(&published, kind)).map(|(_, given)| *given);
+            let given = given.unwrap_or_default();
+            let mut muscle = published;
+            muscle.max_force_n = given.max_force_n.unwrap_or(published.max_force_n * force);
+            muscle.max_speed = given.max_speed.unwrap_or(published.max_speed);
+            muscle.optimal_length_m = given.optimal_length_m.unwrap_or(published.optimal_length_m * length);
+            muscle.slack_length_m = given.slack_length_m.unwrap_or(published.slack_length_m * length);
+            for attachment in muscle.attachments.iter_mut().flatten() {
+                let lever = given.levers().into_iter().find(|(joint, _)| *joint == attachment.joint());
+                attachment.lever_m = lever.and_then(|(_, lever)| lever).unwrap_or(attachment.lever_m * length);
+            }
+            muscle
+        })
+    }
+}
+
+impl MuscleOverride {
+    fn levers(&self) -> [(Joint, Option<f64>); 3] {
+        [(Joint::Hip, self.hip_lever_m), (Joint::Knee, self.knee_lever_m), (Joint::Ankle, self.ankle_lever_m)]
+    }
+}
+
+/// Joints that muscles span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Joint {
+    Hip,
+    Knee,
+    Ankle,
+}
+
+impl Joint {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Hip => "hip",
+            Self::Knee => "knee",
+            Self::Ankle => "ankle",
+        }
+    }
+}
+
+/// Whether a muscle of the table (`HAM_L`) is of a kind (`ham`).
+fn is_of(muscle: &Muscle, kind: &str) -> bool {
+    muscle.name.split('_').next().is_some_and(|name| name.eq_ignore_ascii_case(kind))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> MuscleParameters {
+        serde_json::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn without_wishes_the_published_table_holds_for_everybody() {
+        let small = Subject::new(1.5, 50.0).unwrap();
+        assert_eq!(MuscleParameters::default().muscles(&small), MUSCLES);
+        let table = Subject::new(TABLE_HEIGHT_M, TABLE_MASS_KG).unwrap();
+        assert_eq!(read(r#"{"scaled_to_body": true}"#).muscles(&table), MUSCLES);
+    }
+
+    #[test]
+    fn scaling_follows_height_and_mass_and_spares_overrides() {
+        let small = Subject::new(0.9 * TABLE_HEIGHT_M, 0.5 * TABLE_MASS_KG).unwrap();
+        let muscles = read(r#"{"scaled_to_body": true, "sol": {"max_force_n": 3333.0}}"#).muscles(&small);
+        let ham = (&muscles[0], &MUSCLES[0]);
+        assert!((ham.0.slack_length_m - 0.9 * ham.1.slack_length_m).abs() < 1e-12);
+        assert!((ham.0.max_force_n - 0.5 * ham.1.max_force_n).abs() < 1e-9);
+        let lever = |muscle: &Muscle| muscle.attachments[1].unwrap().lever_m;
+        assert!((lever(ham.0) - 0.9 * lever(ham.1)).abs() < 1e-12);
+        let sol = muscles.iter().find(|muscle| muscle.name == "SOL_L").unwrap();
+        assert!((sol.max_force_n - 3333.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_override_holds_on_both_legs_and_is_checked() {
+        let subject = Subject::builtin(1).unwrap();
+        let muscles = read(r#"{"ham": {"hip_lever_m": 0.07}}"#).muscles(&subject);
+        for name in ["HAM_L", "HAM_R"] {
+            let ham = muscles.iter().find(|muscle| muscle.name == name).unwrap();
+            assert!((ham.attachments[0].unwrap().lever_m - 0.07).abs() < 1e-12);
+        }
+        for (text, expected) in [
+            (r#"{"ta": {"max_force_n": 1.0}}"#, "muscles.ta.max_force_n = 1 is outside the allowed range [50, 20000]"),
+            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m: unknown value \"0.05\"; known: nothing"),
+        ] {
+            let refusal = read(text).validate().unwrap_err().to_string();
+            assert!(refusal.contains(expected), "{refusal}");
+        }
+        assert!(serde_json::from_str::<MuscleParameters>(r#"{"soleus": {}}"#).is_err());
+    }
+}

@@ -1,0 +1,121 @@
+//! Electromyograms: the chain against SciPy, cycles and EMG RMSE against numbers worked out by hand.
+
+#![allow(clippy::unwrap_used)]
+
+use gait_optimizer::ModelError;
+use gait_optimizer::emg::{CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope, emg_rmse};
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Written by `tests/data/emg_scipy.py`.
+const SCIPY: &str = include_str!("data/emg_scipy.json");
+
+/// The signal of the script: bursts of 83 Hz, 211 Hz throughout, a movement artefact of 7 Hz, an offset.
+fn raw(samples: usize) -> Vec<f64> {
+    (0..samples)
+        .map(|k| {
+            let t = k as f64 / 1000.0;
+            let burst = 0.1 + (TAU * t / 1.1).sin().max(0.0);
+            burst * (TAU * 83.0 * t).sin() + 0.2 * (TAU * 211.0 * t + 1.0).sin() + 0.4 * (TAU * 7.0 * t).sin() + 0.5
+        })
+        .collect()
+}
+
+fn recording(samples: usize) -> EmgRecording {
+    EmgRecording { start_s: 0.0, rate_hz: 1000.0, channels: vec![("TA".to_owned(), raw(samples))] }
+}
+
+#[test]
+fn the_envelope_is_scipys() {
+    let envelope = recording(4400).envelopes(&EmgSettings::default()).unwrap().remove(0);
+    let scipy: Value = serde_json::from_str(SCIPY).unwrap();
+    let every = usize::try_from(scipy["every"].as_u64().unwrap()).unwrap();
+    let theirs: Vec<f64> = scipy["envelope"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    assert_eq!(theirs.len(), 84);
+    for (ours, theirs) in envelope.values.iter().step_by(every).zip(theirs) {
+        assert!((ours - theirs).abs() < 1e-9, "{ours} {theirs}");
+    }
+}
+
+#[test]
+fn settings_are_refused_by_name() {
+    let refusal = |change: &dyn Fn(&mut EmgSettings)| {
+        let mut settings = EmgSettings::default();
+        change(&mut settings);
+        recording(4400).envelopes(&settings).unwrap_err().to_string()
+    };
+    assert!(refusal(&|s| s.band_high_hz = 500.0).starts_with("emg.band_high_hz = 500 is outside the allowed range"));
+    assert!(refusal(&|s| s.band_low_hz = 0.0).starts_with("emg.band_low_hz = 0"));
+    assert!(refusal(&|s| s.envelope_hz = f64::NAN).starts_with("emg.envelope_hz = NaN"));
+    assert!(refusal(&|s| s.order = 3).contains("emg.order: unknown value \"3\"; known: 2, 4, 6, 8"));
+    let short = recording(27).envelopes(&EmgSettings::default()).unwrap_err().to_string();
+    assert_eq!(short, "channel TA: 27 samples, the filters need 28");
+}
+
+/// 0 to 2 s at 100 Hz, rising by 1 per second.
+fn ramp() -> Envelope {
+    let values = (0..=200).map(|k| f64::from(k) / 100.0).collect();
+    Envelope { channel: "TA".to_owned(), start_s: 0.0, rate_hz: 100.0, values }
+}
+
+#[test]
+fn a_cycle_is_the_mean_of_whole_strides() {
+    // Strides from 0.0 and from 0.9; a third would end after the recording, a fourth is too short.
+    let cycle = CycleActivity::cut(&ramp(), &[0.0, 0.9, 1.8, 1.9, 2.9]).unwrap();
+    assert_eq!((cycle.strides, cycle.mean.len()), (2, CYCLE_POINTS));
+    // Half way: 0.45 and 1.35, mean 0.9, standard deviation 0.9 / sqrt(2).
+    assert!((cycle.mean[50] - 0.9).abs() < 1e-12);
+    assert!((cycle.standard_deviation[50] - 0.9 / 2.0_f64.sqrt()).abs() < 1e-12);
+    assert!((cycle.peak() - 1.35).abs() < 1e-12 && (cycle.average() - 0.9).abs() < 1e-12);
+    let none = CycleActivity::cut(&ramp(), &[0.0, 0.2]).unwrap_err().to_string();
+    assert!(none.contains("none of the 1 strides lasts 0.8 to 1.6 s"), "{none}");
+}
+
+fn flat(channel: &str, level: f64) -> CycleActivity {
+    CycleActivity {
+        channel: channel.to_owned(),
+        mean: vec![level; CYCLE_POINTS],
+        standard_deviation: vec![0.0; CYCLE_POINTS],
+        strides: 1,
+    }
+}
+
+#[test]
+fn emg_rmse_is_what_the_hand_computes() {
+    let normal = [flat("TA", 0.5), flat("BF", 0.25)];
+    // Half the cycle (51 of 101 points) off by 0.2 in one channel, all of it by 0.3 in the other.
+    let mut gait = [flat("BF", 0.55), flat("TA", 0.5)];
+    gait[1].mean[..51].fill(0.7);
+    let by_hand = (51.0 / 101.0_f64).sqrt() * 0.2 + 0.3;
+    assert!((emg_rmse(&gait, &normal).unwrap() - by_hand).abs() < 1e-12);
+    assert!(matches!(emg_rmse(&gait[..1], &normal), Err(ModelError::Unknown { value, .. }) if value == "TA"));
+
+    let walked = flat("TA", 0.6).normalised_by(&normal[0]).unwrap();
+    assert!((walked.mean[3] - 1.2).abs() < 1e-12, "prosthetic walking may exceed normal walking");
+    assert!(walked.normalised_by(&flat("TA", 0.0)).is_err());
+}
+
+#[test]
+fn tables_are_read_strictly() {
+    let table = |change: &dyn Fn(&mut String)| {
+        let mut text = "# site A\ntime_s,TA,BF\n".to_owned();
+        for k in 0..60 {
+            writeln!(text, "{},0.{k},1", f64::from(k) / 1000.0).unwrap();
+        }
+        change(&mut text);
+        EmgRecording::from_csv("emg.csv", &text)
+    };
+    let whole = table(&|_| {}).unwrap();
+    assert!((whole.rate_hz - 1000.0).abs() < 1e-6);
+    assert!(whole.channels.iter().map(|(name, samples)| (name.as_str(), samples.len())).eq([("TA", 60), ("BF", 60)]));
+    for (from, to, expected) in [
+        ("\n0.01,0.10,1", "\n0.01,x,1", "emg.csv, line 13, column 2"),
+        ("\n0.03,0.30,1\n", "\n0.0301,0.30,1\n0.0302,0,0\n", "is not on an even grid"),
+        ("time_s,", "time,", "expected \"time_s\""),
+        ("TA,BF", "TA,TA", "is there twice"),
+    ] {
+        let refusal = table(&|text| *text = text.replace(from, to)).unwrap_err().to_string();
+        assert!(refusal.contains(expected), "{refusal}");
+    }
+}

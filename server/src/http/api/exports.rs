@@ -1,0 +1,91 @@
+//! A trial's gait for other programs.
+
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Id, Params};
+use crate::http::may::May;
+use crate::store::trials::{Trial, TrialState};
+use crate::store::{TrialId, consents, gaits, trials};
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use gait_optimizer::Gait;
+use gait_optimizer::export::{self, ControllerFile};
+use serde::Deserialize;
+
+/// How densely a gait is sampled.
+#[derive(Debug, Deserialize)]
+pub(super) struct Sampling {
+    /// Samples per second.
+    #[serde(default = "two_hundred")]
+    rate_hz: f64,
+}
+
+fn two_hundred() -> f64 {
+    200.0
+}
+
+/// `GET /trials/{id}/gait.mot`: OpenSim motion file.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/gait.mot",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
+    responses((status = 200, description = "OpenSim motion file: degrees, OpenSim's signs", body = String, content_type = "text/plain")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn motion_file(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    Params(sampling): Params<Sampling>,
+) -> Result<Response, Error> {
+    let (_, gait) = leaving(&app, id).await?;
+    let text = export::motion_file(&gait, sampling.rate_hz)?;
+    Ok(file("text/plain; charset=utf-8", &format!("gait-{}.mot", id.short()), text))
+}
+
+/// `GET /trials/{id}/controller.json`: what the device's controller needs.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/controller.json",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial; its gait has converged"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
+    responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints; it explains its fields", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn controller(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    Params(sampling): Params<Sampling>,
+) -> Result<Response, Error> {
+    let (trial, gait) = leaving(&app, id).await?;
+    // The last iterate of a solve without a solution must not reach a device.
+    if trial.state != TrialState::Converged {
+        let (number, state) = (trial.number, trial.state.as_str());
+        return Err(Error::conflict(format!("trial {number} is {state}: a device only gets a gait that converged")));
+    }
+    let controller = ControllerFile::new(&gait, sampling.rate_hz)?;
+    let text = serde_json::to_string_pretty(&controller).map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(file("application/json", &format!("controller-{}.json", id.short()), text))
+}
+
+/// A trial and its gait, where its subject lets it be given out.
+async fn leaving(app: &AppState, id: TrialId) -> Result<(Trial, Gait), Error> {
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, id).await?;
+    consents::may_be_shown(&mut reader, trial.study_id).await?;
+    let gait = gaits::get(&mut reader, id).await?;
+    Ok((trial, gait))
+}
+
+/// An answer that a browser saves under `name`.
+fn file(kind: &'static str, name: &str, text: String) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
+    ];
+    (headers, text).into_response()
+}

@@ -1,0 +1,182 @@
+//! Reference gaits: the list with the form that imports one, and each with its curves.
+
+use super::error::{Page, PageError, page};
+use super::gait_charts::Drawn;
+use crate::access::{Permission, Read, Run};
+use crate::error::{Error, FieldError};
+use crate::http::AppState;
+use crate::http::extract::{Form as Submitted, Id, Params};
+use crate::http::may::May;
+use crate::plots::{Chart, Stroke};
+use crate::store::reference_gaits::{self, ReferenceGait};
+use crate::store::subjects::{self, Subject};
+use crate::store::{Connection, ReferenceGaitId, SubjectId, commit};
+use crate::studies::recording::{self, Form, Match, NewReferenceGait, Strikes, Unit};
+use askama::Template;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
+use serde::Deserialize;
+use std::str::FromStr;
+
+/// The fields as typed, so that a refused form comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Fields {
+    name: String,
+    form: Form,
+    recording: String,
+    unit: String,
+    force_column: String,
+    strikes: Strikes,
+    heel_strikes_s: String,
+    height_m: String,
+    body_mass_kg: String,
+}
+
+impl Fields {
+    fn read(&self) -> Result<NewReferenceGait, Error> {
+        let given = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
+        let size = |field, text: &str| given(text).map(|text| number(field, &text)).transpose();
+        Ok(NewReferenceGait {
+            name: self.name.clone(),
+            form: self.form,
+            recording: self.recording.clone(),
+            unit: match self.unit.as_str() {
+                "" => None,
+                "degrees" => Some(Unit::Degrees),
+                "radians" => Some(Unit::Radians),
+                other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
+            },
+            force_column: given(&self.force_column),
+            strikes: self.strikes,
+            heel_strikes_s: match given(&self.heel_strikes_s) {
+                None => Vec::new(),
+                Some(text) => text.split(',').map(|part| number("heel_strikes_s", part)).collect::<Result<_, _>>()?,
+            },
+            height_m: size("height_m", &self.height_m)?,
+            body_mass_kg: size("body_mass_kg", &self.body_mass_kg)?,
+        })
+    }
+}
+
+fn number(field: &str, text: &str) -> Result<f64, Error> {
+    f64::from_str(text.trim()).map_err(|_| Error::invalid(field, text, "a number"))
+}
+
+#[derive(Template)]
+#[template(path = "reference_gaits.html")]
+struct ReferenceGaitsPage {
+    matches: Vec<Match>,
+    subjects: Vec<Subject>,
+    /// Whom the distances are measured from.
+    nearest_to: Option<Subject>,
+    may_run: bool,
+    fields: Fields,
+    refused: Option<FieldError>,
+}
+
+impl ReferenceGaitsPage {
+    async fn read(db: &mut Connection, subject: Option<SubjectId>, may_run: bool) -> Result<Self, Error> {
+        let nearest_to = match subject {
+            Some(id) => Some(subjects::get(db, id).await?),
+            None => None,
+        };
+        let matches = if let Some(subject) = &nearest_to {
+            recording::matches(db, &subject.body()).await?
+        } else {
+            let all = reference_gaits::all(db).await?.into_iter();
+            all.map(|reference_gait| Match { reference_gait, distance: None }).collect()
+        };
+        let subjects = subjects::all(db).await?;
+        Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })
+    }
+
+    fn refuses(&self, field: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.field == field)
+    }
+
+    fn is_nearest_to(&self, subject: &Subject) -> bool {
+        self.nearest_to.as_ref().is_some_and(|chosen| chosen.id == subject.id)
+    }
+}
+
+/// Whom to match.
+#[derive(Debug, Deserialize)]
+pub(super) struct To {
+    #[serde(default)]
+    subject: Option<SubjectId>,
+}
+
+/// `GET /references`.
+pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
+    let may_run = may.caller.may(Run::NEEDED);
+    page(&ReferenceGaitsPage::read(&mut *app.read().await?, to.subject, may_run).await?)
+}
+
+/// `POST /references`.
+pub(super) async fn import(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Submitted(fields): Submitted<Fields>,
+) -> Result<Response, PageError> {
+    let definition = match fields.read() {
+        Ok(new) => new.definition_aside().await,
+        Err(error) => Err(error),
+    };
+    let definition = match definition {
+        Ok(definition) => definition,
+        Err(Error::Invalid(refused)) => {
+            let empty = ReferenceGaitsPage::read(&mut *app.read().await?, None, true).await?;
+            let form = page(&ReferenceGaitsPage { fields, refused: Some(*refused), ..empty })?;
+            return Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response());
+        }
+        Err(other) => return Err(other.into()),
+    };
+    let mut writer = app.write().await?;
+    let added = recording::add(&mut writer, &may.caller.actor, &definition).await?;
+    commit(writer).await?;
+    Ok(Redirect::to(&format!("/references/{}", added.id)).into_response())
+}
+
+#[derive(Template)]
+#[template(path = "reference_gait.html")]
+struct ReferenceGaitPage {
+    reference: ReferenceGait,
+    steps: Vec<String>,
+    charts: Vec<Drawn>,
+}
+
+/// `GET /references/{id}`.
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<ReferenceGaitId>) -> Page {
+    let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
+    page(&ReferenceGaitPage {
+        steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
+        charts: charts(&reference.definition).iter().map(|chart| Drawn::new(chart, "")).collect(),
+        reference,
+    })
+}
+
+const TITLES: [&str; 5] = ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip"];
+
+/// Mean angles with their deviation over strides.
+fn charts(reference: &gait_optimizer::ReferenceGait) -> Vec<Chart> {
+    let line = |angle: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+        (0..reference.angles_rad.len()).map(|row| (row as f64, angle(row).to_degrees())).collect()
+    };
+    TITLES
+        .iter()
+        .enumerate()
+        .map(|(column, title)| {
+            let mean = |row: usize| reference.angles_rad[row][column];
+            let chart = Chart::new(title, "gait cycle from right heel strike, %", "angle, °");
+            let chart = chart.with("mean", 0, Stroke::Solid, line(&mean));
+            match &reference.standard_deviation_rad {
+                Some(deviation) => chart
+                    .with("one standard deviation above", 1, Stroke::Dashed, line(&|k| mean(k) + deviation[k][column]))
+                    .with("one below", 1, Stroke::Dashed, line(&|k| mean(k) - deviation[k][column])),
+                None => chart,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,24 @@
+//! Adding a device: one way in for the REST interface and the command line.
+
+use crate::error::Error;
+use crate::printable;
+use crate::store::Writer;
+use crate::store::audit::{self, Actor};
+use crate::store::devices::{self, Device};
+use gait_optimizer::Device as Definition;
+use serde_json::json;
+
+/// Checks a device and writes it; the one that is there already where it is the very same.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<Device, Error> {
+    printable::name("device.name", &definition.name, 80)?;
+    definition.validate()?;
+    let (device, added) = devices::ensure(writer, definition).await?;
+    if added {
+        let detail = json!({ "name": device.name });
+        audit::append(writer, actor, "device.add", &format!("device {}", device.id), &detail).await?;
+    }
+    Ok(device)
+}

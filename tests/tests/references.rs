@@ -1,0 +1,129 @@
+//! Reference gaits from recordings, through REST and pages.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::store::studies::StudyState;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use serde_json::{Value, json};
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Four strides of 1.1 s as our own table.
+fn recording() -> String {
+    sampled(100)
+}
+
+fn sampled(per_second: u32) -> String {
+    let mut text = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
+    for k in 0..=(44 * per_second / 10) {
+        let time = f64::from(k) / f64::from(per_second);
+        let phase = TAU * time / 1.1;
+        let (hip, knee) = (0.2 + 0.4 * phase.cos(), 0.4 - 0.35 * phase.cos());
+        let opposite = 0.2 - 0.4 * phase.cos();
+        writeln!(text, "{time},0.1,{opposite:.6},0.4,0.05,{hip:.6},{knee:.6}").unwrap();
+    }
+    text
+}
+
+fn new(name: &str, height_m: f64) -> Value {
+    json!({"name": name, "form": "csv", "recording": recording(), "height_m": height_m, "body_mass_kg": 66.0})
+}
+
+async fn service() -> (tempfile::TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    (folder, service)
+}
+
+#[tokio::test]
+async fn a_recording_becomes_the_reference_of_a_study() {
+    let (_folder, service) = service().await;
+    let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await;
+    assert_eq!(far.status, StatusCode::CREATED, "{}", far.text);
+    let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
+    let definition = &near["definition"];
+    assert_eq!(definition["angles_rad"].as_array().unwrap().len(), 101);
+    assert!(definition["provenance"].as_str().unwrap().contains("mean of 2 strides"), "{definition}");
+    assert!(definition["standard_deviation_rad"].is_array());
+    // The very same recording is the same reference gait.
+    assert_eq!(service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json()["id"], near["id"]);
+
+    let subject = service.subject().await;
+    let matches = service.fetch(&format!("/api/v1/subjects/{subject}/reference-gaits")).await.json();
+    let names: Vec<_> =
+        matches.as_array().unwrap().iter().map(|m| m["reference_gait"]["name"].as_str().unwrap()).collect();
+    assert_eq!(names[..2], ["near", "far"]);
+    assert!(matches[0]["distance"].as_f64().unwrap() < 0.2 && matches[2]["distance"].is_null(), "{matches}");
+
+    let id: gaitwright::store::ReferenceGaitId = near["id"].as_str().unwrap().parse().unwrap();
+    let study = service.study(|new| (new.reference_gait_id, new.trial_budget) = (Some(id), 1)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await.remove(0).id;
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    assert!(page.contains(&format!("<a href=\"/references/{id}\">near</a>")), "{page}");
+
+    let list = service.fetch(&format!("/references?subject={subject}")).await.text;
+    assert!(list.find(">near</a>").unwrap() < list.find(">far</a>").unwrap());
+    let page = service.fetch(&format!("/references/{id}")).await.text;
+    assert!(
+        page.contains("Right hip") && page.contains("one standard deviation above") && page.contains("<svg"),
+        "{page}"
+    );
+    let audit = service.fetch("/api/v1/audit").await.text;
+    assert_eq!(audit.matches("reference_gait.import").count(), 2, "{audit}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_is_not_whole_imports_nothing_and_says_where() {
+    let (_folder, service) = service().await;
+    let before = service.fetch("/api/v1/reference-gaits").await.json();
+    let text = recording();
+    let (half, _) = text.split_at(text.find("\n1,0.1,").unwrap() + 12);
+    for (change, expected) in [
+        (json!({"recording": half}), "recording, line 102"),
+        (json!({"recording": text.replace("\n1.5,0.1,", "\n1.5,x,")}), "recording, line 152"),
+        (json!({"recording": text.replace("hip_R_rad", "hip_rad")}), "hip_R_rad"),
+        (json!({"form": "opensim"}), "endheader"),
+        (json!({"strikes": "force"}), "no force under the right foot was recorded"),
+        (json!({"heel_strikes_s": [0.5, 99.0]}), "heel strike (s) = 99"),
+        (json!({"height_m": 17.2}), "height_m = 17.2 is outside the allowed range [1.4, 2.2]"),
+        (json!({"recording": format!("# {}\n{text}", "x".repeat(30_000))}), "at most 20000 bytes of comments"),
+        (json!({"name": " "}), "1 to 200 printable characters"),
+        (json!({"form": "c3d"}), "form"),
+    ] {
+        let mut body = new("x", 1.7);
+        body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
+        let refused = service.post("/api/v1/reference-gaits", &body).await;
+        assert!(refused.status.is_client_error(), "{change}: {}", refused.text);
+        assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
+    }
+    assert_eq!(service.fetch("/api/v1/reference-gaits").await.json(), before);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_form_imports_and_comes_back_as_it_was_typed() {
+    let (_folder, service) = service().await;
+    let kind = "application/x-www-form-urlencoded";
+    let form = |recording: &str, height: &str| {
+        let recording = recording.replace('\n', "%0D%0A").replace(',', "%2C");
+        format!("name=S03%2C+level&form=csv&strikes=kinematics&height_m={height}&body_mass_kg=&recording={recording}")
+    };
+    let refused = service.post_text("/references", kind, &form(&recording(), "tall")).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+    assert!(refused.text.contains("height_m: &#34;tall&#34;") || refused.text.contains("tall"), "{}", refused.text);
+    assert!(refused.text.contains("value=\"S03, level\"") && refused.text.contains("0.05,0.6"), "as it was typed");
+    let imported = service.post_text("/references", kind, &form(&recording(), "")).await;
+    assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
+    let page = service.fetch(imported.headers["location"].to_str().unwrap()).await;
+    assert!(page.status == StatusCode::OK && page.text.contains("S03, level"), "{}", page.text);
+    // More than the usual limit of a body is accepted here, and only here.
+    let mut body = new("long", 1.7);
+    body["recording"] = json!(sampled(10_000));
+    assert_eq!(service.post("/api/v1/reference-gaits", &body).await.status, StatusCode::CREATED);
+    assert_eq!(service.post("/api/v1/subjects", &body).await.status, StatusCode::PAYLOAD_TOO_LARGE);
+    service.stop().await;
+}

@@ -1,0 +1,20 @@
+// Lets a recording be chosen as a file: its text goes into the field that works without scripts, too.
+
+const field = document.querySelector("[data-recording]");
+const text = field?.querySelector("textarea");
+if (text) {
+  const label = document.createElement("label");
+  label.textContent = "File";
+  const input = document.createElement("input");
+  input.type = "file";
+  input.accept = ".mot,.sto,.csv,text/plain,text/csv";
+  label.append(input);
+  field.prepend(label);
+  input.addEventListener("change", async () => {
+    const [file] = input.files;
+    if (!file) return;
+    text.value = await file.text();
+    const name = document.querySelector("#name");
+    if (!name.value) name.value = file.name.replace(/\.[^.]*$/, "");
+  });
+}
