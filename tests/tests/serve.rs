@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_tests::client::{get, send};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 /// A service as a process, killed when dropped.
 struct Process {
@@ -62,6 +64,24 @@ fn the_first_start_prints_a_link_that_signs_in_once() {
     assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
     let second = send(process.address(), "POST", &path, "").unwrap();
     assert!(!second.head.to_lowercase().contains("set-cookie"), "{}", second.head);
+}
+
+#[test]
+fn who_connects_and_says_nothing_whole_is_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    let silent = |said: &'static str| {
+        let mut stream = TcpStream::connect(process.address()).unwrap();
+        std::thread::spawn(move || {
+            stream.write_all(said.as_bytes()).unwrap();
+            stream.set_read_timeout(Some(Duration::from_mins(1))).unwrap();
+            // Cut off, with or without a word: not the end of our patience.
+            stream.read_to_end(&mut Vec::new()).map_or_else(|e| e.kind() == ErrorKind::ConnectionReset, |_| true)
+        })
+    };
+    let cut_off = [silent(""), silent("GET / HTTP/1.1\r\nhost: localhost\r\n")].map(|one| one.join().unwrap());
+    assert_eq!(cut_off, [true, true]);
+    assert_eq!(get(process.address(), "/health").unwrap().status, 200);
 }
 
 #[test]

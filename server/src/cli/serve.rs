@@ -13,6 +13,8 @@ use crate::workers::{Dispatch, GaitSolver, InProcess, LEASE};
 use axum_server::Handle;
 use axum_server::tls_rustls::RustlsConfig;
 use clap::Args;
+use hyper_util::rt::{TokioExecutor, TokioTimer};
+use hyper_util::server::conn::auto::Builder;
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,6 +22,8 @@ use std::time::Duration;
 
 /// Requests that run when the service is told to stop have so long to end.
 const DRAIN: Duration = Duration::from_secs(20);
+/// A connection without a whole request head for so long is closed.
+const SILENCE: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Args)]
 pub(super) struct Serve {
@@ -104,13 +108,17 @@ impl Serve {
         let service = app.into_make_service();
         let served = match tls {
             Some(config) => {
-                axum_server::from_tcp_rustls(listener, config)
-                    .map_err(cannot_listen)?
-                    .handle(handle)
-                    .serve(service)
-                    .await
+                let server = axum_server::from_tcp_rustls(listener, config).map_err(cannot_listen)?;
+                let mut server = server.handle(handle).http1_only();
+                cut_off_silence(server.http_builder());
+                server.serve(service).await
             }
-            None => axum_server::from_tcp(listener).map_err(cannot_listen)?.handle(handle).serve(service).await,
+            None => {
+                let server = axum_server::from_tcp(listener).map_err(cannot_listen)?;
+                let mut server = server.handle(handle).http1_only();
+                cut_off_silence(server.http_builder());
+                server.serve(service).await
+            }
         };
         director.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
@@ -131,13 +139,22 @@ impl Serve {
     }
 }
 
+/// Whoever connects and does not say what is wanted loses the connection.
+fn cut_off_silence(http: &mut Builder<TokioExecutor>) {
+    http.http1().timer(TokioTimer::new()).header_read_timeout(SILENCE);
+}
+
 async fn certificate_of(certificate: PathBuf, key: PathBuf) -> Result<RustlsConfig, Error> {
     // Fails only when one was installed before, and that is this one.
     let _ = rustls::crypto::ring::default_provider().install_default();
     let name = certificate.display().to_string();
-    RustlsConfig::from_pem_file(certificate, key)
+    let read = RustlsConfig::from_pem_file(certificate, key)
         .await
-        .map_err(|e| Error::Malformed(format!("cannot use the certificate {name} and its key: {e}")))
+        .map_err(|e| Error::Malformed(format!("cannot use the certificate {name} and its key: {e}")))?;
+    // Silence is cut off in HTTP/1 alone, so that is what is spoken.
+    let mut config = rustls::ServerConfig::clone(&read.get_inner());
+    config.alpn_protocols = vec![b"http/1.1".to_vec()];
+    Ok(RustlsConfig::from_config(Arc::new(config)))
 }
 
 /// The number given, or that of the cores.
