@@ -106,19 +106,16 @@ impl Serve {
             }
         });
         let service = app.into_make_service();
-        let served = match tls {
-            Some(config) => {
-                let server = axum_server::from_tcp_rustls(listener, config).map_err(cannot_listen)?;
-                let mut server = server.handle(handle).http1_only();
-                cut_off_silence(server.http_builder());
-                server.serve(service).await
-            }
-            None => {
-                let server = axum_server::from_tcp(listener).map_err(cannot_listen)?;
-                let mut server = server.handle(handle).http1_only();
-                cut_off_silence(server.http_builder());
-                server.serve(service).await
-            }
+        let served = if let Some(config) = tls {
+            let server = axum_server::from_tcp_rustls(listener, config).map_err(cannot_listen)?;
+            let mut server = server.handle(handle).http1_only();
+            cut_off_silence(server.http_builder());
+            server.serve(service).await
+        } else {
+            let server = axum_server::from_tcp(listener).map_err(cannot_listen)?;
+            let mut server = server.handle(handle).http1_only();
+            cut_off_silence(server.http_builder());
+            server.serve(service).await
         };
         director.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
