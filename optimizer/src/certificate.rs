@@ -129,10 +129,10 @@ fn objections(certificate: &Certificate) -> Vec<String> {
     if let Some(fall) = &certificate.fall {
         objections.push(format!("the simulated walker falls: {fall}"));
     }
-    if let Some(map) = &certificate.return_map {
-        if !map.is_stable() {
-            objections.push(format!("the gait is unstable: its largest multiplier is {:.4}", map.largest));
-        }
+    if let Some(map) = &certificate.return_map
+        && !map.is_stable()
+    {
+        objections.push(format!("the gait is unstable: its largest multiplier is {:.4}", map.largest));
     }
     for map in [&certificate.return_map, &certificate.free_hip_return_map].into_iter().flatten() {
         let difference = (map.largest - map.largest_by_differences).abs();

@@ -12,7 +12,7 @@ use serde_json::json;
 #[derive(Debug)]
 pub enum Examination {
     /// It was made before.
-    Made(Certificate),
+    Made(Box<Certificate>),
     /// The gait to examine.
     Ahead(Box<Gait>),
 }
@@ -23,7 +23,7 @@ pub enum Examination {
 /// [`Error::Conflict`] when the trial has no converged gait, or what the database reports.
 pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Examination, Error> {
     if let Some(certificate) = certificates::find(reader, trial).await? {
-        return Ok(Examination::Made(certificate));
+        return Ok(Examination::Made(Box::new(certificate)));
     }
     let found = trials::get(reader, trial).await?;
     if found.state != TrialState::Converged {
@@ -39,7 +39,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Examinatio
 /// When the gait is not well-formed.
 pub async fn certificate(examination: Examination) -> Result<Certificate, Error> {
     match examination {
-        Examination::Made(certificate) => Ok(certificate),
+        Examination::Made(certificate) => Ok(*certificate),
         Examination::Ahead(gait) => Ok(tokio::task::spawn_blocking(move || certify(&gait))
             .await
             .map_err(|e| Error::Internal(e.to_string()))??),

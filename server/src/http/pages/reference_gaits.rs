@@ -81,12 +81,11 @@ impl ReferenceGaitsPage {
             Some(id) => Some(subjects::get(db, id).await?),
             None => None,
         };
-        let matches = match &nearest_to {
-            Some(subject) => recording::matches(db, &subject.body()).await?,
-            None => {
-                let all = reference_gaits::all(db).await?.into_iter();
-                all.map(|reference_gait| Match { reference_gait, distance: None }).collect()
-            }
+        let matches = if let Some(subject) = &nearest_to {
+            recording::matches(db, &subject.body()).await?
+        } else {
+            let all = reference_gaits::all(db).await?.into_iter();
+            all.map(|reference_gait| Match { reference_gait, distance: None }).collect()
         };
         let subjects = subjects::all(db).await?;
         Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })
@@ -144,7 +143,15 @@ pub(super) async fn import(
 struct ReferenceGaitPage {
     reference: ReferenceGait,
     steps: Vec<String>,
-    charts: Vec<(String, String, Vec<(String, String)>)>,
+    charts: Vec<Drawn>,
+}
+
+/// A chart ready for the page.
+struct Drawn {
+    title: String,
+    svg: String,
+    /// Class and label of each line.
+    legend: Vec<(String, String)>,
 }
 
 /// `GET /references/{id}`.
@@ -153,7 +160,7 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<Re
     let charts = charts(&reference.definition);
     let charts = charts.iter().map(|chart| {
         let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-        (chart.title.clone(), chart.svg(), legend)
+        Drawn { title: chart.title.clone(), svg: chart.svg(), legend }
     });
     page(&ReferenceGaitPage {
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
