@@ -58,7 +58,7 @@ impl Tune {
         let new = NewStudy {
             device_id: Some(device.id),
             reference_gait_id: Some(reference.id),
-            gait_settings,
+            gait_settings: Box::new(gait_settings),
             muscles: self.muscles.is_on(),
             trial_budget: self.trials,
             parallel_trials: u32::try_from(workers).unwrap_or(1),

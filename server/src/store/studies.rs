@@ -130,9 +130,9 @@ pub struct StudyPlan {
     pub reference_gait_id: ReferenceGaitId,
     /// With muscles (C1-C12) or without (C1-C4).
     pub muscles: bool,
-    /// Settings of the gait problem.
+    /// Settings of the gait problem; boxed, as plans pass through many futures.
     #[schema(value_type = Object)]
-    pub gait_settings: GaitSettings,
+    pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
     #[schema(value_type = Object)]
     pub solve_options: SolveOptions,

@@ -519,7 +519,7 @@ async fn assignment_of(
         Some(from) => Some(gaits::warm_start(&mut reader, from).await?),
         None => None,
     };
-    let (muscles, settings) = (plan.muscles, plan.gait_settings);
+    let (muscles, settings) = (plan.muscles, *plan.gait_settings);
     let problem = GaitProblem { subject, device, bounds, muscles, settings, reference };
     Ok(Assignment { attempt, number, problem, warm_start, options: plan.solve_options })
 }

@@ -35,7 +35,7 @@ pub struct NewStudy {
     /// Settings of the gait problem.
     #[serde(default)]
     #[schema(value_type = Object)]
-    pub gait_settings: GaitSettings,
+    pub gait_settings: Box<GaitSettings>,
     /// Limits of one solve.
     #[serde(default)]
     #[schema(value_type = Object)]
@@ -111,7 +111,7 @@ impl NewStudy {
             device_id: None,
             reference_gait_id: None,
             muscles: true,
-            gait_settings: GaitSettings::default(),
+            gait_settings: Box::default(),
             solve_options: SolveOptions::default(),
             base_bounds: TunedBounds::default(),
             search_space: None,
@@ -138,7 +138,7 @@ impl NewStudy {
             device_id: Some(plan.device_id),
             reference_gait_id: Some(plan.reference_gait_id),
             muscles: plan.muscles,
-            gait_settings: plan.gait_settings,
+            gait_settings: plan.gait_settings.clone(),
             solve_options: plan.solve_options,
             base_bounds: plan.base_bounds,
             search_space: Some(plan.search_space.clone()),
