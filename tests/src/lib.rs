@@ -7,4 +7,5 @@ pub mod analytic;
 pub mod broker;
 pub mod cli;
 pub mod client;
+pub mod many_trials;
 pub mod service;

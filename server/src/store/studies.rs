@@ -282,6 +282,19 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
+/// The newest studies that go on only when a person does something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn waiting_for_people(db: &mut Connection, limit: u32) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where state in ('waiting', 'paused', 'draft') order by id desc limit ?")
+            .bind(limit)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// Studies of a subject that did not end.
 ///
 /// # Errors
