@@ -351,6 +351,23 @@ mod tests {
         }
     }
 
+    /// Of two actions, being the best of those tried is being preferred without noise, however large the nugget.
+    #[test]
+    fn the_best_of_two_is_the_preferred_one_with_any_nugget() {
+        for nugget in [1e-5, 0.1, 1.0] {
+            let (winner, loser) = (ActionIndex(0), ActionIndex(20));
+            let log =
+                FeedbackLog { visited: vec![winner, loser], feedback: vec![Feedback::Preference { winner, loser }; 3] };
+            let settings =
+                LearnerSettings { nugget, preference_noise: 1e-3, ..LearnerSettings::published(Method::Eubo) };
+            let belief = posterior(&space(), &log, &settings).unwrap();
+            let preferred = belief.preference_probability(winner, loser).unwrap();
+            let best = belief.best_of_visited(4000, 1).unwrap();
+            assert_eq!(best[0].action, winner);
+            assert!((best[0].probability - preferred).abs() < 0.012, "{nugget}: {} {preferred}", best[0].probability);
+        }
+    }
+
     #[test]
     fn answers_are_coherent() {
         for method in [Method::LineCoSpar, Method::Eubo] {

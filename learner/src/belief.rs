@@ -12,6 +12,9 @@ use crate::random::Random;
 use crate::settings::Link;
 use crate::space::{ActionIndex, SearchSpace};
 
+/// Share of the prior variance by which rounding may leave a covariance short of positive.
+const ROUNDING: f64 = 1e-9;
+
 /// An answer before it is attached to points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Answer {
@@ -63,7 +66,6 @@ impl Chain {
             Some((end, state)) => (end, Some(state)),
             None => (0, None),
         };
-        self.answers = answers.to_vec();
         let mut before = self.base.take().filter(|(base, _)| *base < end);
         while end < answers.len() || state.is_none() {
             let mut model = state.as_ref().map_or_else(Model::default, |s| s.model.roomy());
@@ -84,6 +86,8 @@ impl Chain {
             end = next;
         }
         let state = state.unwrap_or_else(|| Arc::new(State::prior()));
+        // Only now: after an error the old tip belongs to the old answers.
+        self.answers = answers.to_vec();
         self.base = before;
         self.tip = Some((end, Arc::clone(&state)));
         Ok(state)
@@ -174,6 +178,18 @@ impl Belief {
         self.covariance(a, a).max(0.0)
     }
 
+    /// Covariances of a few distinct actions, fit for a joint draw: what a point was told about contains its nugget, any
+    /// other action gets its own here, and rounding may leave a point's variance a hair short of positive.
+    pub(crate) fn joint_covariance(&self, views: &[View]) -> Square {
+        let own = |view: &View| match view.slot {
+            Some(_) => ROUNDING * self.kernel.variance,
+            None => self.kernel.nugget,
+        };
+        Square::from_fn(views.len(), |i, j| {
+            self.covariance(&views[i], &views[j]) + if i == j { own(&views[i]) } else { 0.0 }
+        })
+    }
+
     /// Mean and variance of the difference of two actions.
     pub(crate) fn difference(&self, a: &View, b: &View) -> (f64, f64) {
         let variance = self.covariance(a, a) + self.covariance(b, b) - 2.0 * self.covariance(a, b);
@@ -184,8 +200,7 @@ impl Belief {
     pub(crate) fn draw(&self, others: &[Vec<usize>], random: &mut Random) -> Result<(Vec<f64>, Vec<f64>)> {
         let model = self.model();
         let noise: Vec<f64> = model.points.iter().map(|_| random.normal()).collect();
-        // Rounding may leave the covariance a hair short of positive.
-        let covariance = self.approximation().covariance.ridged(1e-9 * self.kernel.variance);
+        let covariance = self.approximation().covariance.ridged(ROUNDING * self.kernel.variance);
         let spread = Cholesky::new(&covariance)?.multiply(&noise);
         let points: Vec<f64> = self.approximation().mean.iter().zip(spread).map(|(m, s)| m + s).collect();
         let mut whitened_draw = points.clone();

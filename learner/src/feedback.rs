@@ -55,6 +55,7 @@ impl Feedback {
 
 /// The record: what was tried and what was said, each in order.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FeedbackLog {
     /// Actions tried, in order. A repeated trial may appear twice.
     pub visited: Vec<ActionIndex>,

@@ -37,6 +37,6 @@ pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
 pub use posterior::{Learner, Posterior, Prediction, posterior};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch};
-pub use settings::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
+pub use settings::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
 pub use space::{ActionIndex, Dimension, SearchSpace};
 pub use state::LearnerState;

@@ -10,7 +10,7 @@ use crate::hyperparameters::Hyperparameters;
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
 use crate::kernel::{Kernel, KernelShape};
 use crate::likelihood::Interval;
-use crate::linalg::{Cholesky, Square};
+use crate::linalg::Cholesky;
 use crate::random::Random;
 use crate::settings::{Inference, Labels, LearnerSettings};
 use crate::space::{ActionIndex, Dimension, SearchSpace};
@@ -298,10 +298,8 @@ impl Posterior {
     pub(crate) fn sampler(&self, actions: &[ActionIndex]) -> Result<Sampler> {
         let belief = &self.utility;
         let views: Vec<_> = actions.iter().map(|&a| belief.view(a, self.space.levels(a))).collect();
-        let covariance = Square::from_fn(actions.len(), |i, j| {
-            belief.covariance(&views[i], &views[j]) + if i == j { belief.kernel.nugget } else { 0.0 }
-        });
-        Ok(Sampler { mean: views.iter().map(|v| v.mean).collect(), factor: Cholesky::new(&covariance)? })
+        let factor = Cholesky::new(&belief.joint_covariance(&views))?;
+        Ok(Sampler { mean: views.iter().map(|v| v.mean).collect(), factor })
     }
 }
 

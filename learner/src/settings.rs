@@ -9,6 +9,9 @@ mod written;
 
 use written::WrittenSettings;
 
+/// [`LearnerSettings::line_trials`] for lines throughout: more trials than any study has, and exact in every JSON reader.
+pub const EVERY_TRIAL: usize = u32::MAX as usize;
+
 /// How the next action is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -179,7 +182,7 @@ impl LearnerSettings {
     /// EUBO for answers that may be wrong: it assumes much noise and a smooth utility, so that it leans on many answers
     /// rather than on the last one, and never leaves the neighbourhood of the best.
     pub fn for_uncertain_answers() -> Self {
-        Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: usize::MAX, ..Self::of(Method::Eubo) }
+        Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: EVERY_TRIAL, ..Self::of(Method::Eubo) }
     }
 
     /// The settings of a method as the literature has them: LineCoSpar may repeat actions and compares with the last
@@ -210,7 +213,7 @@ impl LearnerSettings {
             samples_per_iteration: 1,
             repeats: true,
             lines: 0,
-            line_trials: usize::MAX,
+            line_trials: EVERY_TRIAL,
             partner: Partner::Previous,
             buffer: 1,
         };

@@ -11,7 +11,7 @@ const MAX_ACTIONS: u64 = 1 << 53;
 /// Largest number of actions that are looked at one by one.
 const MAX_ENUMERATED: usize = 1 << 20;
 /// Largest number of levels of one dimension.
-const MAX_LEVELS: usize = 10_000;
+const MAX_LEVELS: usize = 1_000;
 /// Largest number of dimensions.
 const MAX_DIMENSIONS: usize = 256;
 /// Largest size of a level: squares of distances stay finite.
@@ -25,6 +25,7 @@ const LONGEST_LENGTHSCALE: f64 = 1e4;
 
 /// One tuned quantity and the values it may take.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Dimension {
     /// What people call it.
     pub name: String,

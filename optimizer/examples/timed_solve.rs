@@ -1,7 +1,8 @@
 //! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guesses 1] [--mesh 4,4,6,6]` (one guess, as the other side has one start; the service tries two).
+//! [--guesses 1] [--mesh 4,4,6,6] [--trace]` (one guess, as the other side has one start; the service tries two;
+//! `--trace` prints a line per iteration on stderr).
 
 use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
 use std::error::Error;
@@ -9,6 +10,7 @@ use std::error::Error;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut subject = 1;
     let mut muscles = false;
+    let mut trace = false;
     let mut settings = GaitSettings::reference_problem();
     let mut options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
     let mut arguments = std::env::args().skip(1);
@@ -16,6 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
         match argument.as_str() {
             "--muscles" => muscles = true,
+            "--trace" => trace = true,
             "--subject" => subject = value()?.parse()?,
             "--guesses" => options.cold_guesses = value()?.parse()?,
             "--mesh" => {
@@ -35,6 +38,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         &options,
         &mut |record| {
             let phase = serde_json::json!(record.phase);
+            if trace {
+                eprintln!(
+                    "{phase} {:4} objective {:.8} violation {:.2e} dual {:.2e} barrier {:.1e} step {:.2e}",
+                    record.iteration,
+                    record.objective,
+                    record.constraint_violation,
+                    record.dual_infeasibility,
+                    record.barrier,
+                    record.step
+                );
+            }
             match phases.last_mut() {
                 Some((name, count)) if *name == phase => *count += 1,
                 _ => phases.push((phase, 0)), // the record of the start is not an iteration

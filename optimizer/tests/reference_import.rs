@@ -94,22 +94,26 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
         let (_, gait) = golden_gait(subject, muscles);
         let text = motion_file(&gait, 2000.0).unwrap();
         let recording = Recording::from_opensim("gait.mot", &text, None, None).unwrap();
-        // The file has eight decimals; linear between rows, 90 rad/s² leave h^2/8 qdd = 3e-6 rad.
+        // The file has eight decimals; linear between rows, 90 rad/s² leave h²/8 qdd = 3e-6 rad. Where an impact changes
+        // a velocity by up to 10 rad/s between two rows, h/4 of that: 1.3e-3 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
         let strikes = HeelStrikes::Given(vec![0.0, end]);
         let reference = recording.reference("gait", &strikes, Walker::default()).unwrap();
-        let mut worst = 0.0_f64;
         for (domain, name) in gait.domains.iter().zip(0..) {
-            for (time, q) in domain.time_s.iter().zip(&domain.q) {
+            for ((time, q), k) in domain.time_s.iter().zip(&domain.q).zip(0..) {
+                let at_an_impact = k == 0 || k + 1 == domain.time_s.len();
+                let tolerance = if at_an_impact { 1.3e-3 } else { 3e-6 };
                 let found = recording_at(&recording, *time);
                 for i in 0..5 {
-                    worst = worst.max((found[i] - q[2 + i]).abs());
+                    let difference = (found[i] - q[2 + i]).abs();
+                    assert!(difference < tolerance, "domain {name}, coordinate {i} at {time} s: {difference}");
                 }
-                assert!(worst < 3e-6, "domain {name} at {time}: {worst}");
             }
         }
-        let middle = gait.coordinates_at(0.5 * gait.stride_time_s);
-        assert!((reference.angles_rad[50][0] - middle[2]).abs() < 1e-3);
+        let middle = recording_at(&recording, 0.5 * end);
+        for i in 0..5 {
+            assert!((reference.angles_rad[50][i] - middle[i]).abs() < 1e-5, "coordinate {i}");
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! Load on loopback while real solves run: durable preference writes of several raters at a steady rate together, and
-//! study reads.
+//! study reads; then, with nothing else going on, the pages of a study of ten thousand trials.
 //!
 //! `cargo run --release -p gaitwright-tests --example load -- [SECONDS] [WRITES_PER_SECOND]`
 
@@ -9,6 +9,7 @@ use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::workers::{Assignment, Evaluate, GaitSolver};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::large;
 use gaitwright_tests::service::Service;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -148,5 +149,17 @@ async fn main() {
     println!("a solve with muscles ran on one worker: {running}; trials of that study: {}", trials.len());
     report("durable preference writes", writes, seconds);
     report("study reads", reads, seconds);
+    service.stop().await;
+
+    let (service, study, trial) = large::service(&folder.path().join("large.db")).await;
+    let times = large::times(&service, study, trial).await;
+    if let Some((path, time)) = times.iter().max_by_key(|(_, time)| *time) {
+        println!(
+            "slowest of {} pages and lists of a study of {} trials: {path}, {:.1} ms",
+            times.len(),
+            large::TRIALS,
+            time.as_secs_f64() * 1e3
+        );
+    }
     service.stop().await;
 }

@@ -8,8 +8,10 @@ use gait_optimizer::solve::{Phase, StartedFrom};
 use gait_optimizer::{
     CancelToken, DomainTrajectory, Gait, IterationRecord, SolveOutcome, SolveReport, SolveStatus, Violation, WarmStart,
 };
+use gaitwright::store::TrialId;
 use gaitwright::workers::{Assignment, Evaluate};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Number of iterations that every analytic solve reports.
@@ -24,10 +26,12 @@ pub struct Analytic {
     pub panics: Vec<u32>,
     /// Trials with these numbers panic the first time only.
     pub panics_once: Vec<u32>,
-    /// The first solve hangs after its first iteration, and does not hear that it is cancelled.
-    pub hangs_once: bool,
+    /// So many solves hang after their first iteration, and do not hear that they are cancelled.
+    pub hangs: u32,
     /// How many solves were begun.
     pub begun: AtomicU32,
+    /// Which solve made each iteration, in order: by the trial of its attempt.
+    pub made: Arc<Mutex<Vec<TrialId>>>,
 }
 
 impl Analytic {
@@ -58,6 +62,7 @@ impl Evaluate for Analytic {
                 status = SolveStatus::Cancelled;
                 break;
             }
+            self.made.lock().unwrap().push(assignment.attempt.trial);
             let decay = 0.5_f64.powi(i32::try_from(iteration).unwrap_or(0));
             observer(&IterationRecord {
                 iteration,
@@ -69,7 +74,7 @@ impl Evaluate for Analytic {
                 step: 1.0,
                 guess: 0,
             });
-            if self.hangs_once && begun == 0 {
+            if begun < self.hangs {
                 loop {
                     std::thread::park();
                 }

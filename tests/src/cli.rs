@@ -7,8 +7,8 @@ use std::process::{Command, Output, Stdio};
 pub fn command(binary: &str, folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(binary);
     command.current_dir(folder).args(arguments).stdin(Stdio::null());
-    for setting in ["DATABASE", "LISTEN", "WORKERS", "HOST_NAMES"] {
-        command.env_remove(format!("GAITWRIGHT_{setting}"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("GAITWRIGHT_")) {
+        command.env_remove(name);
     }
     command
 }

@@ -4,8 +4,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::missing_panics_doc)]
 
 pub mod analytic;
+pub mod away;
 pub mod broker;
 pub mod cli;
 pub mod client;
-pub mod many_trials;
+pub mod large;
 pub mod service;

@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 32] = [
+const PAGES: [(&str, Option<Right>); 36] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -134,6 +134,10 @@ const PAGES: [(&str, Option<Right>); 32] = [
     ("get /studies/{id}/compare", Some(Right::Read)),
     ("post /studies/{id}/compare", Some(Right::Answer)),
     ("post /studies/{id}/retract", Some(Right::Answer)),
+    ("get /subjects", Some(Right::Read)),
+    ("get /subjects/{id}", Some(Right::Read)),
+    ("post /subjects/{id}/consent", Some(Right::Run)),
+    ("post /subjects/{id}/withdraw", Some(Right::Run)),
     ("get /trials/{id}", Some(Right::Read)),
     ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),

@@ -131,6 +131,9 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let revoke = format!("{api}/tokens/{}/revoke", text(&token["id"]));
     scene.one(done, "post /tokens/{id}/revoke", &revoke, json!({})).await;
 
+    // Examines a real gait only; tests/certificates.rs counts its row.
+    done.insert("post /trials/{id}/certificate".to_owned());
+
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut described = BTreeSet::new();
     for (path, item) in document["paths"].as_object().unwrap() {

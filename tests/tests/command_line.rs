@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gaitwright::store::Store;
 use gaitwright_tests::cli;
 use std::path::Path;
 use std::process::{Output, Stdio};
@@ -182,5 +183,49 @@ fn a_reader_that_goes_away_is_no_fault() {
         let text = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{text}");
         assert!(!text.contains("panicked"), "{text}");
+    }
+}
+
+#[test]
+fn a_service_whose_port_is_taken_leaves_nothing_behind() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    refused(&["serve", "--no-sign-in", "--listen", &address], &format!("cannot listen on {address}"));
+    let missing = ["serve", "--tls-certificate", "c.pem", "--tls-key", "k.pem", "--listen", "127.0.0.1:0"];
+    refused(&missing, "cannot use the certificate c.pem");
+}
+
+#[tokio::test]
+async fn a_database_that_cannot_be_written_is_named_with_what_it_needs() {
+    refused(&["tune", "--database", "missing/a.db"], "cannot open the database missing/a.db");
+    // Root may write everywhere, so a folder stands in the way of the write-ahead log.
+    let folder = tempfile::tempdir().unwrap();
+    Store::open(&folder.path().join("a.db")).await.unwrap().close().await;
+    std::fs::create_dir(folder.path().join("a.db-wal")).unwrap();
+    let output = gaitwright(folder.path(), &["tune", "--database", "a.db"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("cannot open the database a.db") && text.contains("its folder too"), "{text}");
+}
+
+#[test]
+fn the_environment_is_not_misread_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |name: &str, value: &str| {
+        cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &["config", "show"])
+            .env(name, value)
+            .output()
+            .unwrap()
+    };
+    let output = with("GAITWRIGHT_WORKER", "2");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && text.contains("GAITWRIGHT_WORKER is set, but is not a setting"), "{text}");
+    for (name, value) in
+        [("GAITWRIGHT_LOG_FORMAT", "xml"), ("GAITWRIGHT_LOG", "gaitwright=loud"), ("RUST_LOG", "a=b=c")]
+    {
+        let output = with(name, value);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(text.contains(name) && text.contains(value), "{text}");
     }
 }

@@ -3,11 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::audit;
+use gaitwright::cli::study::import;
+use gaitwright::http::openapi;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright::store::{archive, audit};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::time::Duration;
 
 #[tokio::test]
@@ -20,6 +23,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let draft = service.study(|new| new.start = false).await;
     let human = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
+    let pair = service.post(&format!("/api/v1/studies/{human}/blind/next"), &json!({})).await.json();
+    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     let running = service.study(|new| new.trial_budget = 50).await;
@@ -57,6 +62,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 60})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
+        (format!("/api/v1/studies/{human}/blind/next"), json!({})),
+        (format!("/api/v1/blind/{token}/answer"), json!({"answer": "first"})),
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
         (
             format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),
@@ -66,8 +73,6 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         let refused = service.post(&path, &body).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}: {}", refused.text);
     }
-    let blind = service.post(&format!("/api/v1/studies/{human}/blind/next"), &json!({})).await;
-    assert!(blind.json()["pair"].is_null(), "{}", blind.text);
     let form = format!("a={}&b={}&answer=b&source=subject&author=K&key={}", trials[0].id, trials[1].id, trials[0].id);
     let kind = "application/x-www-form-urlencoded";
     let refused = service.post_text(&format!("/studies/{finished}/compare"), kind, &form).await;
@@ -76,18 +81,54 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     assert_eq!(service.feedback(finished).await, heard);
     assert_eq!(service.trials(running).await.len(), tried);
 
-    // Nothing is given out; the record is kept.
-    for path in ["trials.csv", "history.csv"] {
-        let refused = service.fetch(&format!("/api/v1/studies/{finished}/{path}")).await;
+    // Nothing is shown or given out, whatever asks for it; the record is kept.
+    let heard_id = service.feedback(finished).await[0].id;
+    let named = [
+        ("/studies/{id}", finished.to_string()),
+        ("/trials/{id}", trials[0].id.to_string()),
+        ("/preferences/{id}", heard_id.to_string()),
+        ("/blind/{token}", token.clone()),
+    ];
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut closed = 0;
+    for (path, item) in document["paths"].as_object().unwrap().iter().filter(|(_, item)| item["get"].is_object()) {
+        let Some((of, id)) = named.iter().find(|(of, _)| path.starts_with(&format!("/api/v1{of}"))) else { continue };
+        let name = of.rsplit('/').next().unwrap();
+        for kind in item["get"]["responses"]["200"]["content"].as_object().unwrap().keys() {
+            let answer = service.fetch_as(&path.replace(name, id), kind).await;
+            let open = path == "/api/v1/studies/{id}";
+            let expected = if open { StatusCode::OK } else { StatusCode::CONFLICT };
+            assert_eq!(answer.status, expected, "{path} as {kind}: {}", answer.text);
+            closed += usize::from(!open);
+        }
+    }
+    assert!(closed > 15, "{closed}");
+    for (path, body) in [
+        (format!("/api/v1/trials/{}/certificate", trials[0].id), json!({})),
+        (format!("/api/v1/studies/{human}/unblind"), json!({"rater": "not signed in", "reason": "r"})),
+        (format!("/api/v1/preferences/{heard_id}/retract"), json!({"reason": "r"})),
+    ] {
+        let refused = service.post(&path, &body).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}: {}", refused.text);
     }
-    let table = service.fetch_as(&format!("/api/v1/studies/{finished}/preferences"), "text/csv").await;
-    assert_eq!(table.status, StatusCode::CONFLICT);
-    let gait = service.fetch(&format!("/api/v1/trials/{}/gait.csv", trials[0].id)).await;
-    assert_eq!(gait.status, StatusCode::CONFLICT);
+    for path in [
+        format!("/studies/{finished}/live"),
+        format!("/studies/{finished}/compare"),
+        format!("/trials/{}", trials[0].id),
+        format!("/rate/pair/{token}"),
+    ] {
+        let refused = service.fetch(&path).await;
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{path}");
+        assert!(refused.content_type().starts_with("text/html") && refused.text.contains("withdrew"), "{path}");
+    }
+    let best = trials.iter().filter_map(|trial| trial.gait_rmse_rad).fold(f64::INFINITY, f64::min);
+    for path in ["/".to_owned(), format!("/studies/{finished}")] {
+        let page = service.fetch(&path).await;
+        assert_eq!(page.status, StatusCode::OK);
+        assert!(page.text.contains("withdrew") && !page.text.contains(&format!("{best:.4}")), "{}", page.text);
+    }
     let compared = service.fetch(&format!("/api/v1/compare?ids={finished},{running}")).await;
     assert_eq!(compared.status, StatusCode::CONFLICT);
-    assert_eq!(service.fetch(&format!("/api/v1/studies/{finished}/trials")).await.status, StatusCode::OK);
     let said = service.fetch(&format!("{of_subject}/consents")).await.json();
     let kinds: Vec<_> = said.as_array().unwrap().iter().map(|row| row["kind"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["given", "withdrawn"]);
@@ -97,4 +138,72 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let again = service.post("/api/v1/studies", &json!({"subject_id": person, "start": false})).await;
     assert_eq!(again.status, StatusCode::CREATED, "{}", again.text);
     service.stop().await;
+}
+
+#[tokio::test]
+async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
+    let running = service.study(|new| new.trial_budget = 50).await;
+    let page = format!("/subjects/{}", service.subject().await);
+    let list = service.fetch("/subjects").await;
+    assert!(list.text.contains(&page) && list.text.contains("nothing written down"), "{}", list.text);
+    assert!(service.fetch(&page).await.text.contains("Nothing is written down"));
+    let send = async |act: &str, body: &str| {
+        service.post_text(&format!("{page}/{act}"), "application/x-www-form-urlencoded", body).await
+    };
+
+    assert_eq!(send("consent", "form=&after=0").await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert_eq!(send("consent", "form=version+3&after=0").await.status, StatusCode::SEE_OTHER);
+    let twice = send("consent", "form=version+3&after=0").await;
+    assert_eq!(twice.status, StatusCode::CONFLICT);
+    assert!(twice.text.contains("since this form was shown") && twice.text.matches("version 3</td>").count() == 1);
+
+    assert_eq!(send("withdraw", "reason=+").await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert_eq!(send("withdraw", "reason=moved+away").await.status, StatusCode::SEE_OTHER);
+    assert_eq!(service.get(running).await.state, StudyState::Stopped);
+    let shown = service.fetch(&page).await.text;
+    assert!(shown.contains("This subject withdrew") && shown.contains("moved away"), "{shown}");
+    assert!(!shown.contains("/withdraw\""), "it cannot be done twice");
+    assert_eq!(send("withdraw", "reason=again").await.status, StatusCode::CONFLICT);
+    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 10).await.unwrap();
+    let acts: Vec<_> = trail.iter().map(|row| row.action.as_str()).take(2).collect();
+    assert_eq!(acts, ["subject.withdraw", "subject.consent"]);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let person = service.subject().await;
+    let mut archives = Vec::new();
+    let mut last = None;
+    for seed in [1, 2] {
+        let study = service.study(|new| (new.seed, new.trial_budget) = (seed, 2)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        archives.push(archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap());
+        last = Some(study);
+    }
+    let withdraw = json!({"reason": "moved away"});
+    let path = format!("/api/v1/subjects/{person}/withdraw");
+    assert_eq!(service.post(&path, &withdraw).await.status, StatusCode::OK);
+    service.stop().await;
+    let study = last.unwrap().to_string();
+    let export = ["export", &study, "study.gait", "--database", "a.db"];
+    let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &export);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && text.contains("withdrew consent"), "{text}");
+    assert!(!folder.path().join("study.gait").exists());
+
+    // Elsewhere, where the subject withdraws after a first study came in.
+    let other = gaitwright::store::Store::open(&folder.path().join("b.db")).await.unwrap();
+    import(&other, &archives[0]).await.unwrap();
+    other.close().await;
+    drop(other);
+    let other = Service::start_as_is(&folder.path().join("b.db"), Analytic::default(), 1).await;
+    assert_eq!(other.post(&path, &withdraw).await.status, StatusCode::OK);
+    let refused = import(&other.store, &archives[1]).await.unwrap_err().to_string();
+    assert!(refused.contains("withdrew consent") && refused.contains("nothing was changed"), "{refused}");
+    other.stop().await;
 }

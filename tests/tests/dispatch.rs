@@ -61,7 +61,8 @@ impl Rig {
     async fn engine(&mut self, worker: Worker) -> Arc<dyn Dispatch> {
         let Some(broker) = &self.broker else {
             let panics_once = if worker == Worker::Dies { vec![1] } else { Vec::new() };
-            let solver = Analytic { panics_once, hangs_once: worker == Worker::Hangs, ..Analytic::slow(ITERATION) };
+            let solver =
+                Analytic { panics_once, hangs: u32::from(worker == Worker::Hangs), ..Analytic::slow(ITERATION) };
             return Arc::new(InProcess::new(1, Arc::new(solver)).with_lease(LEASE));
         };
         let url = broker.url();

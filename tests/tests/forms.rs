@@ -207,6 +207,25 @@ async fn a_form_that_is_sent_again_with_another_answer_says_which_one_counts() {
 }
 
 #[tokio::test]
+async fn who_answers_what_another_has_answered_is_told_so() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let give = format!("/api/v1/studies/{study}/preferences");
+    let said = |author: &str, answer: &str| json!({"trial_a": a, "trial_b": b, "answer": answer, "author": author});
+    let first = service.post(&give, &said("S01", "a")).await.json();
+    assert_eq!(first["beside"], json!([]));
+    assert_eq!(service.post(&give, &said("S01", "a")).await.json()["beside"], json!([]), "the same person again");
+    let other = json!({"trial_a": b, "trial_b": a, "answer": "a", "author": "K"});
+    assert_eq!(service.post(&give, &other).await.json()["beside"].as_array().unwrap().len(), 2);
+
+    let body = format!("a={a}&b={b}&answer=no_difference&source=clinician&author=L&note=&key={UNKNOWN}");
+    let sent = service.post_text(&format!("/studies/{study}/compare"), FORM, &body).await;
+    let page = service.fetch(sent.headers["location"].to_str().unwrap()).await.text;
+    assert!(page.contains("S01 has answered this comparison too: trial") && page.contains("K has answered"), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
     let (_folder, service) = service().await;
     let (study, a, b) = finished(&service).await;
@@ -314,7 +333,7 @@ async fn a_gait_page_explains_its_lines() {
     }
     assert!(page.contains(">cost</text>"), "the phases of the solve are marked");
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert!(page.contains("reference gait: ") && page.contains("Subject paper-1"));
+    assert!(page.contains("reference gait: ") && page.contains("paper-1</a> (1.727 m"));
     service.stop().await;
 }
 

@@ -2,14 +2,18 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
-use gaitwright::store::StudyId;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, events};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
+use http_body_util::BodyExt;
 use serde_json::{Value, json};
+use std::time::Duration;
 use tempfile::TempDir;
+use tower::ServiceExt;
 
 const PROBLEM: &str = "application/problem+json";
 
@@ -200,7 +204,8 @@ async fn preferences_are_given_read_back_and_taken_back() {
     let body = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "b", "author": "Dr K"});
     let given = service.post(&path, &body).await;
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
-    let row = given.json();
+    let mut row = given.json();
+    assert_eq!(row.as_object_mut().unwrap().remove("beside"), Some(json!([])), "nobody else answered this");
     assert_eq!((&row["kind"], &row["winner"]), (&json!("preference"), &json!(converged[1])));
     assert_eq!(service.fetch(given.headers["location"].to_str().unwrap()).await.json(), row);
 
@@ -391,5 +396,75 @@ async fn another_site_in_the_same_browser_may_not_change_anything() {
     assert_eq!(service.fetch("/api/v1/subjects").await.json().as_array().unwrap().len(), 2);
     let ours = [("origin", "http://127.0.0.1:8080"), ("host", "127.0.0.1:8080")];
     assert_eq!(service.send(send(&ours)).await.status, StatusCode::CREATED);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_page_size_that_cannot_be_is_refused_with_the_range() {
+    let (_folder, service) = service().await;
+    let study = finished(&service, 2).await;
+    let lists = [
+        "subjects".to_owned(),
+        "audit".to_owned(),
+        format!("studies/{study}/trials"),
+        format!("studies/{study}/preferences"),
+    ];
+    for list in lists {
+        for limit in ["0", "-1", "1001", "99999999999", "many", ""] {
+            let refused = service.fetch(&format!("/api/v1/{list}?limit={limit}")).await;
+            is_problem(&refused, StatusCode::UNPROCESSABLE_ENTITY, "/problems/invalid-field", "limit");
+            assert_eq!((&refused.json()["value"], &refused.json()["allowed"]), (&json!(limit), &json!("1 to 1000")));
+        }
+        assert_eq!(service.fetch(&format!("/api/v1/{list}?limit=1")).await.status, StatusCode::OK);
+    }
+    service.stop().await;
+}
+
+/// The events of a study as they come.
+async fn stream_of(service: &Service, study: StudyId, last_seen: Option<i64>) -> impl AsyncFnMut() -> String + use<> {
+    let mut request = Request::get(format!("/api/v1/studies/{study}/events"));
+    if let Some(seen) = last_seen {
+        request = request.header("last-event-id", seen);
+    }
+    let mut stream = service.router().oneshot(request.body(Body::empty()).unwrap()).await.unwrap().into_body();
+    async move || {
+        let frame = tokio::time::timeout(Duration::from_secs(20), stream.frame()).await.unwrap().unwrap().unwrap();
+        String::from_utf8(frame.into_data().unwrap().to_vec()).unwrap()
+    }
+}
+
+#[tokio::test]
+async fn events_are_replayed_after_the_last_one_that_was_seen() {
+    let (_folder, service) = service().await;
+    let study = finished(&service, 2).await;
+    let recorded = events::after(&mut service.store.read().await.unwrap(), study, 0, 100).await.unwrap();
+    assert!(recorded.len() > 5, "{recorded:?}");
+    let mut heard = stream_of(&service, study, Some(recorded[1].seq)).await;
+    assert!(heard().await.contains("event: study_state"));
+    let mut text = String::new();
+    while text.matches("id: ").count() < recorded.len() - 2 {
+        text.push_str(&heard().await);
+    }
+    let seen: Vec<i64> = text.lines().filter_map(|line| line.strip_prefix("id: ")?.parse().ok()).collect();
+    let expected: Vec<i64> = recorded[2..].iter().map(|event| event.seq).collect();
+    assert_eq!(seen, expected);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn whoever_listens_to_a_study_that_has_ended_is_told_so_and_hears_when_it_goes_on() {
+    let (_folder, service) = service().await;
+    let study = finished(&service, 2).await;
+    let path = format!("/api/v1/studies/{study}");
+    let mut heard = stream_of(&service, study, None).await;
+    let first = heard().await;
+    assert!(
+        first.contains("event: study_state") && first.contains("finished") && first.contains("all 2 trials"),
+        "{first}"
+    );
+    let extended = service.post(&format!("{path}/extend"), &json!({"trial_budget": 3})).await;
+    assert_eq!(extended.status, StatusCode::OK, "{}", extended.text);
+    let next = heard().await;
+    assert!(next.contains("event: study_changed") && next.contains("running") && next.contains("id: "), "{next}");
     service.stop().await;
 }

@@ -3,11 +3,19 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gait_optimizer::{
+    CancelToken, Device, GaitProblem, GaitSettings, ReferenceGait, SolveOptions, Subject, TunedBounds,
+};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, StudyId, commit, studies, subjects, trials};
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
 use gaitwright::studies::catalogue;
 use gaitwright::studies::plan::{self, NewStudy};
+use gaitwright::workers::nats::{Brought, Order, pack};
+use gaitwright::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
+use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
+use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Output, Stdio};
@@ -228,6 +236,76 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
     }
     drop(reader);
     store.close().await;
+}
+
+/// A trial that the program failed at is no success of the command; what it found is told all the same.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_failed_trial_is_told_by_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("gaitwright.db");
+    let solver = Analytic { panics: vec![1], ..Analytic::slow(Duration::from_millis(300)) };
+    let service = Service::start(&database, solver, 1).await;
+    let study = service.study(|new| (new.muscles, new.trial_budget) = (false, 2)).await;
+    until("a second trial", async || service.trials(study).await.len() == 2).await;
+    assert_eq!(service.trials(study).await[0].state, TrialState::Failed);
+    service.stop().await;
+
+    let output =
+        cli::run(BINARY, folder.path(), &["tune", "--muscles", "off", "--trials", "2", "--workers", "1", "--json"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("1 of 2 trials failed; the last, trial 1: ") && text.contains("panics"), "{text}");
+    assert_eq!((&json_of(&output)["study_id"], &json_of(&output)["state"]), (&json!(study), &json!("finished")));
+}
+
+/// Rows are written as they come: a process that is killed leaves what it had.
+#[test]
+fn a_killed_sweep_leaves_its_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let actions = format!("a1,a2,a3,a4,a5,a6,a7,a8\n{}", "20,90,0.3,1.4,0.013,0.5,50,40\n".repeat(9));
+    std::fs::write(folder.join("actions.csv"), actions).unwrap();
+    let sweep = ["sweep", "--actions", "actions.csv", "--out", "out.csv", "--workers", "1", "--max-iterations", "20"];
+    let arguments = [&sweep[..], &COARSE].concat();
+    let mut child = cli::command(BINARY, folder, &arguments).stderr(Stdio::null()).spawn().unwrap();
+    let part = folder.join(format!(".out.csv.{}.part", child.id()));
+    let rows = || std::fs::read_to_string(&part).map_or(0, |text| text.matches('\n').count());
+    while rows() < 3 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let text = std::fs::read_to_string(&part).unwrap();
+    assert!(text.lines().skip(1).take(2).all(|row| row.starts_with("20,90,0.3,1.4,0.013,0.5,50,40,")), "{text}");
+    assert!(!folder.join("out.csv").exists());
+}
+
+/// A real result with muscles, with many more iterations than solves take, beside the 1 MiB that a NATS broker takes in
+/// one message unless told otherwise.
+#[test]
+fn a_result_with_muscles_fits_through_a_broker() {
+    let problem = GaitProblem {
+        subject: Subject::builtin(1).unwrap(),
+        device: Device::ampro3().unwrap(),
+        bounds: TunedBounds::default(),
+        muscles: true,
+        settings: GaitSettings::default(),
+        reference: ReferenceGait::builtin().unwrap(),
+    };
+    let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
+    let options = SolveOptions { max_iterations: 20, ..SolveOptions::default() };
+    let mut order = Assignment { attempt, number: 1, problem, warm_start: None, options };
+    let mut iterations = Vec::new();
+    let outcome = GaitSolver.evaluate(&order, &mut |record| iterations.push(*record), &CancelToken::new()).unwrap();
+    assert!(outcome.gait.domains.iter().all(|domain| domain.muscles.is_some()));
+    let iterations: Vec<_> = iterations.iter().cycle().take(3000).copied().collect();
+    order.warm_start = Some(outcome.warm_start.clone());
+    let order = pack(&Order { program: String::new(), assignment: order }).unwrap().len();
+    let finding = Finding::Ended { outcome: Box::new(outcome), iterations };
+    let result = pack(&Brought { attempt, worker: "worker".to_owned(), finding }).unwrap().len();
+    eprintln!("a job takes {order} bytes, a result {result}");
+    assert!(order.max(result) < 512 << 10, "a job takes {order} bytes, a result {result}");
 }
 
 #[test]

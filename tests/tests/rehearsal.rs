@@ -9,6 +9,8 @@ use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
+use std::collections::HashSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The trials of a study whose person takes so long for each answer, and who solved them.
@@ -53,4 +55,30 @@ async fn who_thinks_long_gets_the_same_trials_and_does_not_wait_for_them() {
     assert!(workers.iter().any(|worker| worker == "prepared"), "{workers:?}");
     // Somewhere in the middle of a solve, which goes on for the trial that asks for it.
     assert_eq!(tuned(Duration::from_millis(60)).await.0, at_once);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_nobody_asked_for_yet_gives_way_within_one_iteration() {
+    let folder = tempfile::tempdir().unwrap();
+    let solver = Analytic::slow(Duration::from_millis(40));
+    let made = Arc::clone(&solver.made);
+    let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
+    let human = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    service.wait_for(human, &[StudyState::Waiting]).await;
+    let known: HashSet<_> = service.trials(human).await.iter().map(|trial| trial.id).collect();
+    let begun = made.lock().unwrap().len();
+    let prepares = || made.lock().unwrap()[begun..].iter().any(|trial| !known.contains(trial));
+    while !prepares() {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+
+    let wanted = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(wanted, &[StudyState::Finished]).await;
+    let wanted = service.trials(wanted).await[0].id;
+    let made = made.lock().unwrap().clone();
+    let first = made.iter().position(|trial| *trial == wanted).unwrap();
+    let last = made.iter().rposition(|trial| *trial == wanted).unwrap();
+    let others = made[first..last].iter().filter(|trial| **trial != wanted).count();
+    assert!(others <= 1, "{others} iterations of what nobody waits for ran beside a trial");
+    service.stop().await;
 }

@@ -2,14 +2,20 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use axum::http::StatusCode;
 use gait_learner::{LearnerSettings, Partner};
-use gaitwright::store::StudyId;
 use gaitwright::store::feedback::{Said, Source};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::{Trial, TrialState};
+use gaitwright::store::{StudyId, trials};
+use gaitwright::studies::plan::NewStudy;
+use gaitwright::workers::{Attempt, InProcess};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::away::Away;
 use gaitwright_tests::service::Service;
+use serde_json::json;
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// What must be the same in two runs with the same seed: everything but identifiers and times.
@@ -169,5 +175,104 @@ async fn several_workers_and_studies_share_the_pool_without_doing_anything_twice
         actions.dedup();
         assert_eq!(actions.len(), 10);
     }
+    service.stop().await;
+}
+
+/// Waits until an engine has so many jobs.
+async fn handed_over(engine: &Away, jobs: usize) -> Vec<Attempt> {
+    for _ in 0..2000 {
+        let present = engine.jobs.lock().unwrap().clone();
+        if present.len() == jobs {
+            return present;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    panic!("the engine has {:?}", engine.jobs.lock().unwrap());
+}
+
+#[tokio::test]
+async fn higher_priorities_go_first_and_equal_ones_share() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    // Made while nothing is handed out, so that the first plan sees all of them.
+    let engine = Away::default();
+    let service = Service::start_with(&database, Arc::new(engine)).await;
+    let mut studies = Vec::new();
+    for (seed, priority) in [(1, 0), (2, 0), (3, 5)] {
+        let new = |new: &mut NewStudy| {
+            (new.seed, new.priority, new.trial_budget, new.parallel_trials) =
+                (seed, priority, 9, 2 + u32::from(seed < 3));
+        };
+        studies.push(service.study(new).await);
+    }
+    service.stop().await;
+    let engine = Away { size: 6, ..Away::default() };
+    let service = Service::start_with(&database, Arc::new(engine.clone())).await;
+    let mut order = Vec::new();
+    for attempt in handed_over(&engine, 6).await {
+        let study = trials::get(&mut service.store.read().await.unwrap(), attempt.trial).await.unwrap().study_id;
+        order.push(studies.iter().position(|known| *known == study).unwrap());
+    }
+    assert_eq!(order, [2, 2, 0, 1, 0, 1], "by priority, then whoever has the fewest");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_no_worker_began_is_taken_back_while_a_study_is_paused() {
+    let folder = tempfile::tempdir().unwrap();
+    let engine = Away { size: 2, ..Away::default() };
+    let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine.clone())).await;
+    let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (4, 2)).await;
+    handed_over(&engine, 2).await;
+    let path = format!("/api/v1/studies/{study}");
+    assert_eq!(service.post(&format!("{path}/pause"), &json!({})).await.status, StatusCode::OK);
+    handed_over(&engine, 0).await;
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    assert!(handed_over(&engine, 0).await.is_empty(), "nothing new starts");
+    assert!(service.trials(study).await.iter().all(|trial| trial.state == TrialState::Queued));
+    assert_eq!(service.post(&format!("{path}/resume"), &json!({})).await.status, StatusCode::OK);
+    let again = handed_over(&engine, 2).await;
+    assert!(again.iter().all(|attempt| attempt.number == 2), "{again:?}");
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cancelled_solve_stops_within_one_iteration() {
+    let folder = tempfile::tempdir().unwrap();
+    let solver = Analytic::slow(Duration::from_millis(100));
+    let made = Arc::clone(&solver.made);
+    let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    while made.lock().unwrap().len() < 2 {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let trial = service.trials(study).await[0].id;
+    assert_eq!(service.post(&format!("/api/v1/trials/{trial}/cancel"), &json!({})).await.status, StatusCode::OK);
+    let before = made.lock().unwrap().len();
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let after = made.lock().unwrap().len();
+    assert!(after <= before + 1, "{before} iterations when it was cancelled, {after} later");
+    service.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_trial_whose_workers_are_never_heard_of_again_is_lost_and_can_be_tried_once_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let solver = Analytic { hangs: 3, ..Analytic::default() };
+    let engine = InProcess::new(1, Arc::new(solver)).with_lease(Duration::from_millis(600));
+    let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine)).await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await.remove(0);
+    assert_eq!(trial.state, TrialState::Lost);
+    assert!(trial.message.contains("not heard of again"), "{}", trial.message);
+    assert!(service.feedback(study).await.is_empty(), "what was lost is no result");
+
+    let path = format!("/api/v1/studies/{study}/extend");
+    assert_eq!(service.post(&path, &json!({"trial_budget": 2})).await.status, StatusCode::OK);
+    let path = format!("/api/v1/trials/{}/retry", trial.id);
+    assert_eq!(service.post(&path, &json!({})).await.status, StatusCode::OK);
+    service.wait_for(study, &[StudyState::Finished]).await;
+    assert!(service.trials(study).await.iter().all(|trial| trial.state.is_result()));
     service.stop().await;
 }

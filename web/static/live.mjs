@@ -45,6 +45,8 @@ if (live) {
     try {
       const answer = await fetch(`/studies/${study}/live${location.search}`);
       if (answer.ok) update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+      // The subject withdrew: what is on this page is not shown any more.
+      if (answer.status === 409) location.reload();
     } catch {
       // The connection is lost: the stream of events comes back by itself and brings what was missed.
     } finally {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer};
 
-use super::{Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
+use super::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
 
 /// Of a field that is given, its value: null is a value where the field has one.
 fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
@@ -24,7 +24,9 @@ macro_rules! settings {
         impl From<WrittenSettings> for LearnerSettings {
             fn from(given: WrittenSettings) -> Self {
                 let rest = given.method.map_or_else(Self::default, Self::of);
-                Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* }
+                let settings = Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* };
+                // Earlier versions wrote the largest number there is.
+                Self { line_trials: settings.line_trials.min(EVERY_TRIAL), ..settings }
             }
         }
     };

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use tracing_subscriber::EnvFilter;
 
 /// The file that is read when none is named.
 const DEFAULT_FILE: &str = "gaitwright.toml";
@@ -192,8 +193,15 @@ impl Settings {
         }
     }
 
-    pub(super) fn log(&self) -> (&str, bool) {
-        (self.text("log"), self.text("log_format") == "json")
+    /// What is logged, and whether as JSON.
+    pub(super) fn log(&self) -> Result<(EnvFilter, bool), Error> {
+        let allowed = "targets and levels such as warn,gaitwright=info";
+        let filter = EnvFilter::try_new(self.text("log")).map_err(|_| self.refused("log", allowed))?;
+        match self.text("log_format") {
+            "text" => Ok((filter, false)),
+            "json" => Ok((filter, true)),
+            _ => Err(self.refused("log_format", "text, json")),
+        }
     }
 }
 
@@ -226,6 +234,16 @@ pub(super) fn queue_name(text: &str) -> Result<String, String> {
     } else {
         Err(QUEUE_NAMES.to_owned())
     }
+}
+
+/// Variables of the environment that look like settings of this program and are none. They are named and not refused:
+/// where services of other machines are announced in the environment, as in Kubernetes, some of them begin like ours.
+pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
+    let is_known = |name: &str| name == "CONFIG" || KNOWN.iter().any(|(known, ..)| known.to_uppercase() == *name);
+    let mut unknown: Vec<String> =
+        names.filter(|name| name.strip_prefix("GAITWRIGHT_").is_some_and(|rest| !is_known(rest))).collect();
+    unknown.sort();
+    unknown
 }
 
 /// An address as it may be shown: whoever is named in it, without the password.
@@ -327,6 +345,23 @@ mod tests {
         assert!(parse(Path::new("x.toml"), "workers = ").is_err());
         let dotted = Flags { nats_queue: Some("a.b".to_owned()), ..Flags::default() };
         assert!(settings(&dotted, &[]).unwrap().nats().unwrap_err().to_string().contains("letters, digits"));
+    }
+
+    #[test]
+    fn logs_are_refused_that_would_never_be_written() {
+        let with =
+            |name, value| settings(&Flags::default(), &[(name, value)]).unwrap().log().map_err(|e| e.to_string());
+        assert!(with("GAITWRIGHT_LOG_FORMAT", "json").unwrap().1);
+        let refused = with("GAITWRIGHT_LOG_FORMAT", "xml").unwrap_err();
+        assert!(refused.contains("GAITWRIGHT_LOG_FORMAT") && refused.contains("text, json"), "{refused}");
+        let refused = with("GAITWRIGHT_LOG", "gaitwright=loud").unwrap_err();
+        assert!(refused.contains("gaitwright=loud") && refused.contains("targets and levels"), "{refused}");
+    }
+
+    #[test]
+    fn variables_that_only_look_like_settings_are_found() {
+        let names = ["GAITWRIGHT_WORKER", "GAITWRIGHT_WORKERS", "GAITWRIGHT_CONFIG", "HOME"];
+        assert_eq!(unknown_variables(names.into_iter().map(str::to_owned)), ["GAITWRIGHT_WORKER"]);
     }
 
     proptest::proptest! {

@@ -24,7 +24,7 @@ mod worker;
 use crate::error::Error;
 use crate::http::openapi;
 use clap::{Parser, Subcommand};
-use config::{Flags, Settings};
+use config::{Flags, Settings, unknown_variables};
 use output::tell;
 use std::process::ExitCode;
 
@@ -41,6 +41,8 @@ enum Ended {
     Done,
     /// A person stopped it before that.
     Interrupted,
+    /// It came to an end, but part of it failed for reasons of the program or the machine.
+    Failed,
 }
 
 /// A preference-learning tuning service for walking gaits of powered prostheses.
@@ -102,8 +104,12 @@ pub fn run() -> ExitCode {
         Ok(settings) => settings,
         Err(error) => return report(&error),
     };
-    let (filter, json) = settings.log();
-    logging::start(filter, json);
+    if let Err(error) = settings.log().and_then(|(filter, json)| logging::start(filter, json)) {
+        return report(&error);
+    }
+    for name in unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())) {
+        tell(&format!("gaitwright: {name} is set, but is not a setting; `gaitwright config show` names them all"));
+    }
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,
         Err(error) => return report(&Error::Internal(error.to_string())),
@@ -133,6 +139,7 @@ pub fn run() -> ExitCode {
     match done {
         Ok(Ended::Done) => ExitCode::SUCCESS,
         Ok(Ended::Interrupted) => ExitCode::from(INTERRUPTED),
+        Ok(Ended::Failed) => ExitCode::FAILURE,
         Err(error) => report(&error),
     }
 }

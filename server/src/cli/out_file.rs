@@ -1,5 +1,5 @@
-//! A file that a command writes at its end, but tries at its beginning: hours of solving are not lost to a typing
-//! error in its name.
+//! A file that a command finishes at its end, but tries at its beginning: hours of solving are not lost to a typing
+//! error in its name. What is appended before the end is there even if the process is killed.
 
 use super::output::tell;
 use crate::error::Error;
@@ -7,8 +7,8 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A file that is written whole or not at all. Until then there is an empty hidden one beside it. A link is followed; a
-/// device or pipe is written to as it is.
+/// A file that is written whole or not at all. Until then there is a hidden one beside it, with what was appended so
+/// far. A link is followed; a device or pipe is written to as it is.
 #[derive(Debug)]
 pub(super) struct OutFile {
     path: PathBuf,
@@ -47,23 +47,39 @@ impl OutFile {
         &self.path
     }
 
+    /// Where the file grows until it is whole.
+    pub(super) fn part(&self) -> &Path {
+        self.part.as_deref().unwrap_or(&self.path)
+    }
+
     /// Writes the file.
     ///
     /// # Errors
     /// [`Error::Malformed`] with the reason.
     pub(super) fn write(mut self, text: &str) -> Result<(), Error> {
-        let Some(mut file) = self.file.take() else { return Ok(()) };
-        let written = file.write_all(text.as_bytes());
-        let done = match &self.part {
-            Some(part) => {
-                let done = written.and_then(|()| file.sync_all()).and_then(|()| std::fs::rename(part, &self.path));
-                if done.is_err() {
-                    self.clean();
-                }
-                done
-            }
-            None => written,
-        };
+        self.append(text)?;
+        self.finish()
+    }
+
+    /// Adds to what will be the file.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] with the reason.
+    pub(super) fn append(&mut self, text: &str) -> Result<(), Error> {
+        let Some(file) = &mut self.file else { return Ok(()) };
+        file.write_all(text.as_bytes()).map_err(|e| failed(&self.path, e))
+    }
+
+    /// Puts what was appended in the place of the file.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] with the reason.
+    pub(super) fn finish(mut self) -> Result<(), Error> {
+        let (Some(file), Some(part)) = (self.file.take(), &self.part) else { return Ok(()) };
+        let done = file.sync_all().and_then(|()| std::fs::rename(part, &self.path));
+        if done.is_err() {
+            self.clean();
+        }
         done.map_err(|e| failed(&self.path, e))
     }
 

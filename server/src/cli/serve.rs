@@ -52,6 +52,15 @@ impl Serve {
         if !local && !database.exists() {
             return Err(nobody_administers());
         }
+        // What can be refused is refused before a file is made.
+        let tls = match tls {
+            Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
+            None => None,
+        };
+        let cannot_listen = |e: std::io::Error| Error::Malformed(format!("cannot listen on {listen}: {e}"));
+        let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
+        listener.set_nonblocking(true).map_err(cannot_listen)?;
+        let address = listener.local_addr().map_err(cannot_listen)?;
         let store = Store::open(&database).await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
@@ -59,17 +68,9 @@ impl Serve {
         if !local && !people::has_admin(&mut *store.read().await?).await? {
             return Err(nobody_administers());
         }
-        let tls = match tls {
-            Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
-            None => None,
-        };
         let mut access = if sign_in { Access::by_sign_in(idle_seconds) } else { Access::without_sign_in() };
         access.secure = tls.is_some();
 
-        let cannot_listen = |e: std::io::Error| Error::Malformed(format!("cannot listen on {listen}: {e}"));
-        let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
-        listener.set_nonblocking(true).map_err(cannot_listen)?;
-        let address = listener.local_addr().map_err(cannot_listen)?;
         let origin = format!("{}://{address}", if access.secure { "https" } else { "http" });
         let link = if sign_in { self.link(&store).await? } else { None };
 

@@ -13,6 +13,7 @@ use gait_optimizer::{
     CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus, TunedBounds, WarmStart, solve,
 };
 use indicatif::ProgressBar;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -24,7 +25,8 @@ pub(super) struct Sweep {
     /// The actions: a CSV file with header a1,a2,a3,a4,a5,a6,a7,a8.
     #[arg(long, value_name = "FILE.csv")]
     actions: PathBuf,
-    /// Where the answers go: one row per action, in the same order.
+    /// Where the answers go: one row per action, in the same order. Until the last one is there they are in a hidden
+    /// file beside it (.FILE.csv.PROCESS.part), which a killed process leaves behind.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// How many solves at the same time; default: the number of cores.
@@ -46,32 +48,91 @@ impl Sweep {
         let mut inputs = self.flags.inputs();
         inputs.push(&self.actions);
         let out = OutFile::open(&self.out, &inputs)?;
+        tell(&format!("rows so far: {}", out.part().display()));
         let (cancel, workers) = (cancelled_by_signal(), cores_or(self.workers));
-        let (rows, stopped) = (actions.clone(), cancel.clone());
-        let mut answers =
-            tokio::task::spawn_blocking(move || solve_all(&problem, &rows, warm.as_ref(), &options, workers, &cancel))
-                .await
-                .map_err(|e| Error::Internal(e.to_string()))?;
-        if answers.iter().all(Result::is_err)
-            && let Some(Err(error)) = answers.pop()
-        {
-            // What is wrong with every row is wrong with the command.
+        let stopped = cancel.clone();
+        let table = tokio::task::spawn_blocking(move || {
+            let mut table = Table::begin(out)?;
+            solve_all(&problem, &actions, warm.as_ref(), &options, workers, &cancel, &mut table)?;
+            Ok::<_, Error>(table)
+        });
+        table.await.map_err(|e| Error::Internal(e.to_string()))??.end(stopped.is_cancelled())
+    }
+}
+
+/// The table of answers: each row goes to the file as soon as all before it are there.
+struct Table {
+    out: OutFile,
+    /// What could not be written to the file is printed at the end: hours of solving are not lost with it.
+    unwritten: Option<Error>,
+    text: String,
+    rows: usize,
+    converged: usize,
+    /// What is wrong with every row is wrong with the command.
+    refused: Option<SolveError>,
+}
+
+impl Table {
+    fn begin(out: OutFile) -> Result<Self, Error> {
+        let mut table = Self { out, unwritten: None, text: String::new(), rows: 0, converged: 0, refused: None };
+        let header: Vec<String> = TunedBounds::NAMES.iter().chain(&COLUMNS).map(|name| (*name).to_owned()).collect();
+        table.line(&header)?;
+        Ok(table)
+    }
+
+    fn add(&mut self, action: &TunedBounds, answer: Answer) -> Result<(), Error> {
+        let mut row: Vec<String> = action.to_array().iter().map(f64::to_string).collect();
+        match answer {
+            Ok(outcome) => {
+                let r = &outcome.report;
+                self.converged += usize::from(r.status == SolveStatus::Converged);
+                row.extend([
+                    status_word(r.status).to_owned(),
+                    r.iterations.to_string(),
+                    format!("{:.3}", r.seconds_total),
+                    number(r.cost_of_transport),
+                    number(r.gait_rmse_rad),
+                    number(r.max_violation),
+                ]);
+                self.rows += 1;
+            }
+            Err(error) => {
+                tell(&format!("{}: {error}", row.join(",")));
+                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(str::to_owned));
+                self.refused = Some(error);
+            }
+        }
+        self.line(&row)
+    }
+
+    fn line(&mut self, cells: &[String]) -> Result<(), Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(cells).map_err(|e| Error::Internal(e.to_string()))?;
+        let bytes = writer.into_inner().map_err(|e| Error::Internal(e.to_string()))?;
+        let line = String::from_utf8(bytes).map_err(|e| Error::Internal(e.to_string()))?;
+        if self.unwritten.is_none() {
+            self.unwritten = self.out.append(&line).err();
+        }
+        self.text.push_str(&line);
+        Ok(())
+    }
+
+    fn end(self, stopped: bool) -> Result<Ended, Error> {
+        if let (0, Some(error)) = (self.rows, self.refused) {
             return Err(error.into());
         }
-        let table = table(&actions, &answers)?;
-        let path = out.path().to_owned();
-        if stopped.is_cancelled() {
-            data(table.trim_end())?;
-            tell(&format!("stopped: what is done is above, {} is as it was", path.display()));
+        let path = self.out.path().display().to_string();
+        if stopped {
+            data(self.text.trim_end())?;
+            tell(&format!("stopped: what is done is above, {path} is as it was"));
             return Ok(Ended::Interrupted);
         }
-        if let Err(error) = out.write(&table) {
-            // Hours of solving are not lost with the file.
-            data(table.trim_end())?;
+        if let Err(error) = self.unwritten.map_or_else(|| self.out.finish(), Err) {
+            data(self.text.trim_end())?;
             return Err(error);
         }
-        let converged = answers.iter().flatten().filter(|o| o.report.status == SolveStatus::Converged).count();
-        tell(&format!("{converged} of {} converged; written to {}", actions.len(), path.display()));
+        let rows = self.text.lines().count() - 1;
+        tell(&format!("{} of {rows} converged; written to {path}", self.converged));
         Ok(Ended::Done)
     }
 }
@@ -109,12 +170,13 @@ fn solve_all(
     options: &SolveOptions,
     workers: usize,
     cancel: &CancelToken,
-) -> Vec<Answer> {
+    table: &mut Table,
+) -> Result<(), Error> {
     let bar = ProgressBar::new(actions.len() as u64);
     bar.tick();
     let next = AtomicUsize::new(0);
     let (sender, receiver) = mpsc::channel();
-    let mut answers: Vec<(usize, Answer)> = std::thread::scope(|scope| {
+    let written = std::thread::scope(|scope| {
         for _ in 0..workers.min(actions.len()) {
             let (sender, next) = (sender.clone(), &next);
             scope.spawn(move || {
@@ -129,40 +191,20 @@ fn solve_all(
             });
         }
         drop(sender);
-        receiver.iter().inspect(|_| bar.inc(1)).collect()
-    });
-    bar.finish_and_clear();
-    answers.sort_by_key(|(row, _)| *row);
-    answers.into_iter().map(|(_, answer)| answer).collect()
-}
-
-fn table(actions: &[TunedBounds], answers: &[Answer]) -> Result<String, Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let internal = |e: csv::Error| Error::Internal(e.to_string());
-    writer.write_record(TunedBounds::NAMES.iter().chain(&COLUMNS)).map_err(internal)?;
-    for (action, answer) in actions.iter().zip(answers) {
-        let mut row: Vec<String> = action.to_array().iter().map(f64::to_string).collect();
-        match answer {
-            Ok(outcome) => {
-                let r = &outcome.report;
-                row.extend([
-                    status_word(r.status).to_owned(),
-                    r.iterations.to_string(),
-                    format!("{:.3}", r.seconds_total),
-                    number(r.cost_of_transport),
-                    number(r.gait_rmse_rad),
-                    number(r.max_violation),
-                ]);
-            }
-            Err(error) => {
-                tell(&format!("{}: {error}", row.join(",")));
-                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(str::to_owned));
+        let mut early: BTreeMap<usize, Answer> = BTreeMap::new();
+        let mut due = 0;
+        for (row, answer) in receiver {
+            bar.inc(1);
+            early.insert(row, answer);
+            while let Some(answer) = early.remove(&due) {
+                table.add(&actions[due], answer)?;
+                due += 1;
             }
         }
-        writer.write_record(&row).map_err(internal)?;
-    }
-    let bytes = writer.into_inner().map_err(|e| Error::Internal(e.to_string()))?;
-    String::from_utf8(bytes).map_err(|e| Error::Internal(e.to_string()))
+        Ok(())
+    });
+    bar.finish_and_clear();
+    written
 }
 
 /// A number as text; empty when it is not finite.

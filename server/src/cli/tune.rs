@@ -5,7 +5,7 @@ use super::body::{Body, Switch};
 use super::numbers::{seed, trials, workers};
 use super::output::{data, tell};
 use super::serve::cores_or;
-use super::unattended::{self, Lines, Run, action_line};
+use super::unattended::{self, Lines, action_line};
 use crate::error::Error;
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
@@ -58,14 +58,20 @@ impl Tune {
         let lines = if self.json { Lines::Progress } else { Lines::Data };
         let ran = unattended::run(&store, &study, workers, lines).await;
         store.close().await;
-        let Run { standing, interrupted } = ran?;
-        self.print(&summary::of(&standing).map_err(Error::Learner)?)?;
-        if interrupted {
-            let done = standing.trials.len() - standing.open();
+        let ran = ran?;
+        self.print(&summary::of(&ran.standing).map_err(Error::Learner)?)?;
+        if ran.interrupted {
+            let done = ran.standing.trials.len() - ran.standing.open();
             tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
             return Ok(Ended::Interrupted);
         }
-        Ok(Ended::Done)
+        match ran.failure() {
+            None => Ok(Ended::Done),
+            Some(failure) => {
+                tell(&format!("gaitwright: {failure}"));
+                Ok(Ended::Failed)
+            }
+        }
     }
 
     fn print(&self, summary: &Summary) -> Result<(), Error> {

@@ -5,7 +5,7 @@ use super::serve::interrupted;
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::studies::{Study, StudyState};
-use crate::store::trials::Trial;
+use crate::store::trials::{Trial, TrialState};
 use crate::store::{Store, commit, studies, trials as trial_rows};
 use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
@@ -33,6 +33,20 @@ pub(super) struct Run {
     pub(super) standing: Standing,
     /// Somebody stopped it before its end.
     pub(super) interrupted: bool,
+}
+
+impl Run {
+    /// What went wrong for reasons of the program or the machine. That an action has no gait is a result.
+    pub(super) fn failure(&self) -> Option<String> {
+        let Standing { study, trials, .. } = &self.standing;
+        let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
+        if study.state != StudyState::Finished {
+            return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
+        }
+        let last = trials.iter().rev().find(failed)?;
+        let count = trials.iter().filter(failed).count();
+        Some(format!("{count} of {} trials failed; the last, trial {}: {}", trials.len(), last.number, last.message))
+    }
 }
 
 /// The unfinished study of the same kind in the database, or a new one.
@@ -105,21 +119,10 @@ async fn follow(director: &Director, study: &Study, lines: Lines) -> Result<(), 
             }
         }
         bar.set_position(shown.len() as u64);
-        match present.state {
-            StudyState::Running => {}
-            StudyState::Finished => {
-                bar.finish_and_clear();
-                return Ok(());
-            }
-            // Nobody answers or starts anything here.
-            StudyState::Draft | StudyState::Waiting | StudyState::Paused | StudyState::Stopped => {
-                bar.finish_and_clear();
-                return Err(Error::conflict(format!(
-                    "the study is {}: {}",
-                    present.state.as_str(),
-                    present.state_reason
-                )));
-            }
+        // Nobody answers, resumes or starts anything here.
+        if present.state != StudyState::Running {
+            bar.finish_and_clear();
+            return Ok(());
         }
         loop {
             tokio::select! {

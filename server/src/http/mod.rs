@@ -17,6 +17,7 @@ mod problem;
 mod revision;
 mod router;
 mod same_origin;
+mod shown;
 mod state;
 mod static_files;
 

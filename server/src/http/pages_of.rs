@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Before<K> {
     /// Where the page before ended.
     pub(crate) before: Option<K>,
-    limit: Option<u32>,
+    /// As given: what is no number at all is refused like one out of range.
+    limit: Option<String>,
 }
 
 /// A page of what comes after something, in order.
@@ -19,29 +20,32 @@ pub(crate) struct Before<K> {
 pub(crate) struct After<K> {
     /// Where the page before ended.
     pub(crate) after: Option<K>,
-    limit: Option<u32>,
+    limit: Option<String>,
 }
 
 impl<K> Before<K> {
     /// How many rows, by default as many as are allowed.
     pub(crate) fn limit(&self, most: u32) -> Result<u32, Error> {
-        checked(self.limit, most)
+        checked(self.limit.as_deref(), most)
     }
 }
 
 impl<K> After<K> {
     /// How many rows, by default as many as are allowed.
     pub(crate) fn limit(&self, most: u32) -> Result<u32, Error> {
-        checked(self.limit, most)
+        checked(self.limit.as_deref(), most)
+    }
+
+    /// How many rows, where a page of as many as are allowed is not what most ask for.
+    pub(crate) fn limit_or(&self, default: u32, most: u32) -> Result<u32, Error> {
+        if self.limit.is_some() { self.limit(most) } else { Ok(default) }
     }
 }
 
-fn checked(limit: Option<u32>, most: u32) -> Result<u32, Error> {
-    match limit {
-        None => Ok(most),
-        Some(limit) if (1..=most).contains(&limit) => Ok(limit),
-        Some(limit) => Err(Error::invalid("limit", limit, &format!("1 to {most}"))),
-    }
+fn checked(limit: Option<&str>, most: u32) -> Result<u32, Error> {
+    let Some(text) = limit else { return Ok(most) };
+    let refused = || Error::invalid("limit", text, &format!("1 to {most}"));
+    text.parse().ok().filter(|limit| (1..=most).contains(limit)).ok_or_else(refused)
 }
 
 /// At most `limit` of the rows as JSON; with more of them, a `Link` header to the page `before` the last one.

@@ -38,6 +38,11 @@ impl Problem {
     fn new(status: StatusCode, kind: &'static str, title: &'static str, detail: String) -> Self {
         Self { kind, title, status: status.as_u16(), detail, field: None, value: None, allowed: None }
     }
+
+    /// The HTTP status of this problem.
+    pub(super) fn status(&self) -> StatusCode {
+        StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
+    }
 }
 
 impl From<&Error> for Problem {
@@ -104,8 +109,7 @@ impl From<&Error> for Problem {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let mut answer = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
+        let mut answer = (self.status(), [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
         // For pages, which show the same problem in words.
         answer.extensions_mut().insert(self);
         answer

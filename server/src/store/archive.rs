@@ -51,7 +51,7 @@ pub struct Archive(BTreeMap<String, Rows>);
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<u8>> {
     let mut reader = sqlx::Connection::begin(db).await?;
     studies::get(&mut reader, study).await?;
-    consents::may_leave(&mut reader, study).await?;
+    consents::may_be_shown(&mut reader, study).await?;
     pack(&mut reader, study).await
 }
 

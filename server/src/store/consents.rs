@@ -18,6 +18,16 @@ pub enum ConsentKind {
     Withdrawn,
 }
 
+impl ConsentKind {
+    /// The word in the record.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::Withdrawn => "withdrawn",
+        }
+    }
+}
+
 /// A row of the record of consent; the newest counts.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Consent {
@@ -47,7 +57,7 @@ pub async fn append(
     let row = Consent { seq: 0, kind, note: note.to_owned(), actor: actor.as_str().to_owned(), created_at: now() };
     let done = sqlx::query("insert into consents (subject_id, kind, note, actor, created_at) values (?, ?, ?, ?, ?)")
         .bind(subject)
-        .bind(if kind == ConsentKind::Given { "given" } else { "withdrawn" })
+        .bind(kind.as_str())
         .bind(&row.note)
         .bind(&row.actor)
         .bind(row.created_at)
@@ -81,15 +91,23 @@ pub async fn of_subject(db: &mut Connection, subject: SubjectId) -> StoreResult<
         .collect()
 }
 
-/// Refuses to give out a study whose subject withdrew.
+/// Whether the subject of a study withdrew.
 ///
 /// # Errors
-/// [`StoreError::Withdrawn`], or what the database reports.
-pub async fn may_leave(db: &mut Connection, study: StudyId) -> StoreResult<()> {
+/// What the database reports.
+pub async fn is_withdrawn(db: &mut Connection, study: StudyId) -> StoreResult<bool> {
     let withdrawn =
         sqlx::query("select 1 from studies where id = ? and subject_id in (select subject_id from withdrawn_subjects)")
             .bind(study)
             .fetch_optional(db)
             .await?;
-    if withdrawn.is_some() { Err(StoreError::Withdrawn) } else { Ok(()) }
+    Ok(withdrawn.is_some())
+}
+
+/// Refuses to show or give out what there is of a study whose subject withdrew.
+///
+/// # Errors
+/// [`StoreError::Withdrawn`], or what the database reports.
+pub async fn may_be_shown(db: &mut Connection, study: StudyId) -> StoreResult<()> {
+    if is_withdrawn(db, study).await? { Err(StoreError::Withdrawn) } else { Ok(()) }
 }

@@ -10,7 +10,11 @@ pub type StoreResult<T> = Result<T, StoreError>;
 #[derive(Debug, Error)]
 pub enum StoreError {
     /// The file cannot be opened or created.
-    #[error("cannot open the database {}: {source}", path.display())]
+    #[error(
+        "cannot open the database {}: {source}; the file must be writable, and its folder too: -wal, -shm and .lock files \
+         are kept beside it",
+        path.display()
+    )]
     Open {
         /// The file.
         path: PathBuf,
@@ -64,7 +68,7 @@ pub enum StoreError {
         reason: String,
     },
     /// The subject withdrew consent.
-    #[error("the subject withdrew consent: the record is kept, but nothing is added to it and nothing is given out")]
+    #[error("the subject withdrew consent: the record is kept, but nothing is added to it, shown or given out")]
     Withdrawn,
     /// The record was closed.
     #[error("the database is closed: the service is shutting down")]

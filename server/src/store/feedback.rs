@@ -251,6 +251,32 @@ pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -
     rows.iter().map(from_row).collect()
 }
 
+/// At most `limit` comparisons of two trials, whichever was named first, by people and scripts other than `author`, that
+/// were not taken back: the newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn by_others(
+    db: &mut Connection,
+    (a, b): (TrialId, TrialId),
+    author: &str,
+    limit: u32,
+) -> StoreResult<Vec<FeedbackRow>> {
+    let rows = sqlx::query(
+        "select f.*, null as retracted_by, null as retracted_because, null as retracted_at from feedback f \
+         where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and f.author <> ?3 \
+         and f.source in ('subject', 'clinician', 'script') and f.seq not in (select feedback_seq from retractions) \
+         order by f.seq desc limit ?4",
+    )
+    .bind(a)
+    .bind(b)
+    .bind(author)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// The version of what a study has heard: changes with every row and every retraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LogVersion {

@@ -9,15 +9,22 @@ use std::path::Path;
 const HEADER: &[u8; 16] = b"SQLite format 3\0";
 
 /// SQLite's codes for a file that is damaged and for one that is no database.
-const NO_DATABASE: [&str; 2] = ["11", "26"];
+const NO_DATABASE: [u32; 2] = [11, 26];
+/// Its codes for a file that cannot be written and for one that cannot be opened, or whose companions cannot.
+const NO_ACCESS: [u32; 2] = [8, 14];
 
 /// Names the file in what SQLite says when it finds out only later.
 pub(super) fn named(path: &Path, error: StoreError) -> StoreError {
-    match &error {
-        StoreError::Database(sqlx::Error::Database(found))
-            if found.code().is_some_and(|code| NO_DATABASE.contains(&code.as_ref())) =>
-        {
-            StoreError::NotADatabase { path: path.to_owned(), reason: found.message().to_owned() }
+    let StoreError::Database(sqlx::Error::Database(found)) = &error else { return error };
+    // The lowest byte is the code, what is above it tells more.
+    let code = found.code().and_then(|code| code.parse().ok()).map(|code: u32| code & 0xff);
+    let path = path.to_owned();
+    match code {
+        Some(code) if NO_DATABASE.contains(&code) => {
+            StoreError::NotADatabase { path, reason: found.message().to_owned() }
+        }
+        Some(code) if NO_ACCESS.contains(&code) => {
+            StoreError::Open { path, source: std::io::Error::other(found.message()) }
         }
         _ => error,
     }

@@ -201,6 +201,22 @@ pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>
     )
 }
 
+/// Leases of studies that do not go on, whose solves no worker began.
+///
+/// # Errors
+/// What the database reports.
+pub async fn held_up(db: &mut Connection) -> StoreResult<Vec<Lease>> {
+    leases(
+        &sqlx::query(
+            "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
+             join studies s on s.id = t.study_id \
+             where j.state = 'leased' and t.state = 'queued' and s.state not in ('running', 'waiting') order by j.id",
+        )
+        .fetch_all(db)
+        .await?,
+    )
+}
+
 /// Every lease that was given to an engine: at start, what an earlier process left behind.
 ///
 /// # Errors

@@ -6,7 +6,7 @@ use crate::printable;
 use crate::store::audit;
 use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{FeedbackId, StudyId, TrialId, Writer, events, feedback, studies, trials};
+use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -79,11 +79,23 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     Ok(id)
 }
 
+/// So many answers of others are told.
+const BESIDE: u32 = 20;
+
+/// The newest answers of others to the same comparison, which stand beside an answer: all of them count.
+///
+/// # Errors
+/// What the database reports.
+pub async fn beside(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
+    let (Said::Preference { winner: a, loser: b } | Said::Tie { a, b }) = row.said else { return Ok(Vec::new()) };
+    Ok(feedback::by_others(db, (a, b), &row.author, BESIDE).await?)
+}
+
 /// Takes an answer back.
 ///
 /// # Errors
-/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already
-/// or is not a comparison.
+/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already,
+/// is not a comparison or is of a subject who withdrew.
 pub async fn retract(
     writer: &mut Writer,
     caller: &Caller,
@@ -99,6 +111,7 @@ pub async fn retract(
     if study.is_some_and(|study| study != row.study_id) {
         return Err(Error::NotFound { what: "in this study, preference".to_owned(), id: id.to_string() });
     }
+    consents::may_be_shown(writer, row.study_id).await?;
     if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
         return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
     }

@@ -1,15 +1,14 @@
 //! The director: proposes, dispatches, records, for every study that goes on by itself.
 //!
-//! One task plans and hands jobs to the engine, another hears what comes of them. What they decide depends on the
-//! record alone, so the process may end at any instant.
+//! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
+//! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
 
 use super::lifecycle::{self, Act};
-use super::next_step::{Step, likely_next, next_step};
+use super::next_step::{Step, next_step};
 use super::record;
-use super::rehearsal::{PREPARED, Prepared, Rehearsals};
+use super::rehearsal::{LikelyNext, PREPARED, Prepared, Rehearsals};
 use super::standing::Standing;
 use crate::error::Error;
-use crate::store::feedback::LogVersion;
 use crate::store::jobs::Lease;
 use crate::store::studies::{Study, StudyPlan, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
@@ -46,8 +45,11 @@ struct Inner {
     board: Arc<Board>,
     /// Solves that are run before anybody asked for them.
     rehearsals: Rehearsals,
-    /// What could still be rehearsed of a study that waits for an answer, by what it has heard.
-    likely: Mutex<HashMap<StudyId, (LogVersion, Vec<NewTrial>)>>,
+    /// Where the studies stand that wait for an answer, as of the last plan: what may be rehearsed.
+    waiting: watch::Sender<Arc<[Standing]>>,
+    /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
+    /// where no job of a trial is.
+    hand_over: Mutex<()>,
     /// With `Some`, the only study that is looked at.
     only: Option<StudyId>,
     /// Something changed: plan again.
@@ -75,7 +77,8 @@ impl Director {
             engine,
             board: Arc::default(),
             rehearsals: Rehearsals::default(),
-            likely: Mutex::default(),
+            waiting: watch::channel(Arc::default()).0,
+            hand_over: Mutex::default(),
             only,
             wake: Notify::new(),
             pulse: watch::channel(0).0,
@@ -137,6 +140,7 @@ impl Director {
             () = stopped => {}
             () = self.keep_planning() => {}
             () = self.keep_listening() => {}
+            () = self.keep_rehearsing() => {}
         }
         self.0.tasks.close();
         self.0.tasks.wait().await;
@@ -163,8 +167,7 @@ impl Director {
         let left = jobs::leased(&mut reader, engine).await?;
         drop(reader);
         for lease in left {
-            self.cancel_solve(lease.trial).await;
-            record::interrupted(&self.0.store, &lease).await?;
+            self.give_back(&lease).await?;
         }
         Ok(())
     }
@@ -172,20 +175,32 @@ impl Director {
     async fn plan_and_dispatch(&self) -> Result<(), Error> {
         let mut reader = self.0.store.read().await?;
         let expired = jobs::expired(&mut reader, now()).await?;
+        let held_up = jobs::held_up(&mut reader).await?;
         let active = studies::active(&mut reader).await?;
         drop(reader);
         for lease in expired {
             self.look_after(&lease).await?;
         }
-        let waiting = |id: StudyId| active.iter().any(|study| study.id == id);
-        self.0.likely.lock().await.retain(|study, _| waiting(*study));
-        self.withdraw(self.0.rehearsals.forget(waiting)).await;
+        for lease in held_up {
+            self.give_back(&lease).await?;
+        }
+        self.withdraw(self.0.rehearsals.forget(|id| active.iter().any(|study| study.id == id))).await;
+        let mut waiting = Vec::new();
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
-            if let Err(error) = self.plan(study.clone()).await {
-                tracing::error!(study = %study.id, %error, "cannot plan a study");
+            match self.plan(study.clone()).await {
+                Ok(standing) => waiting.extend(standing),
+                Err(error) => tracing::error!(study = %study.id, %error, "cannot plan a study"),
             }
         }
-        self.dispatch().await
+        self.dispatch().await?;
+        self.0.waiting.send_replace(waiting.into());
+        Ok(())
+    }
+
+    /// Takes a job back from the engine, uncounted.
+    async fn give_back(&self, lease: &Lease) -> Result<(), Error> {
+        self.cancel_solve(lease.trial).await;
+        record::interrupted(&self.0.store, lease).await.map(drop)
     }
 
     /// A lease ran out. What no worker took yet is handed over once more, in case the engine forgot it; what a worker
@@ -201,8 +216,9 @@ impl Director {
         Ok(())
     }
 
-    /// Proposes trials until the study has as many open ones as it may, or moves it to another state.
-    async fn plan(&self, mut study: Study) -> Result<(), Error> {
+    /// Proposes trials until the study has as many open ones as it may, or moves it to another state. Gives where it
+    /// stands when it waits for an answer.
+    async fn plan(&self, mut study: Study) -> Result<Option<Standing>, Error> {
         loop {
             let mut reader = self.0.store.read().await?;
             let standing = Standing::read(&mut reader, study.clone()).await?;
@@ -214,15 +230,14 @@ impl Director {
             .await
             .map_err(|e| Error::Internal(e.to_string()))?;
             match step? {
-                Step::Nothing if standing.study.state == StudyState::Waiting => return self.rehearse(standing).await,
-                Step::Nothing => return Ok(()),
+                Step::Nothing => return Ok(Some(standing).filter(|s| s.study.state == StudyState::Waiting)),
                 Step::Act(act, reason) => match self.act(&standing.study, act, &reason).await? {
                     Some(changed) => study = changed,
-                    None => return Ok(()),
+                    None => return Ok(None),
                 },
                 Step::Try(new) => {
                     if !self.propose(&standing, &new).await? {
-                        return Ok(());
+                        return Ok(None);
                     }
                 }
             }
@@ -289,16 +304,17 @@ impl Director {
             }
         };
         let attempt = assignment.attempt;
+        let hand_over = self.0.hand_over.lock().await;
         match self.0.rehearsals.claim(&assignment) {
             Prepared::Nothing => {}
             Prepared::Running => return self.started(attempt, PREPARED).await,
             Prepared::Done(finding) => {
+                drop(hand_over);
                 self.started(attempt, PREPARED).await?;
                 return self.ended(attempt, PREPARED, finding).await;
             }
         }
         if self.busy().await? > self.0.engine.size() {
-            self.0.likely.lock().await.clear();
             self.withdraw(self.0.rehearsals.forget_running()).await;
         }
         if let Err(error) = self.0.engine.submit(assignment).await {
@@ -314,29 +330,43 @@ impl Director {
         Ok(leased as usize + self.0.rehearsals.running())
     }
 
-    /// Runs what a study will need next, whatever the answer that it waits for, where no worker is needed for others.
-    async fn rehearse(&self, standing: Standing) -> Result<(), Error> {
-        let (study, version) = (standing.study.id, standing.version);
-        let plan = standing.study.plan.clone();
-        let mut all = self.0.likely.lock().await;
-        if all.get(&study).is_none_or(|(known, _)| *known != version) {
-            self.withdraw(self.0.rehearsals.forget(|other| other != study)).await;
-            let likely = tokio::task::spawn_blocking(move || likely_next(&standing));
-            all.insert(study, (version, likely.await.map_err(|e| Error::Internal(e.to_string()))??));
+    /// Runs what studies will need next, whatever the answers that they wait for, where no worker is needed for others.
+    async fn keep_rehearsing(&self) {
+        let mut waiting = self.0.waiting.subscribe();
+        let mut likely = LikelyNext::default();
+        // The sender lives as long as this director.
+        while waiting.changed().await.is_ok() {
+            let standings = Arc::clone(&waiting.borrow_and_update());
+            likely.keep(|study| standings.iter().any(|standing| standing.study.id == study));
+            for standing in standings.iter() {
+                if let Err(error) = self.rehearse(&mut likely, standing).await {
+                    tracing::warn!(study = %standing.study.id, %error, "what comes next cannot be prepared");
+                }
+            }
         }
-        let Some((_, likely)) = all.get_mut(&study) else { return Ok(()) };
-        while self.busy().await? < self.0.engine.size()
-            && let Some(new) = likely.pop()
-        {
+    }
+
+    async fn rehearse(&self, likely: &mut LikelyNext, standing: &Standing) -> Result<(), Error> {
+        let study = &standing.study;
+        if !likely.knows(standing) {
+            self.withdraw(self.0.rehearsals.forget(|other| other != study.id)).await;
+        }
+        for new in likely.of(standing).await? {
+            if self.busy().await? >= self.0.engine.size() {
+                return Ok(());
+            }
             // No trial has this name: what comes of it is kept here until one asks.
             let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
             let start = new.warm_started_from;
-            let assignment = assignment_of(&self.0.store, &plan, (attempt, new.number), new.action, start).await?;
-            if self.0.rehearsals.begin(study, &assignment)
+            let assignment =
+                assignment_of(&self.0.store, &study.plan, (attempt, new.number), new.action, start).await?;
+            let _hand_over = self.0.hand_over.lock().await;
+            if self.busy().await? < self.0.engine.size()
+                && self.0.rehearsals.begin(study.id, &assignment)
                 && let Err(error) = self.0.engine.submit(assignment).await
             {
-                tracing::warn!(%error, "a solve cannot be prepared");
-                self.0.rehearsals.forget_running();
+                self.withdraw(self.0.rehearsals.forget_running()).await;
+                return Err(error.into());
             }
         }
         Ok(())
@@ -396,8 +426,8 @@ impl Director {
 
     /// A worker took a job.
     async fn started(&self, attempt: Attempt, worker: &str) -> Result<(), Error> {
+        let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let mut writer = self.0.store.write().await?;
-        let lease = jobs::lease_of(&mut writer, attempt.trial, attempt.number).await?;
         if !jobs::heartbeat(&mut writer, &lease, now().after(self.0.engine.lease())).await? {
             drop(writer);
             self.cancel_solve(attempt.trial).await;
@@ -413,8 +443,19 @@ impl Director {
         Ok(())
     }
 
+    /// The lease of an attempt. `None`: the record has no such trial; what was rehearsed in vain speaks of one.
+    async fn lease_of(&self, attempt: Attempt) -> Result<Option<Lease>, Error> {
+        match jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await {
+            Err(StoreError::Missing { .. }) => {
+                tracing::debug!(trial = %attempt.trial, "news of a solve that nobody waits for");
+                Ok(None)
+            }
+            found => Ok(Some(found?)),
+        }
+    }
+
     async fn heartbeat(&self, attempt: Attempt) -> Result<(), Error> {
-        let lease = jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await?;
+        let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         if !self.live_on(&lease).await? {
             self.cancel_solve(attempt.trial).await;
         }
@@ -433,14 +474,7 @@ impl Director {
     async fn ended(&self, attempt: Attempt, worker: &str, finding: Finding) -> Result<(), Error> {
         self.0.board.close(attempt.trial);
         let store = &self.0.store;
-        let lease = jobs::lease_of(&mut *store.read().await?, attempt.trial, attempt.number).await;
-        let lease = match lease {
-            Err(StoreError::Missing { .. }) => {
-                tracing::warn!(trial = %attempt.trial, worker, "a result of a trial that this record does not have");
-                return Ok(());
-            }
-            other => other?,
-        };
+        let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let (outcome, iterations) = match finding {
             Finding::Ended { outcome, iterations } => (outcome, iterations),
             Finding::Broke(reason) => return record::broke(store, &lease, &reason).await.map(drop),

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::trials::TrialState;
-use crate::store::{Connection, TrialId, Writer, certificates, gaits, trials};
+use crate::store::{Connection, TrialId, Writer, certificates, consents, gaits, trials};
 use gait_optimizer::Gait;
 use gait_optimizer::certificate::{Certificate, certify};
 use serde_json::json;
@@ -20,12 +20,13 @@ pub enum Examination {
 /// Looks for the certificate of a trial's gait.
 ///
 /// # Errors
-/// [`Error::Conflict`] when the trial has no converged gait, or what the database reports.
+/// [`Error::Conflict`] when the trial has no converged gait or its subject withdrew, or what the database reports.
 pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Examination, Error> {
+    let found = trials::get(reader, trial).await?;
+    consents::may_be_shown(reader, found.study_id).await?;
     if let Some(certificate) = certificates::find(reader, trial).await? {
         return Ok(Examination::Made(certificate));
     }
-    let found = trials::get(reader, trial).await?;
     if found.state != TrialState::Converged {
         let state = found.state.as_str();
         return Err(Error::conflict(format!("trial {} is {state}: only a converged gait is examined", found.number)));

@@ -3,6 +3,11 @@
 //! The same problem from the same start has the same solution to the last bit. Taking a solution that is there already
 //! changes nothing but the wait; the record and the learner hear of a solve only when a trial asks for it.
 
+use super::next_step::likely_next;
+use super::standing::Standing;
+use crate::error::Error;
+use crate::store::feedback::LogVersion;
+use crate::store::trials::NewTrial;
 use crate::store::{StudyId, TrialId};
 use crate::workers::{Assignment, Attempt, Finding, News, Receipt};
 use std::collections::HashMap;
@@ -19,7 +24,7 @@ pub(super) struct Rehearsals(Mutex<HashMap<TrialId, Rehearsal>>);
 struct Rehearsal {
     study: StudyId,
     assignment: Assignment,
-    /// What came of it; `None`: it runs.
+    /// What came of it; `None`: it runs. What failed is not tried again here, but when a trial asks for it.
     finding: Option<Finding>,
     /// The attempt that asked for it while it ran.
     promised_to: Option<Attempt>,
@@ -59,12 +64,19 @@ impl Rehearsals {
         let found =
             all.iter_mut().find(|(_, one)| one.promised_to.is_none() && same_solve(&one.assignment, assignment));
         let Some((&name, one)) = found else { return Prepared::Nothing };
-        if let Some(finding) = one.finding.take() {
-            all.remove(&name);
-            return Prepared::Done(finding);
+        match one.finding.take() {
+            None => {
+                one.promised_to = Some(assignment.attempt);
+                Prepared::Running
+            }
+            Some(finding) => {
+                all.remove(&name);
+                match finding {
+                    Finding::Ended { .. } => Prepared::Done(finding),
+                    Finding::Broke(_) => Prepared::Nothing,
+                }
+            }
         }
-        one.promised_to = Some(assignment.attempt);
-        Prepared::Running
     }
 
     /// Forgets what nobody asked for, of the studies that are not to stay; those that run are to be withdrawn.
@@ -113,11 +125,7 @@ impl Rehearsals {
                 Ok(News::Ended { attempt, worker, finding, receipt })
             }
             (News::Ended { finding, receipt, .. }, None) => {
-                match finding {
-                    Finding::Ended { .. } => one.finding = Some(finding),
-                    // What failed here is tried again, and recorded, when it is asked for.
-                    Finding::Broke(_) => drop(all.remove(&name)),
-                }
+                one.finding = Some(finding);
                 Err(receipt)
             }
             (News::Started { .. } | News::Iterated { .. }, None) => Err(Receipt::not_needed()),
@@ -127,6 +135,36 @@ impl Rehearsals {
     fn all(&self) -> MutexGuard<'_, HashMap<TrialId, Rehearsal>> {
         // The map is whole between any two statements that hold the lock.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What studies that wait for an answer would propose next, computed once for what each has heard.
+#[derive(Debug, Default)]
+pub(super) struct LikelyNext(HashMap<StudyId, (LogVersion, Vec<NewTrial>)>);
+
+impl LikelyNext {
+    /// Forgets the studies that are not to stay.
+    pub(super) fn keep(&mut self, stays: impl Fn(StudyId) -> bool) {
+        self.0.retain(|study, _| stays(*study));
+    }
+
+    /// Whether it is computed for what the study has heard by now.
+    pub(super) fn knows(&self, standing: &Standing) -> bool {
+        self.0.get(&standing.study.id).is_some_and(|(heard, _)| *heard == standing.version)
+    }
+
+    /// The trials that a study would propose next.
+    ///
+    /// # Errors
+    /// What the learner reports.
+    pub(super) async fn of(&mut self, standing: &Standing) -> Result<Vec<NewTrial>, Error> {
+        if !self.knows(standing) {
+            let there = standing.clone();
+            let likely = tokio::task::spawn_blocking(move || likely_next(&there));
+            let likely = likely.await.map_err(|e| Error::Internal(e.to_string()))??;
+            self.0.insert(standing.study.id, (standing.version, likely));
+        }
+        Ok(self.0.get(&standing.study.id).map(|(_, likely)| likely.clone()).unwrap_or_default())
     }
 }
 

@@ -15,7 +15,7 @@ async fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [url, queue, lease, pause, hangs] = &arguments[..] else { panic!("five arguments") };
     let milliseconds = |text: &str| Duration::from_millis(text.parse().expect("milliseconds"));
-    let solver = Analytic { hangs_once: hangs == "true", ..Analytic::slow(milliseconds(pause)) };
+    let solver = Analytic { hangs: u32::from(hangs == "true"), ..Analytic::slow(milliseconds(pause)) };
     let name = format!("worker {}", std::process::id());
     let worker = Worker::connect(url, queue, name, 1, milliseconds(lease), Arc::new(solver)).await.unwrap();
     Box::pin(worker.run(CancellationToken::new())).await.unwrap();

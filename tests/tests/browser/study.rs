@@ -4,7 +4,7 @@ use crate::chromium::Chromium;
 use crate::site::Site;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::many_trials;
+use gaitwright_tests::large;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -212,7 +212,7 @@ async fn browser_opens_ten_thousand_trials_within_a_second() {
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.trial_budget = 3).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let fill = |database: PathBuf| async move { many_trials::fill(&database, study).await };
+    let fill = |database: PathBuf| async move { large::fill(&database, study).await };
     let site = site.restart(Analytic::default(), fill).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     let mut fastest = f64::INFINITY;

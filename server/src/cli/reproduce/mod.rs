@@ -7,7 +7,7 @@ use super::Ended;
 use super::numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::unattended::{self, Lines, Run};
+use super::unattended::{self, Lines};
 use crate::error::Error;
 use crate::store::studies::{self, Study, StudyState};
 use crate::store::{Store, commit, gaits};
@@ -111,11 +111,17 @@ impl Reproduce {
                     let standing = if finished {
                         Standing::read(&mut *store.read().await?, study).await?
                     } else {
-                        let Run { standing, interrupted } = unattended::run(store, &study, 1, Lines::Progress).await?;
-                        if interrupted {
+                        let ran = unattended::run(store, &study, 1, Lines::Progress).await?;
+                        if ran.interrupted {
                             return Ok(None);
                         }
-                        standing
+                        if let Some(failure) = ran.failure() {
+                            tell(&format!("gaitwright: {failure}"));
+                        }
+                        if ran.standing.study.state != StudyState::Finished {
+                            return Err(Error::conflict("a study did not come to its end; nothing is compared"));
+                        }
+                        ran.standing
                     };
                     outcomes.push(outcome(store, subject, muscles, seed, &standing).await?);
                 }

@@ -7,6 +7,7 @@ use crate::http::blind_motion::{Figure, blind_motion};
 use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::shown::Shown;
 use crate::store::presentations::{self, Presentation};
 use crate::store::{StudyId, gaits, studies};
 use crate::studies::blind::{self, Answered, RaterAnswer, RaterFigures};
@@ -152,7 +153,7 @@ pub(super) async fn answer(
 pub(super) async fn raters(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
 ) -> Result<Json<Vec<RaterFigures>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;

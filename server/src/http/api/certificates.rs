@@ -6,7 +6,8 @@ use crate::http::AppState;
 use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::Once;
-use crate::store::{TrialId, certificates, trials};
+use crate::http::shown::Shown;
+use crate::store::{TrialId, certificates};
 use crate::studies::examination;
 use axum::Json;
 use axum::extract::State;
@@ -26,12 +27,10 @@ use gait_optimizer::certificate::Certificate;
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Shown(id): Shown<TrialId>,
 ) -> Result<Json<Certificate>, Error> {
-    let mut reader = app.read().await?;
-    trials::get(&mut reader, id).await?;
     let missing = || Error::NotFound { what: "certificate of trial".to_owned(), id: id.to_string() };
-    certificates::find(&mut reader, id).await?.map(Json).ok_or_else(missing)
+    certificates::find(&mut *app.read().await?, id).await?.map(Json).ok_or_else(missing)
 }
 
 /// `POST /trials/{id}/certificate`: makes it, where it is not made yet.

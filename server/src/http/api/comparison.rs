@@ -76,7 +76,7 @@ pub(super) async fn get(
 
 async fn row(db: &mut Connection, id: StudyId) -> Result<Compared, Error> {
     let study = studies::get(db, id).await?;
-    consents::may_leave(db, id).await?;
+    consents::may_be_shown(db, id).await?;
     let counts = trials::counts(db, id).await?;
     let standing = Standing::read(db, study).await?;
     let (standing, best) = tokio::task::spawn_blocking(move || {

@@ -1,13 +1,15 @@
 //! Live events of a study (Server-Sent Events).
 //!
 //! What is recorded has an id and is replayed after `Last-Event-ID`; iterations of running solves have none: who
-//! misses one sees the next.
+//! misses one sees the next. A stream begins with where the study stands, so that who listens to one that has ended
+//! knows; it stays open, because a study that has ended can be extended.
 
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::store::{StudyId, TrialId, events, studies};
 use crate::workers::Progress;
 use axum::extract::State;
@@ -15,6 +17,7 @@ use axum::http::HeaderMap;
 use axum::response::sse::{Event, KeepAlive, Sse};
 use futures_util::Stream;
 use serde::Deserialize;
+use serde_json::json;
 use std::collections::HashMap;
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
@@ -39,18 +42,18 @@ pub(super) struct From {
     path = "/studies/{id}/events",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Begin after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "The last event that was seen")),
-    responses((status = 200, description = "Server-sent events; recorded ones carry an id and are replayed after `Last-Event-ID`", body = String, content_type = "text/event-stream")),
+    responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = String, content_type = "text/event-stream")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
     Params(from): Params<From>,
     headers: HeaderMap,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Error> {
     let mut reader = app.read().await?;
-    studies::get(&mut reader, id).await?;
+    let study = studies::get(&mut reader, id).await?;
     let last_seen = headers.get("last-event-id").and_then(|value| value.to_str().ok()?.parse().ok()).or(from.after);
     let after = match last_seen {
         Some(seq) => seq,
@@ -58,7 +61,12 @@ pub(super) async fn of_study(
     };
     drop(reader);
     let (sender, receiver) = mpsc::channel(16);
+    let stands = json!({ "state": study.state, "reason": study.state_reason });
+    let stands = Event::default().event("study_state").json_data(stands).map_err(|e| Error::Internal(e.to_string()))?;
     tokio::spawn(async move {
+        if sender.send(stands).await.is_err() {
+            return;
+        }
         // Ends when the browser goes away or the server stops; either is the normal end.
         let _ = follow(&app, id, after, &sender).await;
     });

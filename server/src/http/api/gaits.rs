@@ -3,10 +3,10 @@
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
-use crate::store::{TrialId, consents, gaits, trials};
+use crate::http::shown::Shown;
+use crate::store::{TrialId, gaits};
 use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
@@ -24,15 +24,13 @@ use gait_optimizer::Gait;
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Shown(id): Shown<TrialId>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     if wants_csv(&headers) {
         return table(&app, id).await;
     }
-    let mut reader = app.read().await?;
-    trials::get(&mut reader, id).await?;
-    let text = gaits::json_of(&mut reader, id).await?;
+    let text = gaits::json_of(&mut *app.read().await?, id).await?;
     let headers = [(header::CONTENT_TYPE, "application/json"), (header::VARY, "Accept")];
     Ok((headers, text).into_response())
 }
@@ -46,14 +44,16 @@ pub(super) async fn get(
     responses((status = 200, description = "One row per mesh point", body = String, content_type = "text/csv")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn get_csv(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Response, Error> {
+pub(super) async fn get_csv(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Response, Error> {
     table(&app, id).await
 }
 
 async fn table(app: &AppState, id: TrialId) -> Result<Response, Error> {
     let mut reader = app.read().await?;
-    let trial = trials::get(&mut reader, id).await?;
-    consents::may_leave(&mut reader, trial.study_id).await?;
     let gait = gaits::get(&mut reader, id).await?;
     drop(reader);
     let (header, rows) = rows(&gait);

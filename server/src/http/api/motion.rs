@@ -3,10 +3,10 @@
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::gait_series::points;
 use crate::http::may::May;
-use crate::store::{TrialId, gaits, trials};
+use crate::http::shown::Shown;
+use crate::store::{TrialId, gaits};
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::Gait;
@@ -47,11 +47,12 @@ struct Frame {
     responses((status = 200, description = "Stick figures over one stride", body = Object)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Motion>, Error> {
-    let mut reader = app.read().await?;
-    trials::get(&mut reader, id).await?;
-    let gait = gaits::get(&mut reader, id).await?;
-    drop(reader);
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Json<Motion>, Error> {
+    let gait = gaits::get(&mut *app.read().await?, id).await?;
     Ok(Json(motion(&gait)?))
 }
 

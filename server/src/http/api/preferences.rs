@@ -8,14 +8,15 @@ use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::OnceWith;
 use crate::http::pages_of::{After, linked_after};
+use crate::http::shown::Shown;
 use crate::store::feedback::{self, FeedbackRow, Said};
-use crate::store::{FeedbackId, StudyId, consents, studies};
+use crate::store::{FeedbackId, StudyId, studies};
 use crate::studies::answer::{self, Answer};
 use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// `GET /studies/{id}/preferences`: as given, retracted ones included, by pages; the `Link` header has the address of
@@ -31,14 +32,13 @@ use utoipa::ToSchema;
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
     Params(page): Params<After<i64>>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     if wants_csv(&headers) {
-        consents::may_leave(&mut reader, id).await?;
         return table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?);
     }
     let limit = page.limit(1000)?;
@@ -99,9 +99,18 @@ fn table(study: StudyId, rows: &[FeedbackRow]) -> Result<Response, Error> {
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<FeedbackId>,
+    Shown(id): Shown<FeedbackId>,
 ) -> Result<Json<FeedbackRow>, Error> {
     Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
+}
+
+/// An answer as recorded.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Recorded {
+    #[serde(flatten)]
+    row: FeedbackRow,
+    /// Answers of others to the same comparison, the newest twenty at most: all of them count.
+    beside: Vec<FeedbackId>,
 }
 
 /// `POST /studies/{id}/preferences`.
@@ -111,7 +120,7 @@ pub(super) async fn get(
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Answer,
-    responses((status = 201, description = "Recorded", body = FeedbackRow)),
+    responses((status = 201, description = "Recorded", body = Recorded)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn create(
@@ -125,8 +134,9 @@ pub(super) async fn create(
     };
     let given = answer::give(&mut writer, &once.caller, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
+    let beside = answer::beside(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &row).await
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &Recorded { row, beside }).await
 }
 
 /// Why an answer is taken back.

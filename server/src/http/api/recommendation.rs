@@ -3,9 +3,9 @@
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
-use crate::store::{StudyId, TrialId, consents, schema, studies};
+use crate::http::shown::Shown;
+use crate::store::{StudyId, TrialId, schema, studies};
 use crate::studies::choice::best_to_show;
 use crate::studies::standing::Standing;
 use axum::Json;
@@ -47,11 +47,10 @@ pub(super) struct Recommendation {
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
 ) -> Result<Json<Recommendation>, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    consents::may_leave(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
     let (standing, best) = tokio::task::spawn_blocking(move || {

@@ -7,16 +7,18 @@ use crate::http::extract::{Id, Params};
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::Once;
+use crate::http::pages_of::After;
+use crate::http::shown::Shown;
 use crate::store::results::{self, AttemptResult};
 use crate::store::trials::{self, Trial};
-use crate::store::{Connection, StudyId, TrialId, consents, gaits, schema, studies};
+use crate::store::{Connection, StudyId, TrialId, gaits, schema, studies};
 use crate::studies::command;
 use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use gait_optimizer::{IterationRecord, TunedBounds};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::collections::HashMap;
 use utoipa::ToSchema;
 
@@ -27,13 +29,6 @@ pub(super) struct TrialPage {
     /// Give it as `after` to get the next page; absent on the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     next: Option<u32>,
-}
-
-/// Which page.
-#[derive(Debug, Deserialize)]
-pub(super) struct PageParams {
-    after: Option<u32>,
-    limit: Option<u32>,
 }
 
 /// `GET /studies/{id}/trials`: by number, by pages; all of them as CSV.
@@ -48,8 +43,8 @@ pub(super) struct PageParams {
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
-    Params(page): Params<PageParams>,
+    Shown(id): Shown<StudyId>,
+    Params(page): Params<After<u32>>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
@@ -57,10 +52,7 @@ pub(super) async fn of_study(
     if wants_csv(&headers) {
         return table(&mut reader, id).await;
     }
-    let limit = page.limit.unwrap_or(200);
-    if !(1..=1000).contains(&limit) {
-        return Err(Error::invalid("limit", limit, "1 to 1000"));
-    }
+    let limit = page.limit_or(200, 1000)?;
     let mut found = trials::page(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
     let more = found.len() > limit as usize;
     found.truncate(limit as usize);
@@ -80,7 +72,7 @@ pub(super) async fn of_study(
 pub(super) async fn of_study_csv(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -96,7 +88,11 @@ pub(super) async fn of_study_csv(
     responses((status = 200, description = "The trial", body = Trial)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Result<Json<Trial>, Error> {
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Json<Trial>, Error> {
     Ok(Json(trials::get(&mut *app.read().await?, id).await?))
 }
 
@@ -158,7 +154,7 @@ pub(super) async fn retry(
 pub(super) async fn iterations(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Shown(id): Shown<TrialId>,
 ) -> Result<Json<Vec<IterationRecord>>, Error> {
     if let Some(track) = app.director.board().track(id) {
         return Ok(Json(track.records));
@@ -178,15 +174,12 @@ pub(super) async fn iterations(
 pub(super) async fn attempts(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Shown(id): Shown<TrialId>,
 ) -> Result<Json<Vec<AttemptResult>>, Error> {
-    let mut reader = app.read().await?;
-    trials::get(&mut reader, id).await?;
-    Ok(Json(results::of_trial(&mut reader, id).await?))
+    Ok(Json(results::of_trial(&mut *app.read().await?, id).await?))
 }
 
 async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Error> {
-    consents::may_leave(db, study).await?;
     let mut header = vec!["number", "trial_id"];
     header.extend(TunedBounds::NAMES);
     header.extend([

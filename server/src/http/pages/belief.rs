@@ -7,12 +7,13 @@ use super::study::answer_in_words;
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::plots::{Cell, Chart, HeatMap, Stroke};
 use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{StudyId, TrialId, consents, studies, trials};
+use crate::store::{StudyId, TrialId, studies, trials};
 use crate::studies::belief::{Belief, Beliefs, Comparison, MOST_ANSWERS};
 use crate::studies::choice::MANY;
 use crate::studies::standing::Standing;
@@ -37,10 +38,10 @@ struct BeliefPage {
     study: Study,
     /// Why nothing is shown; none: it is.
     absent: Option<String>,
-    shown: Option<Shown>,
+    shown: Option<Everything>,
 }
 
-struct Shown {
+struct Everything {
     agreement: Agreement,
     marginals: Vec<Drawn>,
     maps: Maps,
@@ -82,12 +83,11 @@ struct AnswerRow {
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    consents::may_leave(&mut reader, id).await?;
     let total = trials::counts(&mut reader, id).await?.total as usize;
     if total >= MANY {
         return absent(study, format!("From {MANY} trials on the belief takes longer to compute than a page may."));
@@ -118,10 +118,10 @@ fn absent(study: Study, why: String) -> Page {
     page(&BeliefPage { study, absent: Some(why), shown: None })
 }
 
-fn show(standing: &Standing, beliefs: &Beliefs, choice: &Choice) -> Result<Shown, Error> {
+fn show(standing: &Standing, beliefs: &Beliefs, choice: &Choice) -> Result<Everything, Error> {
     let belief = beliefs.of(standing).map_err(Error::Learner)?;
     let chosen = chosen(belief.posterior.space(), choice)?;
-    Ok(Shown {
+    Ok(Everything {
         agreement: belief.agreement,
         marginals: marginals(&belief),
         maps: maps(&belief, standing, chosen).map_err(Error::Learner)?,

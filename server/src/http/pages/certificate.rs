@@ -12,7 +12,7 @@ use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
 
 /// A certificate in words.
-pub(super) struct Shown {
+pub(super) struct InWords {
     /// Every check is within its limit, and the gait is stable.
     pub(super) passed: bool,
     /// Why not.
@@ -23,7 +23,7 @@ pub(super) struct Shown {
     pub(super) checks: Vec<Check>,
 }
 
-impl Shown {
+impl InWords {
     pub(super) fn new(certificate: Certificate) -> Self {
         let mut figures = Vec::new();
         if let Some(map) = &certificate.return_map {

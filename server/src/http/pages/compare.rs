@@ -10,7 +10,8 @@ use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
-use crate::store::feedback::Source;
+use crate::http::shown::Shown;
+use crate::store::feedback::{FeedbackRow, Source};
 use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
@@ -65,6 +66,8 @@ struct Saved {
     text: String,
     at: String,
     retracted: bool,
+    /// What others answered to the same comparison: who, and what.
+    beside: Vec<(String, String)>,
 }
 
 /// So many trials of a large study are offered.
@@ -74,7 +77,7 @@ const OFFERED: u32 = 200;
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
     show(&app, id, choice, Submitted::default(), None).await
@@ -91,7 +94,11 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         Standing::read(&mut reader, study).await?
     };
     let saved = match choice.saved {
-        Some(saved) => Some(feedback::get(&mut reader, saved).await?),
+        Some(saved) => {
+            let row = feedback::get(&mut reader, saved).await?;
+            let beside = answer::beside(&mut reader, &row).await?;
+            Some((row, beside))
+        }
         None => None,
     };
     let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
@@ -125,12 +132,14 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     drop(reader);
     let draw = move || pair.map(|(a, b)| gait_charts::of_pair(&a, &b, &reference)).unwrap_or_default();
     let charts = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
-    let saved = saved.and_then(|row| {
+    let saved = saved.and_then(|(row, beside)| {
+        let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, &standing)?));
         Some(Saved {
             id: row.id,
             text: answer_in_words(&row, &standing)?,
             at: row.created_at.minute(),
             retracted: row.retraction.is_some(),
+            beside: beside.into_iter().filter_map(said).collect(),
         })
     });
     page(&ComparePage { study: standing.study, trials, a, b, charts, key: FeedbackId::fresh(), saved, typed, refused })
@@ -196,7 +205,7 @@ enum Given {
 pub(super) async fn post(
     may: May<access::Answer>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
     Form(form): Form<Submitted>,
 ) -> Result<Response, PageError> {
     let (saved, status, why) = match give(&app, &may.caller, id, &form).await {
@@ -209,8 +218,7 @@ pub(super) async fn post(
             (saved.parse().ok(), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
-            (None, status, error.to_string())
+            (None, Problem::from(&error).status(), error.to_string())
         }
         Err(other) => return Err(other.into()),
     };

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::http::problem::Problem;
 use askama::Template;
 use axum::extract::Request;
-use axum::http::{Method, StatusCode, Uri, header};
+use axum::http::{Method, Uri, header};
 use axum::middleware::Next;
 use axum::response::{Html, IntoResponse, Redirect, Response};
 
@@ -37,7 +37,7 @@ impl IntoResponse for PageError {
 }
 
 fn shown(problem: Problem) -> Response {
-    let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    let status = problem.status();
     match (ErrorPage { problem }).render() {
         Ok(text) => (status, Html(text)).into_response(),
         Err(_) => status.into_response(),

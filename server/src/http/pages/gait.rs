@@ -1,7 +1,7 @@
 //! A trial and its gait.
 
 use super::bound_use::{self, BoundUse};
-use super::certificate::Shown;
+use super::certificate;
 use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::format::{self, words};
@@ -9,8 +9,8 @@ use super::gait_charts;
 use crate::access::{Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::plots::gait_tiles;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
@@ -33,7 +33,7 @@ struct GaitPage {
     from: Option<(TrialId, u32)>,
     has_gait: bool,
     may_run: bool,
-    certificate: Option<Shown>,
+    certificate: Option<certificate::InWords>,
     groups: Vec<gait_charts::Group>,
     solve: Option<Drawn>,
     /// The stride as a row of pictures.
@@ -49,7 +49,7 @@ struct GaitPage {
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<TrialId>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<TrialId>) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -64,7 +64,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<
         Err(error) => return Err(error.into()),
     };
     let iterations = if gait.is_some() { gaits::iterations(&mut reader, id).await? } else { Vec::new() };
-    let certificate = certificates::find(&mut reader, id).await?.map(Shown::new);
+    let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     drop(reader);
     let has_gait = gait.is_some();
     let action = trial.action;

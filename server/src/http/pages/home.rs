@@ -10,7 +10,7 @@ use crate::http::may::May;
 use crate::plots::sparkline;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialCounts;
-use crate::store::{Connection, StudyId, studies, subjects, trials};
+use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
 use askama::Template;
 use axum::extract::State;
 use serde::Deserialize;
@@ -45,6 +45,7 @@ struct Row {
     best_rmse: Option<String>,
     /// The smallest Gait RMSE so far, trial by trial.
     course: Option<String>,
+    withdrawn: bool,
 }
 
 struct Waiting {
@@ -81,7 +82,8 @@ fn waiting(study: Study) -> Waiting {
 async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
     let counts = trials::counts(db, study.id).await?;
     let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
-    let improvements = trials::improvements(db, study.id).await?;
+    let withdrawn = consents::is_withdrawn(db, study.id).await?;
+    let improvements = if withdrawn { Vec::new() } else { trials::improvements(db, study.id).await? };
     let course: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
     Ok(Row {
         state: words(study.state.as_str()),
@@ -91,5 +93,6 @@ async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
         study,
         subject,
         counts,
+        withdrawn,
     })
 }

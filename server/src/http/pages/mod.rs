@@ -19,6 +19,7 @@ mod reference;
 mod side_by_side;
 mod sign_in;
 mod study;
+mod subject;
 mod system;
 
 use super::AppState;
@@ -38,6 +39,10 @@ pub fn routes() -> Router<AppState> {
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
+        .route("/subjects", get(subject::list))
+        .route("/subjects/{id}", get(subject::get))
+        .route("/subjects/{id}/consent", post(subject::consent))
+        .route("/subjects/{id}/withdraw", post(subject::withdraw))
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))

@@ -25,6 +25,7 @@ struct RatePage {
     studies: Vec<(StudyId, String)>,
     nothing: bool,
     saved: Option<Saved>,
+    others: bool,
 }
 
 /// An answer as read back from the record.
@@ -53,6 +54,8 @@ pub(super) struct Before {
     nothing: bool,
     /// The pair that was just answered.
     saved: Option<String>,
+    #[serde(default)]
+    others: bool,
 }
 
 /// `GET /rate`: the studies that may ask for a comparison.
@@ -75,7 +78,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         // Names can say what is tuned: a rater sees the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
-    page(&RatePage { studies, nothing: before.nothing, saved })
+    page(&RatePage { studies, nothing: before.nothing, saved, others: before.others })
 }
 
 async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Saved>, Error> {
@@ -146,12 +149,14 @@ pub(super) async fn answer(
     let mut writer = app.write().await?;
     // The same form sent twice, by a double click or after a lost answer, is one answer.
     let before = blind::own(&mut writer, &may.caller, &token).await?.answer;
+    let mut others = "";
     if before != Some(form.answer) {
-        blind::answer(&mut writer, &may.caller, &token, &given).await?;
+        let (_, answered) = blind::answer(&mut writer, &may.caller, &token, &given).await?;
         commit(writer).await?;
         app.director.changed();
+        others = if answered.answered_by_others { "&others=true" } else { "" };
     }
-    Ok(Redirect::to(&format!("/rate?saved={token}")))
+    Ok(Redirect::to(&format!("/rate?saved={token}{others}")))
 }
 
 /// `POST /rate/pair/{token}/take-back`.

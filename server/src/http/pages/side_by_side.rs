@@ -85,7 +85,7 @@ struct Side {
 impl Side {
     async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
         let study = studies::get(db, id).await?;
-        consents::may_leave(db, id).await?;
+        consents::may_be_shown(db, id).await?;
         let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
         let counts = trials::counts(db, id).await?;
         let standing = if counts.total as usize >= MANY {

@@ -8,7 +8,8 @@ use crate::store::audit;
 use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
-use crate::store::{Connection, StudyId, TrialId, Writer, events, studies};
+use crate::store::{Connection, StudyId, TrialId, Writer, consents, events, studies};
+use crate::studies::answer;
 use crate::studies::comparison::open_question;
 use crate::studies::standing::Standing;
 use serde::{Deserialize, Serialize};
@@ -37,11 +38,14 @@ pub struct Answered {
     pub number: u32,
     /// What was recorded.
     pub answer: Said,
+    /// Somebody else has answered this comparison too: both answers count.
+    pub answered_by_others: bool,
 }
 
 /// The pair that a study asks for, newest first, computed outside any transaction.
 async fn question(db: &mut Connection, study: StudyId) -> Result<(u64, Option<(TrialId, TrialId)>), Error> {
     let study = studies::get(db, study).await?;
+    consents::may_be_shown(db, study.id).await?;
     let seed = study.plan.seed;
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
         return Ok((seed, None));
@@ -130,19 +134,26 @@ pub async fn answer(
     }
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let voice = Voice { source, author: &caller.name, note: &given.note };
-    let feedback = match heard(&shown, given.answer) {
+    let heard = match heard(&shown, given.answer) {
         Some(said) => Some(feedback::append(writer, shown.study_id, &said, voice).await?),
         None => None,
     };
-    let row = NewAnswer { said: given.answer, response_ms: given.response_ms, note: &given.note, feedback };
+    let row = NewAnswer { said: given.answer, response_ms: given.response_ms, note: &given.note, feedback: heard };
     if !presentations::answer(writer, shown.id, row).await? {
         return Err(Error::conflict("this pair was answered already"));
     }
-    let payload = json!({ "feedback_id": feedback, "presentation_id": shown.id });
+    let answered_by_others = match heard {
+        Some(id) => {
+            let row = feedback::get(writer, id).await?;
+            !answer::beside(writer, &row).await?.is_empty()
+        }
+        None => false,
+    };
+    let payload = json!({ "feedback_id": heard, "presentation_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
     let detail = json!({ "study": shown.study_id, "number": shown.number, "answer": given.answer });
     audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
-    Ok((shown.study_id, Answered { number: shown.number, answer: given.answer }))
+    Ok((shown.study_id, Answered { number: shown.number, answer: given.answer, answered_by_others }))
 }
 
 /// Takes a rater's last answer back: what was said stays in the record, and counts no more.
@@ -162,7 +173,7 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
     }
     presentations::take_back(writer, shown.id).await?;
     note(writer, caller, &shown, "presentation.take_back").await?;
-    Ok(Answered { number: shown.number, answer: Said::Withdrawn })
+    Ok(Answered { number: shown.number, answer: Said::Withdrawn, answered_by_others: false })
 }
 
 /// Whether an answer stands that may go: the rater's last one, and not about safety.
@@ -179,6 +190,7 @@ pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Re
     if shown.rater != caller.name {
         return Err(Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() });
     }
+    consents::may_be_shown(db, shown.study_id).await?;
     Ok(shown)
 }
 
@@ -208,6 +220,7 @@ pub async fn unblind(
     reason: &str,
 ) -> Result<Vec<Presentation>, Error> {
     studies::get(writer, study).await?;
+    consents::may_be_shown(writer, study).await?;
     let reason = reason.trim();
     if reason.is_empty() || reason.chars().count() > 2000 {
         return Err(Error::invalid("reason", reason, "1 to 2000 characters: why blindness ends"));

@@ -12,11 +12,13 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::plots::{Chart, Node, Stroke, tree};
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
+use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
-use crate::store::{StudyId, TrialId, commit, consents, devices, events, reference_gaits, studies, subjects, trials};
+use crate::store::{StudyId, TrialId, commit, consents, devices, events, reference_gaits, studies, trials};
 use crate::studies::choice::{MANY, best_trial};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
@@ -35,7 +37,7 @@ use std::collections::HashMap;
 #[template(path = "study.html")]
 struct StudyPage {
     study: Study,
-    subject: String,
+    subject: Subject,
     device: String,
     reference: String,
     live: String,
@@ -43,6 +45,15 @@ struct StudyPage {
     variant: &'static str,
     answers_by: &'static str,
     may_administer: bool,
+}
+
+/// The page of a study whose subject withdrew: what was tried, and nothing of what came of it.
+#[derive(Template)]
+#[template(path = "study_closed.html")]
+struct ClosedPage {
+    study: Study,
+    subject: Subject,
+    counts: TrialCounts,
 }
 
 /// The part that changes while the study runs.
@@ -111,13 +122,16 @@ pub(super) async fn get(
 ) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let last_event = events::last(&mut reader, id).await?;
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
+    if consents::is_withdrawn(&mut reader, id).await? {
+        let counts = trials::counts(&mut reader, id).await?;
+        return page(&ClosedPage { study, subject, counts });
+    }
+    let last_event = events::last(&mut reader, id).await?;
     let device = devices::get(&mut reader, study.plan.device_id).await?.name;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     drop(reader);
     let live = read_live(&app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
-    let subject = format!("{} ({} m, {} kg)", subject.pseudonym, subject.height_m, subject.body_mass_kg);
     let may_administer = may.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
     page(&StudyPage { study, subject, device, reference, live, last_event, variant, answers_by, may_administer })
@@ -127,7 +141,7 @@ pub(super) async fn get(
 pub(super) async fn live(
     may: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Shown(id): Shown<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
     page(&read_live(&app, &may.caller, id, choice).await?)
@@ -144,12 +158,9 @@ struct Running {
 pub(super) async fn running(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Shown(id): Shown<TrialId>,
 ) -> Result<Response, PageError> {
-    let mut reader = app.read().await?;
-    let trial = trials::get(&mut reader, id).await?;
-    consents::may_leave(&mut reader, trial.study_id).await?;
-    drop(reader);
+    let trial = trials::get(&mut *app.read().await?, id).await?;
     let Some(track) = app.director.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
     Ok(page(&Running { row: running_row(&trial, Some(&track)) })?.into_response())
 }

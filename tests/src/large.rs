@@ -1,11 +1,27 @@
-//! A study of ten thousand trials.
+//! A study of ten thousand trials, and the pages and lists that must stay fast with it.
 
-use gaitwright::store::StudyId;
+use crate::analytic::Analytic;
+use crate::service::Service;
+use axum::http::StatusCode;
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::{StudyId, TrialId};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::Path;
+use std::time::{Duration, Instant};
 
-/// How many there are then.
+/// How many trials.
 pub const TRIALS: u32 = 10_000;
+
+/// A service on a record with such a study, and one of its trials.
+pub async fn service(database: &Path) -> (Service, StudyId, TrialId) {
+    let service = Service::start(database, Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await[0].id;
+    service.stop().await;
+    fill(database, study).await;
+    (Service::start(database, Analytic::default(), 1).await, study, trial)
+}
 
 /// Fills a finished study with trials like its first one.
 pub async fn fill(database: &Path, study: StudyId) {
@@ -49,4 +65,38 @@ pub async fn fill(database: &Path, study: StudyId) {
     sqlx::query("update studies set trial_budget = 10000").execute(&mut *writer).await.unwrap();
     writer.commit().await.unwrap();
     pool.close().await;
+}
+
+/// Each page and list, with the fastest of three answers.
+pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(String, Duration)> {
+    let api = format!("/api/v1/studies/{study}");
+    let mut times = Vec::new();
+    for path in [
+        "/".to_owned(),
+        format!("/studies/{study}"),
+        format!("/studies/{study}/live"),
+        format!("/studies/{study}?sort=a5&order=ascending&state=converged&contains=drawn&page=3"),
+        format!("/studies/{study}/belief"),
+        "/system".to_owned(),
+        format!("/studies/{study}/compare"),
+        format!("/trials/{trial}"),
+        "/api/v1/studies".to_owned(),
+        api.clone(),
+        format!("{api}/trials?after=9000"),
+        format!("{api}/preferences?after=9000&limit=200"),
+        format!("{api}/raters"),
+        "/api/v1/audit".to_owned(),
+        "/metrics".to_owned(),
+    ] {
+        let mut fastest = Duration::MAX;
+        for _ in 0..3 {
+            let begun = Instant::now();
+            let answer = service.fetch(&path).await;
+            fastest = fastest.min(begun.elapsed());
+            assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
+            assert!(answer.text.len() < 2_000_000, "{path}: {} bytes", answer.text.len());
+        }
+        times.push((path.replace(&study.to_string(), "STUDY").replace(&trial.to_string(), "TRIAL"), fastest));
+    }
+    times
 }

@@ -1,0 +1,143 @@
+//! Subjects, and the forms for what they signed and that they withdraw.
+
+use super::error::{Page, PageError, page};
+use crate::access::{Permission, Read, Run};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Form, Id, Params};
+use crate::http::may::May;
+use crate::http::problem::Problem;
+use crate::store::consents::{self, Consent, ConsentKind};
+use crate::store::subjects::{self, Subject};
+use crate::store::{SubjectId, commit};
+use crate::studies::consent::{self, NewConsent, Withdrawal};
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use serde::Deserialize;
+
+/// How many subjects the page shows.
+const PAGE: u32 = 100;
+
+#[derive(Template)]
+#[template(path = "subjects.html")]
+struct SubjectsPage {
+    subjects: Vec<Row>,
+    /// The last subject of this page, when others follow.
+    next: Option<SubjectId>,
+}
+
+struct Row {
+    subject: Subject,
+    consent: &'static str,
+}
+
+#[derive(Template)]
+#[template(path = "subject.html")]
+struct SubjectPage {
+    subject: Subject,
+    consents: Vec<Consent>,
+    withdrawn: bool,
+    may_run: bool,
+    /// The newest row that the form knows of: sent twice, it is written once.
+    after: i64,
+    refused: Option<String>,
+}
+
+/// Which subjects to show.
+#[derive(Debug, Deserialize)]
+pub(super) struct Before {
+    before: Option<SubjectId>,
+}
+
+/// `GET /subjects`.
+pub(super) async fn list(_: May<Read>, State(app): State<AppState>, Params(Before { before }): Params<Before>) -> Page {
+    let mut reader = app.read().await?;
+    let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;
+    let more = found.len() > PAGE as usize;
+    found.truncate(PAGE as usize);
+    let next = found.last().filter(|_| more).map(|subject| subject.id);
+    let mut rows = Vec::with_capacity(found.len());
+    for subject in found {
+        let said = consents::of_subject(&mut reader, subject.id).await?;
+        rows.push(Row { subject, consent: said.last().map_or("nothing written down", |last| last.kind.as_str()) });
+    }
+    page(&SubjectsPage { subjects: rows, next })
+}
+
+/// `GET /subjects/{id}`.
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<SubjectId>) -> Page {
+    show(&app, id, may.caller.may(Run::NEEDED), None).await
+}
+
+async fn show(app: &AppState, id: SubjectId, may_run: bool, refused: Option<String>) -> Page {
+    let mut reader = app.read().await?;
+    let subject = subjects::get(&mut reader, id).await?;
+    let consents = consents::of_subject(&mut reader, id).await?;
+    drop(reader);
+    let last = consents.last();
+    let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
+    let after = last.map_or(0, |last| last.seq);
+    page(&SubjectPage { subject, consents, withdrawn, may_run, after, refused })
+}
+
+/// What was signed.
+#[derive(Debug, Deserialize)]
+pub(super) struct Signed {
+    form: String,
+    after: i64,
+}
+
+/// `POST /subjects/{id}/consent`.
+pub(super) async fn consent(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+    Form(form): Form<Signed>,
+) -> Result<Response, PageError> {
+    let done = give(&app, &may, id, form).await;
+    answer(&app, id, done).await
+}
+
+async fn give(app: &AppState, may: &May<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
+    let mut writer = app.write().await?;
+    let newest = consents::of_subject(&mut writer, id).await?.last().map_or(0, |last| last.seq);
+    if newest != form.after {
+        return Err(Error::conflict("something was written down since this form was shown; look at it first"));
+    }
+    consent::give(&mut writer, &may.caller.actor, id, &NewConsent { form: form.form }).await?;
+    Ok(commit(writer).await?)
+}
+
+/// `POST /subjects/{id}/withdraw`.
+pub(super) async fn withdraw(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+    Form(why): Form<Withdrawal>,
+) -> Result<Response, PageError> {
+    let done = end(&app, &may, id, &why).await;
+    answer(&app, id, done).await
+}
+
+async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
+    let mut writer = app.write().await?;
+    let (_, cancelled) = consent::withdraw(&mut writer, &may.caller.actor, id, why).await?;
+    commit(writer).await?;
+    for trial in cancelled {
+        app.director.cancel_solve(trial).await;
+    }
+    app.director.changed();
+    Ok(())
+}
+
+/// Shows the subject anew; what was refused, with the reason.
+async fn answer(app: &AppState, id: SubjectId, done: Result<(), Error>) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            Ok((Problem::from(&error).status(), show(app, id, true, Some(error.to_string())).await?).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}

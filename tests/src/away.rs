@@ -1,0 +1,49 @@
+//! An engine whose workers are all away: it takes jobs and begins none.
+
+use futures_util::future::BoxFuture;
+use gaitwright::store::TrialId;
+use gaitwright::workers::{Assignment, Attempt, Dispatch, DispatchError, News};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// The engine.
+#[derive(Debug, Clone, Default)]
+pub struct Away {
+    /// How many jobs it takes.
+    pub size: usize,
+    /// The jobs that it has, in the order in which they came.
+    pub jobs: Arc<Mutex<Vec<Attempt>>>,
+}
+
+impl Dispatch for Away {
+    fn name(&self) -> &'static str {
+        "away"
+    }
+
+    fn size(&self) -> usize {
+        self.size
+    }
+
+    fn lease(&self) -> Duration {
+        Duration::from_mins(1)
+    }
+
+    fn outlives_process(&self) -> bool {
+        true
+    }
+
+    fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
+        Box::pin(async move {
+            self.jobs.lock().unwrap().push(assignment.attempt);
+            Ok(())
+        })
+    }
+
+    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        Box::pin(async move { self.jobs.lock().unwrap().retain(|attempt| attempt.trial != trial) })
+    }
+
+    fn next(&self) -> BoxFuture<'_, News> {
+        Box::pin(std::future::pending())
+    }
+}

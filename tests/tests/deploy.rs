@@ -1,0 +1,136 @@
+//! What is said in `server/deploy`, as far as it can be tried without a container engine and without systemd running.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright_tests::cli;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
+const CONTAINER: &str = include_str!("../../server/deploy/Containerfile");
+const UNIT: &str = include_str!("../../server/deploy/gaitwright.service");
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+}
+
+/// The arguments of every line of the container file that begins with this word.
+fn lines(word: &str) -> Vec<Vec<String>> {
+    let split =
+        |line: &str| line.split_whitespace().map(|part| part.trim_matches(['[', ']', '"', ',']).to_owned()).collect();
+    CONTAINER.lines().filter_map(|line| line.strip_prefix(word)?.strip_prefix(' ')).map(split).collect()
+}
+
+/// What goes into the stage that builds.
+fn copied() -> BTreeSet<String> {
+    let of_context = lines("COPY").into_iter().filter(|words| !words[0].starts_with("--from"));
+    of_context.flat_map(|words| words[..words.len() - 1].to_vec()).collect()
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn the_container_gets_everything_that_is_built_and_nothing_that_is_not_there() {
+    let root = root();
+    let copied = copied();
+    for path in &copied {
+        assert!(root.join(path).exists(), "{path}");
+    }
+    let manifest: toml::Table = std::fs::read_to_string(root.join("Cargo.toml")).unwrap().parse().unwrap();
+    let workspace = manifest["workspace"].as_table().unwrap();
+    for member in workspace["members"].as_array().unwrap() {
+        assert!(copied.contains(member.as_str().unwrap()), "{member:?}");
+    }
+    assert!(copied.contains("Cargo.lock") && copied.contains("Cargo.toml"));
+    let version = workspace["package"]["rust-version"].as_str().unwrap();
+    assert!(lines("FROM")[0][0].contains(&format!("rust:{version}-")), "{:?}", lines("FROM"));
+
+    // What the program embeds comes from these folders too.
+    let mut files = Vec::new();
+    for crate_folder in ["optimizer/src", "learner/src", "server/src"] {
+        sources(&root.join(crate_folder), &mut files);
+    }
+    let mut embedded = 0;
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        for macro_name in ["include_str!(\"", "include_bytes!(\""] {
+            for rest in text.split(macro_name).skip(1) {
+                let path = file.parent().unwrap().join(rest.split('"').next().unwrap()).canonicalize().unwrap();
+                let top = path.strip_prefix(&root).unwrap().components().next().unwrap();
+                assert!(
+                    copied.contains(top.as_os_str().to_str().unwrap()),
+                    "{} embeds {}",
+                    file.display(),
+                    path.display()
+                );
+                embedded += 1;
+            }
+        }
+    }
+    assert!(embedded > 8, "{embedded}");
+    let templates = std::fs::read_to_string(root.join("server/askama.toml")).unwrap();
+    assert!(templates.contains("../web/") && copied.contains("web"), "{templates}");
+}
+
+#[test]
+fn the_container_runs_what_it_builds() {
+    let build = lines("RUN").into_iter().find(|words| words[0] == "cargo").unwrap();
+    assert_eq!(build, ["cargo", "build", "--release", "--locked", "--package", "gaitwright"]);
+    let built = lines("COPY").into_iter().find(|words| words[0] == "--from=build").unwrap();
+    assert_eq!(built[1], "/source/target/release/gaitwright");
+    assert_eq!(lines("ENTRYPOINT"), [["gaitwright"]]);
+
+    // As it is started the first time: it says what it wants, and leaves nothing behind.
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = lines("CMD").remove(0);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let output = cli::run(BINARY, folder.path(), &arguments);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && text.contains("until there is an administrator"), "{text}");
+    assert!(cli::files(folder.path()).is_empty());
+}
+
+#[test]
+fn the_unit_starts_the_program_with_settings_that_it_knows() {
+    let setting = |name: &str| UNIT.lines().find_map(|line| line.strip_prefix(name)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "").unwrap();
+    let start: Vec<&str> = setting("ExecStart=").split_whitespace().collect();
+    assert_eq!(start, ["/usr/local/bin/gaitwright", "serve", "--config", "/etc/gaitwright.toml"]);
+    let mut command = cli::command(BINARY, folder.path(), &["config", "show", "--config", "gaitwright.toml"]);
+    for (name, value) in setting("Environment=").split_whitespace().map(|pair| pair.split_once('=').unwrap()) {
+        command.env(name, value);
+    }
+    let output = command.output().unwrap();
+    let (shown, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() && said.is_empty(), "{said}");
+    let database = "database = \"/var/lib/gaitwright/gaitwright.db\"  # environment GAITWRIGHT_DATABASE";
+    assert!(shown.contains(database) && shown.contains("log_format = \"json\""), "{shown}");
+    let stop: u64 = setting("TimeoutStopSec=").parse().unwrap();
+    assert!(stop >= 30, "the service drains for up to 20 s");
+}
+
+#[test]
+fn systemd_finds_no_fault_in_the_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let unit = folder.path().join("gaitwright.service");
+    std::fs::write(&unit, UNIT.replace("/usr/local/bin/gaitwright", BINARY)).unwrap();
+    let Ok(output) = Command::new("systemd-analyze").args(["verify", "--man=no"]).arg(&unit).output() else {
+        eprintln!("skipped: there is no systemd-analyze on this machine");
+        return;
+    };
+    let text = String::from_utf8_lossy(&output.stderr);
+    // Of other units of the machine it may complain.
+    let ours: Vec<_> = text.lines().filter(|line| line.contains("gaitwright.service")).collect();
+    assert!(ours.is_empty(), "{ours:?}");
+}
