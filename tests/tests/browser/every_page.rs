@@ -21,6 +21,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
     vec![
         ("home", "/".to_owned()),
+        ("subjects", "/subjects".to_owned()),
+        ("subject", format!("/subjects/{}", site.service.subject().await)),
         ("new-study", "/studies/new".to_owned()),
         ("study", format!("/studies/{study}")),
         ("belief", format!("/studies/{study}/belief?right=a5&down=a6")),

@@ -65,7 +65,7 @@ async fn browser_rater_answers_with_a_finger_on_a_tablet() {
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }
     page.tap("input[value=no_difference]").await;
-    assert_eq!(page.value("document.querySelector('input:checked')?.value ?? ''").await, "no_difference");
+    page.wait_until("document.querySelector('input:checked')?.value === 'no_difference'").await;
     page.tap("[data-answer] [type=submit]").await;
     page.wait_for(".notice.good").await;
     assert_eq!(answers(&site, study).await.len(), 1);
