@@ -23,8 +23,8 @@ pub async fn service(database: &Path) -> (Service, StudyId, TrialId) {
     (Service::start(database, Analytic::default(), 1).await, study, trial)
 }
 
-/// Fills a finished study with trials like its first ones.
-async fn fill(database: &Path, study: StudyId) {
+/// Fills a finished study with trials like its first one.
+pub async fn fill(database: &Path, study: StudyId) {
     let options = SqliteConnectOptions::new().filename(database).foreign_keys(true);
     let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
     let mut writer = pool.begin().await.unwrap();
@@ -75,6 +75,9 @@ pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(St
         "/".to_owned(),
         format!("/studies/{study}"),
         format!("/studies/{study}/live"),
+        format!("/studies/{study}?sort=a5&order=ascending&state=converged&contains=drawn&page=3"),
+        format!("/studies/{study}/belief"),
+        "/system".to_owned(),
         format!("/studies/{study}/compare"),
         format!("/trials/{trial}"),
         "/api/v1/studies".to_owned(),

@@ -121,12 +121,15 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 29] = [
+const PAGES: [(&str, Option<Right>); 39] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
+    ("post /studies/new/check", Some(Right::Run)),
+    ("get /studies/compare", Some(Right::Read)),
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
+    ("get /studies/{id}/belief", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),
     ("post /studies/{id}/compare", Some(Right::Answer)),
@@ -136,6 +139,7 @@ const PAGES: [(&str, Option<Right>); 29] = [
     ("post /subjects/{id}/consent", Some(Right::Run)),
     ("post /subjects/{id}/withdraw", Some(Right::Run)),
     ("get /trials/{id}", Some(Right::Read)),
+    ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),
     ("get /references", Some(Right::Read)),
     ("post /references", Some(Right::Run)),
@@ -144,6 +148,12 @@ const PAGES: [(&str, Option<Right>); 29] = [
     ("post /rate/{id}", Some(Right::Rate)),
     ("get /rate/pair/{token}", Some(Right::Rate)),
     ("post /rate/pair/{token}", Some(Right::Rate)),
+    ("post /rate/pair/{token}/take-back", Some(Right::Rate)),
+    ("get /people", Some(Right::Administer)),
+    ("post /people", Some(Right::Administer)),
+    ("get /audit", Some(Right::Administer)),
+    ("get /system", Some(Right::Read)),
+    ("get /glossary", None),
     ("get /api", None),
     ("get /sign-in", None),
     ("post /sign-in", None),

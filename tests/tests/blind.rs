@@ -192,6 +192,42 @@ async fn unblinding_needs_a_reason_is_an_act_and_marks_what_follows() {
 }
 
 #[tokio::test]
+async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
+    const FORM: &str = "application/x-www-form-urlencoded";
+    let (_folder, service, study) = waiting(6).await;
+    let pair = next(&service, study).await;
+    let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
+    assert_eq!(say(&service, &pair, "first").await, StatusCode::CREATED);
+    let heard = |rows: &[gaitwright::store::feedback::FeedbackRow]| {
+        rows.iter().filter(|row| row.source.as_str() == "clinician" && row.retraction.is_none()).count()
+    };
+    assert_eq!(heard(&service.feedback(study).await), 1);
+    let back = service.post_text(&at(&pair, "/take-back"), FORM, "").await;
+    assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
+    assert_eq!(heard(&service.feedback(study).await), 0);
+    let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.json();
+    assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
+    assert_eq!(service.post_text(&at(&pair, "/take-back"), FORM, "").await.status, StatusCode::CONFLICT);
+
+    // Neither what is not the last answer, nor that a gait is unsafe.
+    let mut pairs = Vec::new();
+    while pairs.len() < 2 {
+        service.wait_for(study, &[StudyState::Waiting]).await;
+        let pair = next(&service, study).await;
+        if !pair.is_null() {
+            let answer = if pairs.is_empty() { "cannot_tell" } else { "unsafe_second" };
+            assert_eq!(say(&service, &pair, answer).await, StatusCode::CREATED);
+            pairs.push(pair);
+        }
+    }
+    for pair in &pairs {
+        let refused = service.post_text(&at(pair, "/take-back"), FORM, "").await;
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn a_rater_is_told_that_another_has_answered_the_same() {
     let (_folder, service, study) = waiting(4).await;
     let pair = next(&service, study).await;

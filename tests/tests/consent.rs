@@ -182,7 +182,7 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
     for seed in [1, 2] {
         let study = service.study(|new| (new.seed, new.trial_budget) = (seed, 2)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
-        archives.push(archive::pack(&mut service.store.read().await.unwrap(), study).await.unwrap());
+        archives.push(archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap());
         last = Some(study);
     }
     let withdraw = json!({"reason": "moved away"});

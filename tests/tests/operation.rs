@@ -40,7 +40,7 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
         json!({"trial_a": converged[2].id, "trial_b": converged[0].id, "answer": "no_difference", "author": "K"});
     service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
     let expected = posterior(&service, study).await;
-    let file = archive::pack(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    let file = archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
 
     // Another record, with rows of its own.
     let other = Service::start(&folder.path().join("b.db"), Analytic::default(), 1).await;

@@ -238,7 +238,7 @@ async fn cursors_and_identifiers() {
 async fn archives() {
     let target = Target::set().await;
     let study = target.study.parse().unwrap();
-    let whole = archive::pack(&mut target.service.store.read().await.unwrap(), study).await.unwrap();
+    let whole = archive::of_study(&mut target.service.store.read().await.unwrap(), study).await.unwrap();
     for (at, flip, bytes) in drawn(&(any::<prop::sample::Index>(), 1_u8.., prop::collection::vec(any::<u8>(), 0..200)))
     {
         assert!(archive::open(&bytes).is_err());

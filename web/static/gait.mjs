@@ -4,9 +4,27 @@
 /**
  * @typedef {[number, number]} Place
  * @typedef {{knee: Place, ankle: Place, heel: Place, toe: Place}} Leg
- * @typedef {{time_s: number, hip: Place, shoulder: Place, left: Leg, right: Leg, domain: string, forces_n: Place[]}} Frame
+ * @typedef {{time_s: number, hip: Place, shoulder: Place, left: Leg, right: Leg, domain: string, forces_n: Place[], activations?: number[]}} Frame
  * @typedef {{stride_time_s: number, stride_length_m: number, frames: Frame[]}} Motion
  */
+
+/**
+ * Where the muscles are drawn, in the order of the activations: leg, from and to along hip-knee-ankle (0 to 2), and on
+ * which side of the bone, in metres forwards. A scheme: attachments are the model's.
+ * @type {["left" | "right", number, number, number][]}
+ */
+const MUSCLES = [
+  ["left", 0.05, 1.05, -0.055],
+  ["left", -0.1, 0.4, -0.075],
+  ["left", -0.1, 0.4, 0.06],
+  ["left", 0.92, 1.9, -0.06],
+  ["left", 0.35, 1.08, 0.055],
+  ["left", 1.3, 1.95, -0.035],
+  ["left", 1.15, 1.9, 0.04],
+  ["right", 0.05, 1.0, -0.055],
+  ["right", -0.1, 0.4, -0.075],
+  ["right", -0.1, 0.4, 0.06],
+];
 
 /** Newtons per metre of a drawn force. */
 const FORCE_SCALE = 1600;
@@ -43,6 +61,7 @@ export function frameAt(motion, time) {
     right: legBetween(a.right, b.right, share),
     domain: a.domain,
     forces_n: a.forces_n.map((force, i) => between(force, b.forces_n[i], share)),
+    activations: a.activations?.map((value, i) => value + ((b.activations?.[i] ?? value) - value) * share),
   };
 }
 
@@ -163,6 +182,25 @@ class Walker {
       const foot = feet[i];
       line([foot, [foot[0] + force[0] / FORCE_SCALE, foot[1] + force[1] / FORCE_SCALE]]);
     });
+
+    // Muscles: thicker and darker, the more active.
+    pen.strokeStyle = colour("--c6");
+    frame.activations?.forEach((activation, i) => {
+      const [side, from, to, forwards] = MUSCLES[i];
+      const joints = [frame.hip, frame[side].knee, frame[side].ankle];
+      /** @type {(along: number) => Place} */
+      const beside = (along) => {
+        const bone = along < 1 ? 0 : 1;
+        const [a, b] = [joints[bone], joints[bone + 1]];
+        const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+        const [x, z] = between(a, b, along - bone);
+        return [x - (forwards * (b[1] - a[1])) / length, z + (forwards * (b[0] - a[0])) / length];
+      };
+      pen.globalAlpha = 0.2 + 0.8 * Math.min(activation, 1);
+      pen.lineWidth = 2 + 6 * Math.min(activation, 1);
+      line([beside(from), beside((from + to) / 2), beside(to)]);
+    });
+    pen.globalAlpha = 1;
 
     // The prosthetic side is dashed as well as of another colour.
     const leg = (/** @type {Leg} */ l) => {

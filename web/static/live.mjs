@@ -1,8 +1,33 @@
 // @ts-check
-// Keeps a study page current: recorded events bring the changed part from the server, iterations are written in place.
-// Without this script the page is right after a reload.
+// Keeps a study page current: recorded events bring the parts that changed from the server, iterations are written in
+// place. Sorting and filtering the trials changes the address and brings the table alone.
+// Without this script the page is right after a reload, and sorting and filtering load it anew.
 
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
+
+/** Shortest time between two drawings of a running solve, ms. */
+const DRAWING_PAUSE = 1000;
+
+/**
+ * Replaces what changed and leaves the rest, its focus and its scroll position alone.
+ * @param {HTMLElement} shown
+ * @param {Document} fresh
+ */
+function update(shown, fresh) {
+  for (const part of /** @type {NodeListOf<HTMLElement>} */ (shown.querySelectorAll("[data-part]"))) {
+    const next = fresh.querySelector(`[data-part="${part.dataset.part}"]`);
+    if (!next || next.innerHTML === part.innerHTML) continue;
+    const held = part.contains(document.activeElement) ? document.activeElement : null;
+    const name = held?.getAttribute("value") ?? held?.textContent;
+    const across = part.querySelector(".scroll")?.scrollLeft ?? 0;
+    part.replaceChildren(...next.childNodes);
+    part.querySelector(".scroll")?.scrollTo({ left: across });
+    if (held) {
+      const alike = [...part.querySelectorAll(held.tagName)].find((e) => (e.getAttribute("value") ?? e.textContent) === name);
+      /** @type {HTMLElement | undefined} */ (alike)?.focus();
+    }
+  }
+}
 
 if (live) {
   const study = live.dataset.study;
@@ -10,7 +35,7 @@ if (live) {
   let pending = false;
   let again = false;
 
-  /** Brings the changing part; asked for meanwhile, once more afterwards. */
+  /** Brings what changed; asked for meanwhile, once more afterwards. */
   const refresh = async () => {
     if (pending) {
       again = true;
@@ -18,17 +43,12 @@ if (live) {
     }
     pending = true;
     try {
-      const answer = await fetch(`/studies/${study}/live`);
-      if (answer.ok) {
-        const focused = document.activeElement?.closest("#live") ? document.activeElement.getAttribute("value") : null;
-        live.innerHTML = await answer.text();
-        if (focused) {
-          /** @type {HTMLElement | null} */ (live.querySelector(`button[value="${focused}"]`))?.focus();
-        }
-      } else if (answer.status === 409) {
-        // The subject withdrew: what is on this page is not shown any more.
-        location.reload();
-      }
+      const answer = await fetch(`/studies/${study}/live${location.search}`);
+      if (answer.ok) update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+      // The subject withdrew: what is on this page is not shown any more.
+      if (answer.status === 409) location.reload();
+    } catch {
+      // The connection is lost: the stream of events comes back by itself and brings what was missed.
     } finally {
       pending = false;
       if (again) {
@@ -38,15 +58,52 @@ if (live) {
     }
   };
 
+  /** @param {string} query */
+  const list = (query) => {
+    history.replaceState(null, "", query);
+    void refresh();
+  };
+  live.addEventListener("click", (event) => {
+    const link = /** @type {Element} */ (event.target).closest("a[data-listing]");
+    if (!link || event.ctrlKey || event.metaKey || event.shiftKey) return;
+    event.preventDefault();
+    list(/** @type {string} */ (link.getAttribute("href")));
+  });
+  const filter = /** @type {HTMLFormElement | null} */ (live.querySelector("form[data-listing]"));
+  const filtered = () => {
+    if (!filter) return;
+    const query = new URLSearchParams(location.search);
+    for (const [name, value] of new FormData(filter)) {
+      if (name !== "sort" && name !== "order") query.set(name, String(value));
+    }
+    query.delete("page");
+    list(`?${query}`);
+  };
+  filter?.addEventListener("input", filtered);
+  filter?.addEventListener("submit", (event) => {
+    event.preventDefault();
+    filtered();
+  });
+
   for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted"]) {
     source.addEventListener(kind, () => void refresh());
   }
-  source.addEventListener("progress", (event) => {
+
+  /** @type {Map<string, number>} When each running solve was last drawn. */
+  const drawn = new Map();
+  source.addEventListener("progress", async (event) => {
     const p = JSON.parse(event.data);
-    const text = live.querySelector(`[data-trial="${p.trial_id}"] [data-text]`);
-    if (text && p.objective !== null && p.constraint_violation !== null) {
-      text.textContent =
-        `iteration ${p.iteration}, objective ${p.objective.toFixed(4)}, violation ${p.constraint_violation.toExponential(1)}`;
-    }
+    const row = live.querySelector(`[data-trial="${p.trial_id}"]`);
+    const text = row?.querySelector("[data-text]");
+    if (!row || !text || p.objective === null || p.constraint_violation === null) return;
+    text.textContent =
+      `iteration ${p.iteration}, objective ${p.objective.toFixed(4)}, violation ${p.constraint_violation.toExponential(1)}`;
+    const now = performance.now();
+    if (now - (drawn.get(p.trial_id) ?? -Infinity) < DRAWING_PAUSE) return;
+    drawn.set(p.trial_id, now);
+    const answer = await fetch(`/trials/${p.trial_id}/running`).catch(() => null);
+    if (answer?.status !== 200) return;
+    const fresh = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[data-chart]");
+    if (fresh) row.querySelector("[data-chart]")?.replaceWith(fresh);
   });
 }

@@ -12,6 +12,8 @@ if (box) {
   const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-answer]"));
   const save = /** @type {HTMLButtonElement} */ (form.querySelector("[type=submit]"));
   const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
+  const speed = /** @type {HTMLSelectElement} */ (document.querySelector("[data-speed]"));
+  /** @type {HTMLElement} */ (document.querySelector("[data-controls]")).hidden = false;
   save.disabled = true;
   let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
   let phase = 0;
@@ -61,7 +63,9 @@ if (box) {
     const show = () => canvases.forEach((canvas, i) => draw(canvas, motions[i]));
     /** @param {number} now */
     const step = (now) => {
-      if (playing) phase = (phase + (now - last) / STRIDE_MS) % 1;
+      // The first frame may be of a moment before the motion was there.
+      const passed = Math.max(now - last, 0) / STRIDE_MS;
+      if (playing) phase = (phase + passed * Number(speed.value)) % 1;
       last = now;
       show();
       requestAnimationFrame(step);
@@ -74,10 +78,23 @@ if (box) {
       playing = !playing;
       label();
     });
-    form.addEventListener("submit", () => {
+    form.addEventListener("submit", (event) => {
+      if (!navigator.onLine) {
+        // A browser that leaves the page would lose what was chosen.
+        event.preventDefault();
+        state.textContent = "There is no connection: nothing was sent. Save again when it is back.";
+        return;
+      }
       /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms")).value = String(
         Math.round(performance.now() - begun),
       );
+    });
+    document.addEventListener("keydown", (event) => {
+      const place = ["1", "2", "3"].indexOf(event.key);
+      if (place < 0 || /** @type {Element} */ (event.target).closest("textarea")) return;
+      const choice = form.querySelectorAll(".verdict input")[place];
+      /** @type {HTMLInputElement} */ (choice).checked = true;
+      /** @type {HTMLInputElement} */ (choice).focus();
     });
     save.disabled = false;
     state.textContent = "";

@@ -4,7 +4,7 @@ use super::record::exists;
 use crate::error::Error;
 use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
-use crate::store::{Store, StoreError, StudyId, archive, backup, commit, consents, events, gaits, studies};
+use crate::store::{Store, StoreError, StudyId, archive, backup, commit, events, gaits, studies};
 use crate::studies::choice::best_to_show;
 use crate::studies::standing::Standing;
 use clap::Args;
@@ -26,15 +26,8 @@ impl Export {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.database)?;
         let pool = backup::open_read_only(&self.database).await?;
-        let packed = match pool.begin().await {
-            // One transaction: every table as of the same instant.
-            Ok(mut reader) => match studies::get(&mut reader, self.study).await {
-                Ok(_) => match consents::may_be_shown(&mut reader, self.study).await {
-                    Ok(()) => archive::pack(&mut reader, self.study).await,
-                    Err(error) => Err(error),
-                },
-                Err(error) => Err(error),
-            },
+        let packed = match pool.acquire().await {
+            Ok(mut reader) => archive::of_study(&mut reader, self.study).await,
             Err(error) => Err(StoreError::from(error)),
         };
         pool.close().await;

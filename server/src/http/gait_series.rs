@@ -36,6 +36,8 @@ pub(crate) struct Point<'a> {
     pub(crate) forces: [f64; 8],
     /// Activations.
     pub(crate) activation: Option<&'a [f64; 10]>,
+    /// Fibre lengths over optimal lengths.
+    pub(crate) fibre_length: Option<&'a [f64; 10]>,
 }
 
 /// The mesh points of all domains, in time. A domain's last point and the next one's first have the same time:
@@ -52,9 +54,11 @@ pub(crate) fn points(gait: &Gait) -> Vec<Point<'_>> {
                 let axis = usize::from(name.axis == Axis::Z);
                 forces[side + point + axis] = *value;
             }
-            let activation = domain.muscles.as_ref().and_then(|muscles| muscles.activation.get(i));
+            let muscles = domain.muscles.as_ref();
+            let activation = muscles.and_then(|muscles| muscles.activation.get(i));
+            let fibre_length = muscles.and_then(|muscles| muscles.fibre_length.get(i));
             let time_s = domain.time_s.get(i).copied().unwrap_or_default();
-            points.push(Point { time_s, domain: &domain.name, q, qd, u, forces, activation });
+            points.push(Point { time_s, domain: &domain.name, q, qd, u, forces, activation, fibre_length });
         }
     }
     points

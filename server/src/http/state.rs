@@ -4,6 +4,7 @@ use super::host::Hosts;
 use super::metrics::Requests;
 use crate::access::BackOff;
 use crate::store::{Reader, Store, StoreResult, Writer};
+use crate::studies::belief::Beliefs;
 use crate::studies::director::Director;
 use std::sync::Arc;
 
@@ -16,6 +17,8 @@ pub struct AppState {
     pub access: Arc<Access>,
     /// What was asked of the service so far.
     pub requests: Arc<Requests>,
+    /// What the learner believes of the studies that were looked at.
+    pub beliefs: Arc<Beliefs>,
     /// The names that the service answers to.
     pub hosts: Hosts,
 }
@@ -48,7 +51,7 @@ impl Access {
 impl AppState {
     /// A service over a director.
     pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
-        Self { director, access, requests: Arc::default(), hosts }
+        Self { director, access, requests: Arc::default(), beliefs: Arc::default(), hosts }
     }
 
     /// The record.

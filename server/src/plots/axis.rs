@@ -49,6 +49,13 @@ impl Axis {
         self.decimals = 0;
     }
 
+    /// Puts the ticks at these values, with as many decimals as tell them apart.
+    pub(super) fn set_ticks(&mut self, ticks: &[f64]) {
+        let decimals = |tick: &f64| tick.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        self.decimals = ticks.iter().map(decimals).max().unwrap_or(0).min(6);
+        self.ticks = ticks.to_vec();
+    }
+
     /// Where a value lies between the ends, 0 to 1.
     pub(super) fn place(&self, value: f64) -> f64 {
         (value - self.from) / (self.to - self.from)

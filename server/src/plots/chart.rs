@@ -14,6 +14,21 @@ pub enum Stroke {
     Points,
     /// A line that holds its value until the next point, with a mark at each.
     Steps,
+    /// The same, dashed.
+    DashedSteps,
+    /// A line with a mark at each point.
+    Marked,
+}
+
+/// An area between two lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    /// Its name in the legend.
+    pub label: String,
+    /// To the right, lower end, upper end.
+    pub points: Vec<(f64, f64, f64)>,
+    /// Colour of the palette, 0 to 9.
+    pub colour: usize,
 }
 
 /// One line of a chart.
@@ -38,12 +53,18 @@ pub struct Chart {
     pub x_label: String,
     /// What is up, with its unit.
     pub y_label: String,
+    /// Areas behind the lines.
+    pub bands: Vec<Band>,
     /// The lines.
     pub series: Vec<Series>,
     /// Vertical lines with names: where one phase ends.
     pub marks: Vec<(f64, String)>,
     /// Whether the x axis shows whole numbers only.
     pub whole_x: bool,
+    /// The least range of the y axis, where charts are to be compared.
+    pub y_range: Option<(f64, f64)>,
+    /// Where the ticks of the x axis are; empty: at round values.
+    pub x_ticks: Vec<f64>,
 }
 
 /// Size of the drawing and of its margins, in its own units. The style sheet enlarges the text of a narrow drawing:
@@ -65,9 +86,12 @@ impl Chart {
             title: title.to_owned(),
             x_label: x_label.to_owned(),
             y_label: y_label.to_owned(),
+            bands: Vec::new(),
             series: Vec::new(),
             marks: Vec::new(),
             whole_x: false,
+            y_range: None,
+            x_ticks: Vec::new(),
         }
     }
 
@@ -78,6 +102,13 @@ impl Chart {
         self
     }
 
+    /// Adds an area between two lines.
+    #[must_use]
+    pub fn with_band(mut self, label: &str, colour: usize, points: Vec<(f64, f64, f64)>) -> Self {
+        self.bands.push(Band { label: label.to_owned(), points, colour });
+        self
+    }
+
     /// The chart as an SVG element.
     pub fn svg(&self) -> String {
         let all = || self.series.iter().flat_map(|series| series.points.iter());
@@ -85,7 +116,12 @@ impl Chart {
         if self.whole_x {
             x.keep_whole_ticks();
         }
-        let y = Axis::over(all().map(|p| p.1), 5, false);
+        if !self.x_ticks.is_empty() {
+            x.set_ticks(&self.x_ticks);
+        }
+        let areas = self.bands.iter().flat_map(|band| band.points.iter()).flat_map(|p| [p.1, p.2]);
+        let least = self.y_range.into_iter().flat_map(|(low, high)| [low, high]);
+        let y = Axis::over(all().map(|p| p.1).chain(areas).chain(least), 5, false);
         let mut svg = String::with_capacity(16 * 1024);
         // Writing to a String cannot fail.
         let _ = self.draw(&mut svg, &x, &y);
@@ -95,11 +131,10 @@ impl Chart {
     /// The names of the lines that have a point to be seen, for a legend in HTML: class, label.
     pub fn legend(&self) -> Vec<(String, &str)> {
         let seen = |s: &&Series| s.points.iter().any(|(x, y)| x.is_finite() && y.is_finite());
-        self.series
-            .iter()
-            .filter(seen)
-            .map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.as_str()))
-            .collect()
+        let lines = self.series.iter().filter(seen);
+        let lines = lines.map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.as_str()));
+        let bands = self.bands.iter().map(|b| (format!("key c{} band", b.colour % 10), b.label.as_str()));
+        lines.chain(bands).collect()
     }
 
     fn draw(&self, svg: &mut String, x: &Axis, y: &Axis) -> std::fmt::Result {
@@ -119,7 +154,7 @@ impl Chart {
         for &tick in &x.ticks {
             let at = px(tick);
             write!(svg, "<path class=\"grid\" d=\"M{at:.1} {bottom}v5\"/>")?;
-            write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 22.0, x.text(tick))?;
+            write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 27.0, x.text(tick))?;
         }
         let (mut last, mut drop) = (f64::NEG_INFINITY, 0.0);
         for (value, name) in &self.marks {
@@ -139,6 +174,9 @@ impl Chart {
             )?;
         }
         write!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>")?;
+        for band in &self.bands {
+            band.draw(svg, &px, &py)?;
+        }
         for series in &self.series {
             series.draw(svg, &px, &py)?;
         }
@@ -157,10 +195,22 @@ impl Chart {
 impl Stroke {
     fn class(self) -> &'static str {
         match self {
-            Self::Solid | Self::Steps => "solid",
-            Self::Dashed => "dashed",
+            Self::Solid | Self::Steps | Self::Marked => "solid",
+            Self::Dashed | Self::DashedSteps => "dashed",
             Self::Points => "points",
         }
+    }
+}
+
+impl Band {
+    fn draw(&self, svg: &mut String, px: &impl Fn(f64) -> f64, py: &impl Fn(f64) -> f64) -> std::fmt::Result {
+        write!(svg, "<path class=\"band c{}\" d=\"", self.colour % 10)?;
+        let low = self.points.iter().map(|&(x, low, _)| (x, low));
+        let high = self.points.iter().rev().map(|&(x, _, high)| (x, high));
+        for (i, (x, y)) in low.chain(high).enumerate() {
+            write!(svg, "{}{:.1} {:.1}", if i == 0 { 'M' } else { 'L' }, px(x), py(y))?;
+        }
+        write!(svg, "Z\"/>")
     }
 }
 
@@ -176,7 +226,7 @@ impl Series {
                 } else if !pen_down {
                     write!(svg, "M{:.1} {:.1}", px(x), py(y))?;
                     pen_down = true;
-                } else if self.stroke == Stroke::Steps {
+                } else if matches!(self.stroke, Stroke::Steps | Stroke::DashedSteps) {
                     write!(svg, "H{:.1}V{:.1}", px(x), py(y))?;
                 } else {
                     write!(svg, "L{:.1} {:.1}", px(x), py(y))?;
@@ -184,7 +234,7 @@ impl Series {
             }
             write!(svg, "\"/>")?;
         }
-        if matches!(self.stroke, Stroke::Points | Stroke::Steps) {
+        if !matches!(self.stroke, Stroke::Solid | Stroke::Dashed) {
             for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
                 write!(svg, "<circle class=\"dot c{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\"/>", px(x), py(y))?;
             }
@@ -193,7 +243,7 @@ impl Series {
     }
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

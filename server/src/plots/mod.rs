@@ -4,5 +4,13 @@
 
 mod axis;
 mod chart;
+mod gait_tiles;
+mod heat_map;
+mod sparkline;
+mod tree;
 
-pub use chart::{Chart, Series, Stroke};
+pub use chart::{Band, Chart, Series, Stroke};
+pub use gait_tiles::gait_tiles;
+pub use heat_map::{Cell, HeatMap};
+pub use sparkline::sparkline;
+pub use tree::{Node, tree};

@@ -2,7 +2,7 @@
 //!
 //! The first line is plain JSON (format and SHA-256 of the rest), the rest is zstd-compressed JSON: rows by table.
 
-use super::{Connection, StoreError, StoreResult, StudyId, json};
+use super::{Connection, StoreError, StoreResult, StudyId, consents, json, studies};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use sqlx::sqlite::SqliteRow;
@@ -15,7 +15,7 @@ const FORMAT: &str = "gaitwright study 1";
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 13] = [
+const TABLES: [(&str, &str); 14] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -28,6 +28,7 @@ const TABLES: [(&str, &str); 13] = [
     ("retractions", "feedback_seq in (select seq from feedback where study_id = ?)"),
     ("presentations", "study_id = ? order by id"),
     ("presentation_answers", "presentation_id in (select id from presentations where study_id = ?)"),
+    ("presentation_retractions", "presentation_id in (select id from presentations where study_id = ?)"),
     ("unblindings", "study_id = ? order by seq"),
 ];
 
@@ -43,11 +44,18 @@ struct Head {
 #[derive(Debug)]
 pub struct Archive(BTreeMap<String, Rows>);
 
-/// Writes a study into an archive.
+/// A study as an archive, every table as of the same instant.
 ///
 /// # Errors
-/// What the database reports.
-pub async fn pack(db: &mut Connection, study: StudyId) -> StoreResult<Vec<u8>> {
+/// [`StoreError::Missing`], [`StoreError::Withdrawn`], or what the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<u8>> {
+    let mut reader = sqlx::Connection::begin(db).await?;
+    studies::get(&mut reader, study).await?;
+    consents::may_be_shown(&mut reader, study).await?;
+    pack(&mut reader, study).await
+}
+
+async fn pack(db: &mut Connection, study: StudyId) -> StoreResult<Vec<u8>> {
     let mut tables = BTreeMap::new();
     for (table, belongs) in TABLES {
         let sql = AssertSqlSafe(format!("select * from {table} where {belongs}"));

@@ -19,6 +19,7 @@ mod id;
 pub mod idempotency;
 pub mod jobs;
 mod json;
+pub mod listing;
 mod migrations;
 pub mod presentations;
 pub mod reference_gaits;

@@ -214,8 +214,39 @@ pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>)
     Ok(done.rows_affected() == 1)
 }
 
-const SELECT: &str = "select p.*, a.answer, a.created_at as answered_at from presentations p \
-                      left join presentation_answers a on a.presentation_id = p.id ";
+/// Takes the answer of a presentation back. `false`: it was taken back before.
+///
+/// # Errors
+/// A violated constraint when there is no answer, or what the database reports.
+pub async fn take_back(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into presentation_retractions (presentation_id, created_at) values (?, ?) \
+         on conflict (presentation_id) do nothing",
+    )
+    .bind(id)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// What the learner heard of a presentation's answer.
+///
+/// # Errors
+/// What the database reports.
+pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
+    let row = sqlx::query("select feedback_id from presentation_answers where presentation_id = ?")
+        .bind(id)
+        .fetch_optional(db)
+        .await?;
+    Ok(row.map(|row| row.try_get(0)).transpose()?.flatten())
+}
+
+/// An answer that was taken back reads as withdrawn: asked, and not counted.
+const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.answer, 'withdrawn') as answer, \
+                      a.created_at as answered_at from presentations p \
+                      left join presentation_answers a on a.presentation_id = p.id \
+                      left join presentation_retractions r on r.presentation_id = p.id ";
 
 /// The presentation with this token.
 ///

@@ -293,6 +293,19 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
+/// The newest studies that go on only when a person does something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn waiting_for_people(db: &mut Connection, limit: u32) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where state in ('waiting', 'paused', 'draft') order by id desc limit ?")
+            .bind(limit)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
 /// Studies of a subject that did not end.
 ///
 /// # Errors
@@ -380,7 +393,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             device_id: row.try_get("device_id")?,
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,
-            gait_settings: recorded_settings(row.try_get("gait_settings")?)?,
+            gait_settings: Box::new(recorded_settings(row.try_get("gait_settings")?)?),
             solve_options: json::column(row, "solve_options")?,
             base_bounds: json::column(row, "base_bounds")?,
             search_space: json::column(row, "search_space")?,

@@ -394,16 +394,46 @@ pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCou
     })
 }
 
-/// The smallest Gait RMSE of the converged trials of a study, rad.
+/// The converged trials of a study that were nearer to the reference than every one before them: number, Gait RMSE, rad.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn smallest_rmse(db: &mut Connection, study: StudyId) -> StoreResult<Option<f64>> {
-    let row = sqlx::query("select min(gait_rmse_rad) from trials where study_id = ? and state = 'converged'")
-        .bind(study)
-        .fetch_one(db)
-        .await?;
-    Ok(row.try_get(0)?)
+pub async fn improvements(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(u32, f64)>> {
+    let rows = sqlx::query(
+        "select number, gait_rmse_rad from (select number, gait_rmse_rad, \
+         min(gait_rmse_rad) over (order by number rows between unbounded preceding and current row) as best \
+         from trials where study_id = ? and state = 'converged') where gait_rmse_rad = best order by number",
+    )
+    .bind(study)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(|row| Ok((row.try_get(0)?, row.try_get(1)?))).collect()
+}
+
+/// How long solves took.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// How many were measured.
+    pub solves: usize,
+    /// Median of their wall times, s.
+    pub median_seconds: f64,
+}
+
+/// The newest solves, at most 200, with or without muscles; none before the first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<Measured>> {
+    let rows = sqlx::query(
+        "select seconds_total from (select t.seconds_total from trials t join studies s on s.id = t.study_id \
+         where s.muscles = ? and t.seconds_total is not null and t.state in ('converged', 'not_converged') \
+         order by t.id desc limit 200) order by seconds_total",
+    )
+    .bind(muscles)
+    .fetch_all(db)
+    .await?;
+    let Some(middle) = rows.get(rows.len() / 2) else { return Ok(None) };
+    Ok(Some(Measured { solves: rows.len(), median_seconds: middle.try_get(0)? }))
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<Trial> {

@@ -5,6 +5,7 @@
 //! record does not have, so that a process that ends at any instant is continued by the next one.
 
 pub mod answer;
+pub mod belief;
 pub mod blind;
 pub mod catalogue;
 pub mod change;

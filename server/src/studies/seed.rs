@@ -9,6 +9,8 @@ pub enum Purpose {
     Proposal,
     /// Order and sides of the presentation with this number.
     Presentation,
+    /// Draws behind what is shown of the learner's belief.
+    Belief,
 }
 
 /// The seed for one draw.
@@ -16,6 +18,7 @@ pub fn derive(study_seed: u64, purpose: Purpose, counter: u64) -> u64 {
     let name = match purpose {
         Purpose::Proposal => "proposal",
         Purpose::Presentation => "presentation",
+        Purpose::Belief => "belief",
     };
     let mut hash = Sha256::new();
     hash.update(study_seed.to_le_bytes());

@@ -1,6 +1,7 @@
 //! REST under `/api/v1`: one file per resource. Route and description are one thing: what is not described here is
 //! not reachable.
 
+mod archive;
 mod audit;
 mod blind;
 mod certificates;
@@ -13,6 +14,7 @@ pub mod health;
 mod history;
 mod motion;
 mod preferences;
+mod recommendation;
 mod reference_gaits;
 mod scripts;
 mod studies;
@@ -56,6 +58,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(comparison::get))
         .routes(routes!(trials::of_study))
         .routes(routes!(trials::of_study_csv))
+        .routes(routes!(recommendation::of_study))
+        .routes(routes!(archive::of_study))
         .routes(routes!(history::of_study))
         .routes(routes!(history::of_study_csv))
         .routes(routes!(preferences::of_study, preferences::create))

@@ -32,6 +32,10 @@ struct Frame {
     domain: String,
     /// Ground forces on left heel, left toe, right heel, right toe: forward and up, N.
     forces_n: [[f64; 2]; 4],
+    /// Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R; absent without
+    /// muscles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    activations: Option<[f64; 10]>,
 }
 
 /// `GET /trials/{id}/motion`.
@@ -59,7 +63,7 @@ pub(in crate::http) fn motion(gait: &Gait) -> Result<Motion, Error> {
         .map(|(figure, point)| {
             let f = point.forces;
             let forces_n = [[f[0], f[1]], [f[2], f[3]], [f[4], f[5]], [f[6], f[7]]];
-            Frame { figure, domain: point.domain.to_owned(), forces_n }
+            Frame { figure, domain: point.domain.to_owned(), forces_n, activations: point.activation.copied() }
         })
         .collect();
     Ok(Motion { stride_time_s: gait.stride_time_s, stride_length_m: gait.stride_length_m, frames })

@@ -1,7 +1,8 @@
 //! The form for a preference between two gaits of a study.
 
+use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
-use super::gait_charts::{self, Drawn};
+use super::gait_charts;
 use super::study::answer_in_words;
 use crate::access::{self, Caller, Read};
 use crate::error::Error;

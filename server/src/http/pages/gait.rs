@@ -1,19 +1,24 @@
 //! A trial and its gait.
 
+use super::bound_use::{self, BoundUse};
 use super::certificate;
+use super::drawn::Drawn;
 use super::error::{Page, page};
-use super::format::{self, Bound, words};
-use super::gait_charts::{self, Drawn};
+use super::format::{self, words};
+use super::gait_charts;
 use crate::access::{Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
 use crate::http::shown::Shown;
+use crate::plots::gait_tiles;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
 use crate::store::{StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
 use askama::Template;
 use axum::extract::State;
+use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::{Gait, IterationRecord, ReferenceGait, SolveStatus, TunedBounds};
 
 #[derive(Template)]
 #[template(path = "gait.html")]
@@ -25,14 +30,22 @@ struct GaitPage {
     seconds: String,
     violation: String,
     figures: Vec<(&'static str, String)>,
-    bounds: Vec<Bound>,
     from: Option<(TrialId, u32)>,
     /// Name of the reference gait.
     reference: String,
     has_gait: bool,
     may_run: bool,
     certificate: Option<certificate::InWords>,
-    charts: Vec<Drawn>,
+    groups: Vec<gait_charts::Group>,
+    solve: Option<Drawn>,
+    /// The stride as a row of pictures.
+    tiles: Option<String>,
+    /// How near the gait comes to each bound.
+    bounds: Vec<BoundUse>,
+    /// Why there is no gait.
+    explanation: Option<&'static str>,
+    /// The command that looks for the bound that must give way.
+    explain: String,
     phases: [(&'static str, &'static str); 4],
     trial: Trial,
 }
@@ -57,31 +70,78 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
     drop(reader);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
-    let charts = tokio::task::spawn_blocking(move || {
-        let mut charts = gait.map(|gait| gait_charts::of_gait(&gait, &reference)).unwrap_or_default();
-        charts.extend(gait_charts::of_iterations(&iterations));
-        charts
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    let action = trial.action;
+    let drawn = tokio::task::spawn_blocking(move || draw(gait.as_ref(), &reference, &iterations, &action))
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))??;
     page(&GaitPage {
-        study,
         state: words(trial.state.as_str()),
         rmse: format::figure(trial.gait_rmse_rad),
         cost: format::figure(trial.cost_of_transport),
         seconds: format::seconds(trial.seconds_total),
         violation: format::tiny(trial.max_violation),
         figures: figures(&trial),
-        bounds: format::bounds(&trial.action),
+        bounds: drawn.bounds,
+        explanation: trial.status.and_then(explanation),
+        explain: explain(&trial, &study),
         from,
         reference: reference_name,
         has_gait,
         may_run: may.caller.may(Run::NEEDED),
         certificate,
-        charts,
+        groups: drawn.groups,
+        solve: drawn.solve,
+        tiles: drawn.tiles,
         phases: gait_charts::PHASES,
         trial,
+        study,
     })
+}
+
+/// What is computed from a gait: CPU work.
+struct Everything {
+    groups: Vec<gait_charts::Group>,
+    solve: Option<Drawn>,
+    tiles: Option<String>,
+    bounds: Vec<BoundUse>,
+}
+
+fn draw(
+    gait: Option<&Gait>,
+    reference: &ReferenceGait,
+    iterations: &[IterationRecord],
+    action: &TunedBounds,
+) -> Result<Everything, Error> {
+    let figures = gait.map(stick_figures).transpose()?;
+    Ok(Everything {
+        groups: gait.map(|gait| gait_charts::of_gait(gait, reference)).unwrap_or_default(),
+        solve: gait_charts::of_iterations(iterations),
+        tiles: figures.as_deref().map(gait_tiles),
+        bounds: bound_use::of(action, gait),
+    })
+}
+
+/// Why a solve ended without a gait.
+fn explanation(status: SolveStatus) -> Option<&'static str> {
+    match status {
+        SolveStatus::Converged => None,
+        SolveStatus::Infeasible => Some(
+            "No motion near the last one keeps every constraint: the bounds contradict each other, or another one of them.",
+        ),
+        SolveStatus::Cancelled => Some("Somebody ended the solve before it was done."),
+        _ => Some(
+            "The optimiser ended before every constraint was met. That is no proof that these bounds have no gait.",
+        ),
+    }
+}
+
+/// The command line that relaxes one bound after the other until there is a gait.
+fn explain(trial: &Trial, study: &Study) -> String {
+    let values = trial.action.to_array();
+    let bounds: Vec<String> =
+        TunedBounds::NAMES.iter().zip(values).map(|(name, value)| format!("{name}={value}")).collect();
+    let muscles = if study.plan.muscles { "on" } else { "off" };
+    format!("gaitwright solve --muscles {muscles} --bounds {} --explain", bounds.join(","))
 }
 
 fn figures(trial: &Trial) -> Vec<(&'static str, String)> {

@@ -1,24 +1,10 @@
 //! The charts of a gait.
 
+use super::drawn::Drawn;
 use crate::http::gait_series::{MUSCLES, Point, points};
 use crate::plots::{Chart, Stroke};
 use gait_optimizer::solve::Phase;
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
-
-/// A chart ready for the page.
-pub(super) struct Drawn {
-    pub(super) title: String,
-    pub(super) note: &'static str,
-    pub(super) svg: String,
-    pub(super) legend: Vec<(String, String)>,
-}
-
-impl Drawn {
-    pub(super) fn new(chart: &Chart, note: &'static str) -> Self {
-        let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-        Self { title: chart.title.clone(), note, svg: chart.svg(), legend }
-    }
-}
 
 /// The phases of the stride, in their order, for either leg.
 pub(super) const PHASES: [(&str, &str); 4] = [
@@ -37,73 +23,165 @@ const ANGLES: [(&str, usize, usize); 5] = [
     ("Left ankle", 5, 3),
     ("Right hip (prosthesis side)", 6, 4),
 ];
-const JOINTS: [&str; 6] = ["left hip", "left knee", "left ankle", "right hip", "right knee", "right ankle"];
+const JOINTS: [&str; 6] = ["Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
+const MUSCLE_GROUPS: [(&str, &[usize]); 3] =
+    [("left thigh and hip", &[0, 1, 2, 4]), ("left shank", &[3, 5, 6]), ("right (residual limb)", &[7, 8, 9])];
+/// Names of q, apart from the place of the hip.
+const COORDINATES: [&str; 7] =
+    ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
-/// Joint angles against the reference, ground forces, torques, activations.
-pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Vec<Drawn> {
-    let points = points(gait);
-    let end = points.last().map_or(1.0, |point| point.time_s).max(1e-9);
-    // A gap between domains: forces, torques and accelerations may jump there.
-    let over = |f: &dyn Fn(&Point<'_>) -> f64| -> Vec<(f64, f64)> {
-        let mut line: Vec<(f64, f64)> = Vec::with_capacity(points.len() + 8);
-        for (i, point) in points.iter().enumerate() {
-            if i > 0 && points[i - 1].domain != point.domain {
+/// Charts that belong together.
+pub(super) struct Group {
+    pub(super) id: &'static str,
+    pub(super) heading: &'static str,
+    pub(super) hint: &'static str,
+    pub(super) charts: Vec<Drawn>,
+}
+
+/// The points of a gait on the axis of the gait cycle.
+struct Cycle<'a> {
+    points: Vec<Point<'a>>,
+    end: f64,
+    marks: Vec<(f64, String)>,
+}
+
+impl<'a> Cycle<'a> {
+    fn of(gait: &'a Gait) -> Self {
+        let points = points(gait);
+        let end = points.last().map_or(1.0, |point| point.time_s).max(1e-9);
+        let marks = domain_starts(&points, end);
+        Self { points, end, marks }
+    }
+
+    /// A line over the cycle, with a gap between domains: forces, torques and accelerations may jump there.
+    fn over(&self, f: impl Fn(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
+        self.line(|point| 100.0 * point.time_s / self.end, f)
+    }
+
+    fn line(&self, x: impl Fn(&Point<'_>) -> f64, y: impl Fn(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
+        let mut line: Vec<(f64, f64)> = Vec::with_capacity(self.points.len() + 8);
+        for (i, point) in self.points.iter().enumerate() {
+            if i > 0 && self.points[i - 1].domain != point.domain {
                 line.push((f64::NAN, f64::NAN));
             }
-            line.push((100.0 * point.time_s / end, f(point)));
+            line.push((x(point), y(point)));
         }
         line
-    };
-    let marks = domain_starts(&points, end);
-    let mut drawn = Vec::new();
-    let mut draw = |mut chart: Chart, note: &'static str| {
-        chart.marks.clone_from(&marks);
-        drawn.push(Drawn::new(&chart, note));
-    };
-    for (title, q, column) in ANGLES {
-        let measured = reference.angles_rad.iter().enumerate().map(|(i, row)| (i as f64, row[column].to_degrees()));
-        let chart = Chart::new(title, CYCLE, "angle, °").with("reference", 7, Stroke::Dashed, measured.collect()).with(
-            "this gait",
-            0,
-            Stroke::Solid,
-            over(&|p| p.q[q].to_degrees()),
-        );
-        draw(chart, "Flexion, dorsiflexion and forward lean are positive.");
     }
-    let knee_and_ankle = Chart::new("Prosthesis", CYCLE, "angle, °")
-        .with("right knee", 0, Stroke::Solid, over(&|p| p.q[7].to_degrees()))
-        .with("right ankle", 1, Stroke::Dashed, over(&|p| p.q[8].to_degrees()));
-    draw(knee_and_ankle, "The prosthetic joints have no reference.");
-    for (title, axis) in [("Ground force, vertical", 1), ("Ground force, forward", 0)] {
+
+    fn draw(&self, mut chart: Chart) -> Drawn {
+        chart.marks.clone_from(&self.marks);
+        Drawn::new(&chart, "")
+    }
+}
+
+/// Everything that is drawn of a gait.
+pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Vec<Group> {
+    let cycle = Cycle::of(gait);
+    let mut groups = vec![angles(&cycle, reference), forces(&cycle), torques(&cycle, gait)];
+    if gait.muscles {
+        groups.push(muscles(&cycle));
+    }
+    groups.push(portraits(&cycle));
+    groups
+}
+
+fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
+    let draw =
+        |&(title, q, column): &(&str, usize, usize)| {
+            let measured = reference.angles_rad.iter().enumerate().map(|(i, row)| (i as f64, row[column].to_degrees()));
+            let chart = Chart::new(title, CYCLE, "angle, °")
+                .with("reference", 7, Stroke::Dashed, measured.collect())
+                .with("this gait", 0, Stroke::Solid, cycle.over(|p| p.q[q].to_degrees()));
+            cycle.draw(chart)
+        };
+    let prosthesis = Chart::new("Prosthesis", CYCLE, "angle, °")
+        .with("right knee", 0, Stroke::Solid, cycle.over(|p| p.q[7].to_degrees()))
+        .with("right ankle", 1, Stroke::Dashed, cycle.over(|p| p.q[8].to_degrees()));
+    let mut charts: Vec<Drawn> = ANGLES.iter().map(draw).collect();
+    charts.push(cycle.draw(prosthesis));
+    let hint = "Flexion, dorsiflexion and forward lean are positive. The prosthetic joints have no reference.";
+    Group { id: "angles", heading: "Joint angles", hint, charts }
+}
+
+fn forces(cycle: &Cycle<'_>) -> Group {
+    let draw = |(title, axis): (&str, usize)| {
         let chart = Chart::new(title, CYCLE, "force, N")
-            .with("left foot", 0, Stroke::Solid, over(&|p| p.forces[axis] + p.forces[2 + axis]))
-            .with("right foot (prosthesis)", 1, Stroke::Dashed, over(&|p| p.forces[4 + axis] + p.forces[6 + axis]));
-        draw(chart, "Heel and toe together.");
-    }
-    for (title, first) in [("Joint torques, left", 0), ("Joint torques, right (prosthesis side)", 3)] {
-        let mut chart = Chart::new(title, CYCLE, "torque, N m");
-        for joint in first..first + 3 {
-            let stroke = if joint % 3 == 1 { Stroke::Dashed } else { Stroke::Solid };
-            chart = chart.with(JOINTS[joint], joint % 3, stroke, over(&|p| p.u[joint]));
-        }
-        draw(chart, "");
-    }
-    if points.iter().any(|point| point.activation.is_some()) {
-        for (title, muscles) in [
-            ("Muscle activation, left thigh and hip", &[0_usize, 1, 2, 4][..]),
-            ("Muscle activation, left shank", &[3, 5, 6]),
-            ("Muscle activation, right (residual limb)", &[7, 8, 9]),
-        ] {
-            let mut chart = Chart::new(title, CYCLE, "activation, 0 to 1");
+            .with("left foot", 0, Stroke::Solid, cycle.over(|p| p.forces[axis] + p.forces[2 + axis]))
+            .with(
+                "right foot (prosthesis)",
+                1,
+                Stroke::Dashed,
+                cycle.over(|p| p.forces[4 + axis] + p.forces[6 + axis]),
+            );
+        cycle.draw(chart)
+    };
+    let charts = [("Ground force, vertical", 1), ("Ground force, forward", 0)].map(draw).into();
+    Group { id: "forces", heading: "Ground reaction forces", hint: "Heel and toe together.", charts }
+}
+
+fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
+    let limits = torque_limits(gait);
+    let draw = |(joint, name): (usize, &&str)| {
+        let (low, high) = limits[joint];
+        // Two lines with a gap between them.
+        let limit = vec![(0.0, high), (100.0, high), (f64::NAN, f64::NAN), (0.0, low), (100.0, low)];
+        let chart = Chart::new(name, CYCLE, "torque, N m").with("limits", 7, Stroke::Dashed, limit).with(
+            "torque",
+            joint / 3,
+            Stroke::Solid,
+            cycle.over(|p| p.u[joint]),
+        );
+        cycle.draw(chart)
+    };
+    let charts = JOINTS.iter().enumerate().map(draw).collect();
+    let hint = "The right knee and ankle are driven by the prosthesis, the other joints by the person.";
+    Group { id: "torques", heading: "Joint torques", hint, charts }
+}
+
+/// Lowest and highest torque of each joint, N m.
+fn torque_limits(gait: &Gait) -> [(f64, f64); 6] {
+    let (limits, device) = (&gait.settings.limits, &gait.device);
+    let both = |largest: f64| (-largest, largest);
+    [
+        both(limits.hip_torque_n_m),
+        both(limits.knee_torque_n_m),
+        (-limits.ankle_plantarflexion_torque_n_m, limits.ankle_dorsiflexion_torque_n_m),
+        both(limits.hip_torque_n_m),
+        both(device.knee_torque_limit_n_m),
+        both(device.ankle_torque_limit_n_m),
+    ]
+}
+
+fn muscles(cycle: &Cycle<'_>) -> Group {
+    let mut charts = Vec::new();
+    for (what, unit) in [("Activation", "activation, 0 to 1"), ("Fibre length", "optimal fibre lengths")] {
+        for (part, muscles) in MUSCLE_GROUPS {
+            let mut chart = Chart::new(&format!("{what}, {part}"), CYCLE, unit);
             for (place, &muscle) in muscles.iter().enumerate() {
                 let stroke = if place % 2 == 1 { Stroke::Dashed } else { Stroke::Solid };
-                let line = over(&|p| p.activation.map_or(f64::NAN, |a| a[muscle]));
+                let state = |p: &Point<'_>| if what == "Activation" { p.activation } else { p.fibre_length }.copied();
+                let line = cycle.over(|p| state(p).map_or(f64::NAN, |values| values[muscle]));
                 chart = chart.with(MUSCLES[muscle], place, stroke, line);
             }
-            draw(chart, "");
+            charts.push(cycle.draw(chart));
         }
     }
-    drawn
+    let hint = "HAM hamstrings, GLU glutei, HFL hip flexors, GAS gastrocnemius, VAS vasti, SOL soleus, TA tibialis \
+                anterior; L left, R right.";
+    Group { id: "muscles", heading: "Muscles", hint, charts }
+}
+
+fn portraits(cycle: &Cycle<'_>) -> Group {
+    let draw = |(place, name): (usize, &&str)| {
+        let q = place + 2;
+        let line = cycle.line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees());
+        let colour = usize::from(q >= 6);
+        Drawn::new(&Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, line), "")
+    };
+    let charts = COORDINATES.iter().enumerate().map(draw).collect();
+    let hint = "Angle and its velocity over the stride: a closed curve repeats itself; a gap is an impact.";
+    Group { id: "portraits", heading: "Phase portraits", hint, charts }
 }
 
 /// Where each domain begins, in percent of the cycle.
@@ -180,7 +258,8 @@ pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Drawn> {
     let mut chart = Chart::new("How the solve went", "iteration", "log10")
         .with("constraint violation", 0, Stroke::Solid, line(|r| r.constraint_violation))
         .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
-        .with("barrier", 2, Stroke::Solid, line(|r| r.barrier));
+        .with("barrier", 2, Stroke::Solid, line(|r| r.barrier))
+        .with("objective", 3, Stroke::Dashed, line(|r| r.objective.abs()));
     chart.whole_x = true;
     chart.marks = solve_phases(&iterations);
     Some(Drawn::new(&chart, "Scaled; decimal logarithm. Vertical lines: where a phase of the solve begins."))

@@ -1,13 +1,14 @@
 //! The list of studies.
 
 use super::error::{Page, page};
-use super::format::words;
+use super::format::{variant, words};
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
-use crate::store::studies::{FeedbackMode, Study, StudyState};
+use crate::plots::sparkline;
+use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
 use askama::Template;
@@ -20,6 +21,8 @@ const PAGE: u32 = 100;
 #[derive(Template)]
 #[template(path = "home.html")]
 struct Home {
+    /// What goes on only when somebody does something.
+    waiting: Vec<Waiting>,
     studies: Vec<Row>,
     /// Whether newer studies come before these.
     later: bool,
@@ -36,11 +39,20 @@ pub(super) struct Before {
 struct Row {
     study: Study,
     subject: String,
+    variant: &'static str,
     counts: TrialCounts,
     state: String,
     best_rmse: Option<String>,
-    waits_for_answer: bool,
+    /// The smallest Gait RMSE so far, trial by trial.
+    course: Option<String>,
     withdrawn: bool,
+}
+
+struct Waiting {
+    study: Study,
+    what: &'static str,
+    /// Where to do it.
+    link: String,
 }
 
 /// `GET /`.
@@ -54,15 +66,33 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(Before
     for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    page(&Home { studies: rows, later: before.is_some(), next })
+    let waiting = studies::waiting_for_people(&mut reader, PAGE).await?.into_iter().map(waiting).collect();
+    page(&Home { waiting, studies: rows, later: before.is_some(), next })
+}
+
+fn waiting(study: Study) -> Waiting {
+    let (what, place) = match study.state {
+        StudyState::Waiting => ("a comparison waits for an answer", "/compare"),
+        StudyState::Paused => ("held: it goes on when somebody resumes it", ""),
+        _ => ("not started yet", ""),
+    };
+    Waiting { link: format!("/studies/{}{place}", study.id), what, study }
 }
 
 async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
     let counts = trials::counts(db, study.id).await?;
     let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
     let withdrawn = consents::is_withdrawn(db, study.id).await?;
-    let best_rmse = if withdrawn { None } else { trials::smallest_rmse(db, study.id).await? };
-    let best_rmse = best_rmse.map(|rmse| format!("{rmse:.4}"));
-    let waits_for_answer = study.state == StudyState::Waiting && study.plan.feedback_mode == FeedbackMode::Human;
-    Ok(Row { state: words(study.state.as_str()), study, subject, counts, best_rmse, waits_for_answer, withdrawn })
+    let improvements = if withdrawn { Vec::new() } else { trials::improvements(db, study.id).await? };
+    let course: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
+    Ok(Row {
+        state: words(study.state.as_str()),
+        variant: variant(study.plan.muscles),
+        best_rmse: improvements.last().map(|(_, rmse)| format!("{rmse:.4}")),
+        course: sparkline("Smallest Gait RMSE by trial", &course, f64::from(counts.total)),
+        study,
+        subject,
+        counts,
+        withdrawn,
+    })
 }

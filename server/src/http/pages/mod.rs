@@ -1,19 +1,27 @@
 //! Pages for people: rendered on the server, usable without scripts.
 
+mod audit;
+mod belief;
+mod bound_use;
 mod certificate;
 mod compare;
+mod drawn;
 pub mod error;
 mod format;
 mod gait;
 mod gait_charts;
+mod glossary;
 mod home;
 mod new_study;
+mod people;
 mod rate;
 mod reference;
 mod reference_gaits;
+mod side_by_side;
 mod sign_in;
 mod study;
 mod subject;
+mod system;
 
 use super::AppState;
 use super::api::recordings;
@@ -25,8 +33,11 @@ pub fn routes() -> Router<AppState> {
     Router::new()
         .route("/", get(home::get))
         .route("/studies/new", get(new_study::get).post(new_study::post))
+        .route("/studies/new/check", post(new_study::check))
+        .route("/studies/compare", get(side_by_side::get))
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
+        .route("/studies/{id}/belief", get(belief::get))
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
@@ -35,12 +46,18 @@ pub fn routes() -> Router<AppState> {
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
         .route("/trials/{id}", get(gait::get))
+        .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/references", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
         .route("/references/{id}", get(reference_gaits::get))
         .route("/rate", get(rate::list))
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
+        .route("/rate/pair/{token}/take-back", post(rate::take_back))
+        .route("/people", get(people::get).post(people::post))
+        .route("/audit", get(audit::get))
+        .route("/system", get(system::get))
+        .route("/glossary", get(glossary::get))
         .route("/api", get(reference::get))
         .route("/sign-in", get(sign_in::get).post(sign_in::post))
         .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))

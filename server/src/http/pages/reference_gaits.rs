@@ -1,7 +1,7 @@
 //! Reference gaits: the list with the form that imports one, and each with its curves.
 
+use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
-use super::gait_charts::Drawn;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;

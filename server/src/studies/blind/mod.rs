@@ -9,8 +9,8 @@ mod rater;
 
 pub use draw::{Drawn, draw};
 pub use figures::{RaterFigures, Share, figures};
-pub(crate) use rater::own;
-pub use rater::{Answered, RaterAnswer, answer, next, unblind};
+pub use rater::{Answered, RaterAnswer, answer, next, take_back, unblind};
+pub(crate) use rater::{can_be_taken_back, own};
 
 use crate::store::TrialId;
 use crate::store::presentations::{Presentation, Said};

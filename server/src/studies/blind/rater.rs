@@ -156,6 +156,34 @@ pub async fn answer(
     Ok((shown.study_id, Answered { number: shown.number, answer: given.answer, answered_by_others }))
 }
 
+/// Takes a rater's last answer back: what was said stays in the record, and counts no more.
+///
+/// # Errors
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it cannot be taken back.
+pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
+    let shown = own(writer, caller, token).await?;
+    if !can_be_taken_back(writer, &shown).await? {
+        let why = "only the last answer can be taken back, once; and a gait that was called unsafe stays closed: tell \
+                   whoever runs the study";
+        return Err(Error::conflict(why));
+    }
+    if let Some(heard) = presentations::heard_of(writer, shown.id).await? {
+        crate::studies::answer::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back")
+            .await?;
+    }
+    presentations::take_back(writer, shown.id).await?;
+    note(writer, caller, &shown, "presentation.take_back").await?;
+    Ok(Answered { number: shown.number, answer: Said::Withdrawn, answered_by_others: false })
+}
+
+/// Whether an answer stands that may go: the rater's last one, and not about safety.
+pub(crate) async fn can_be_taken_back(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
+    let all = presentations::of_study(db, shown.study_id).await?;
+    let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
+    let stands = matches!(shown.answer, Some(Said::First | Said::Second | Said::NoDifference | Said::CannotTell));
+    Ok(last && stands)
+}
+
 /// The presentation of a token, if it is this rater's.
 pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Presentation, Error> {
     let shown = presentations::by_token(db, token).await?;

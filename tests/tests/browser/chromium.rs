@@ -3,11 +3,14 @@
 use chromiumoxide::Page;
 use chromiumoxide::browser::{Browser, BrowserConfig};
 use chromiumoxide::cdp::browser_protocol::emulation::{
-    SetDeviceMetricsOverrideParams, SetScriptExecutionDisabledParams,
+    MediaFeature, SetDeviceMetricsOverrideParams, SetEmulatedMediaParams, SetScriptExecutionDisabledParams,
+    SetTouchEmulationEnabledParams,
 };
-use chromiumoxide::cdp::browser_protocol::input::InsertTextParams;
+use chromiumoxide::cdp::browser_protocol::input::{InsertTextParams, SynthesizeTapGestureParams};
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
-use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent};
+use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent, OverrideNetworkStateParams};
+use chromiumoxide::cdp::js_protocol::runtime::EventExceptionThrown;
+use chromiumoxide::page::ScreenshotParams;
 use futures_util::StreamExt;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -99,6 +102,13 @@ impl Tab {
                 list.lock().unwrap().push(format!("{:?}: {}", event.entry.level, event.entry.text));
             }
         });
+        let mut thrown = page.event_listener::<EventExceptionThrown>().await.unwrap();
+        let list = Arc::clone(&complaints);
+        tokio::spawn(async move {
+            while let Some(event) = thrown.next().await {
+                list.lock().unwrap().push(format!("thrown: {:?}", event.exception_details));
+            }
+        });
         if !scripts {
             page.execute(SetScriptExecutionDisabledParams::new(true)).await.unwrap();
         }
@@ -119,6 +129,60 @@ impl Tab {
         panic!("{selector} does not appear on {:?}", self.page.url().await);
     }
 
+    /// Waits until an expression is true.
+    pub(crate) async fn wait_until(&self, expression: &str) {
+        for _ in 0..400 {
+            // While a page gives way to the next one there is nothing to ask.
+            let value = self.page.evaluate(expression.to_owned()).await.ok();
+            if value.is_some_and(|v| v.value().and_then(serde_json::Value::as_bool) == Some(true)) {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        panic!("never true on {:?}: {expression}", self.page.url().await);
+    }
+
+    /// Goes to another address.
+    pub(crate) async fn goto(&self, address: &str) {
+        self.page.goto(address).await.unwrap();
+    }
+
+    /// Loads the page anew.
+    pub(crate) async fn reload(&self) {
+        self.page.reload().await.unwrap();
+    }
+
+    /// Touches an element with a finger.
+    pub(crate) async fn tap(&self, selector: &str) {
+        self.wait_for(selector).await;
+        let element = self.page.find_element(selector).await.unwrap();
+        element.scroll_into_view().await.unwrap();
+        let place = element.clickable_point().await.unwrap();
+        self.page.execute(SetTouchEmulationEnabledParams::new(true)).await.unwrap();
+        self.page.execute(SynthesizeTapGestureParams::new(place.x, place.y)).await.unwrap();
+    }
+
+    /// Sets what the person prefers: `prefers-color-scheme`, `prefers-reduced-motion`.
+    pub(crate) async fn prefer(&self, feature: &str, value: &str) {
+        let media = SetEmulatedMediaParams::builder().feature(MediaFeature::new(feature, value)).build();
+        self.page.execute(media).await.unwrap();
+    }
+
+    /// Tells the page that the connection is cut, or back.
+    pub(crate) async fn disconnect(&self, gone: bool) {
+        self.page.execute(OverrideNetworkStateParams::new(gone, 0.0, -1.0, -1.0)).await.unwrap();
+    }
+
+    /// A picture of the whole page.
+    pub(crate) async fn picture(&self, file: &Path) {
+        self.page.save_screenshot(ScreenshotParams::builder().full_page(true).build(), file).await.unwrap();
+    }
+
+    /// Where the page is.
+    pub(crate) async fn address(&self) -> String {
+        self.page.url().await.unwrap().unwrap_or_default()
+    }
+
     /// Clicks an element with the mouse.
     pub(crate) async fn click(&self, selector: &str) {
         self.wait_for(selector).await;
@@ -134,6 +198,7 @@ impl Tab {
 
     /// Replaces the text of a field.
     pub(crate) async fn fill(&self, selector: &str, text: &str) {
+        self.wait_for(selector).await;
         self.run(&format!("document.querySelector('{selector}').select()")).await;
         self.type_text(text).await;
     }
@@ -158,12 +223,23 @@ impl Tab {
         self.page.find_element(selector).await.unwrap().inner_text().await.unwrap().unwrap_or_default()
     }
 
-    /// Runs a script.
+    /// Runs a script; while a page gives way to the next one, a moment later.
     pub(crate) async fn run(&self, script: &str) {
-        self.page.evaluate(format!("(() => {{ {script} }})()")).await.unwrap();
+        for _ in 0..100 {
+            if self.page.evaluate(format!("(() => {{ {script} }})()")).await.is_ok() {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        panic!("cannot run on {:?}: {script}", self.page.url().await);
     }
 
-    /// The value of an expression, as JSON text or bare string.
+    /// Makes known what a script defines.
+    pub(crate) async fn define(&self, script: &str) {
+        self.page.evaluate(script.to_owned()).await.unwrap();
+    }
+
+    /// The value of an expression, of a promise its outcome, as JSON text or bare string.
     pub(crate) async fn value(&self, expression: &str) -> String {
         let value = self.page.evaluate(expression.to_owned()).await.unwrap().value().cloned().unwrap_or_default();
         value.as_str().map_or_else(|| value.to_string(), str::to_owned)

@@ -1,14 +1,19 @@
 //! A study: where it stands, live.
 
+mod trials_table;
+
+use self::trials_table::{Choice, TrialRow, TrialsTable};
+use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
-use crate::access::{Read, Run};
+use super::gait_charts;
+use crate::access::{Administer, Caller, Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::{Chart, Stroke};
+use crate::plots::{Chart, Node, Stroke, tree};
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
@@ -23,8 +28,10 @@ use crate::studies::{command, lifecycle};
 use crate::workers::Track;
 use askama::Template;
 use axum::extract::State;
-use axum::response::Redirect;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
+use std::collections::HashMap;
 
 #[derive(Template)]
 #[template(path = "study.html")]
@@ -35,6 +42,9 @@ struct StudyPage {
     reference: String,
     live: String,
     last_event: i64,
+    variant: &'static str,
+    answers_by: &'static str,
+    may_administer: bool,
 }
 
 /// The page of a study whose subject withdrew: what was tried, and nothing of what came of it.
@@ -57,12 +67,19 @@ struct Live {
     running: Vec<RunningRow>,
     best: Option<Best>,
     unanswered: bool,
-    chart: Option<String>,
-    legend: Vec<(String, String)>,
-    trials: Vec<TrialRow>,
+    chart: Option<Drawn>,
+    table: TrialsTable,
+    /// Which gait grew out of which.
+    tree: Option<String>,
     answers: Vec<AnswerRow>,
     question: bool,
     can_compare: bool,
+}
+
+impl Live {
+    fn is_best(&self, row: &TrialRow) -> bool {
+        self.best.as_ref().is_some_and(|best| best.id == row.id)
+    }
 }
 
 struct ActButton {
@@ -74,6 +91,7 @@ struct RunningRow {
     id: TrialId,
     number: u32,
     text: String,
+    chart: Option<Drawn>,
 }
 
 struct Best {
@@ -82,36 +100,26 @@ struct Best {
     rmse: String,
     cost: String,
     bounds: Vec<Bound>,
-}
-
-struct TrialRow {
-    id: TrialId,
-    number: u32,
-    state: &'static str,
-    state_words: String,
-    rmse: String,
-    cost: String,
-    iterations: String,
-    seconds: String,
-    from: Option<(TrialId, u32)>,
-    action: Vec<String>,
-    reason: String,
-    message: String,
-    is_best: bool,
+    has_gait: bool,
 }
 
 struct AnswerRow {
     row: FeedbackRow,
     text: String,
-    source: String,
+    source: &'static str,
     at: String,
 }
 
-/// So many trials of a large study are shown; the downloads have all of them.
+/// So many of the newest trials of a large study are in the chart, and the newest answers in the list.
 const SHOWN: u32 = 200;
 
 /// `GET /studies/{id}`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Page {
+pub(super) async fn get(
+    may: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    Params(choice): Params<Choice>,
+) -> Page {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
@@ -123,13 +131,38 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<St
     let device = devices::get(&mut reader, study.plan.device_id).await?.name;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     drop(reader);
-    let live = read_live(&app, id).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
-    page(&StudyPage { study, subject, device, reference, live, last_event })
+    let live = read_live(&app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
+    let may_administer = may.caller.may(Administer::NEEDED);
+    let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
+    page(&StudyPage { study, subject, device, reference, live, last_event, variant, answers_by, may_administer })
 }
 
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
-pub(super) async fn live(_: May<Read>, State(app): State<AppState>, Shown(id): Shown<StudyId>) -> Page {
-    page(&read_live(&app, id).await?)
+pub(super) async fn live(
+    may: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+    Params(choice): Params<Choice>,
+) -> Page {
+    page(&read_live(&app, &may.caller, id, choice).await?)
+}
+
+/// How far a running solve is.
+#[derive(Template)]
+#[template(path = "running.html")]
+struct Running {
+    row: RunningRow,
+}
+
+/// `GET /trials/{id}/running`: one running solve, for the script; nothing once it has ended.
+pub(super) async fn running(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Response, PageError> {
+    let trial = trials::get(&mut *app.read().await?, id).await?;
+    let Some(track) = app.director.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
+    Ok(page(&Running { row: running_row(&trial, Some(&track)) })?.into_response())
 }
 
 /// What a button does.
@@ -170,15 +203,15 @@ fn button(act: Act) -> Option<ActButton> {
 }
 
 /// What is computed from the standing: CPU work.
-struct Figures {
+pub(super) struct Figures {
     /// People are to answer and nobody has: what the learner believes then is only what it began with.
     unanswered: bool,
-    best: Option<TrialId>,
-    history: Vec<Milestone>,
+    pub(super) best: Option<TrialId>,
+    pub(super) history: Vec<Milestone>,
     question: bool,
 }
 
-async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
+async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
@@ -188,6 +221,7 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
     } else {
         Standing::read(&mut reader, study).await?
     };
+    let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
     drop(reader);
     let (standing, figures) = tokio::task::spawn_blocking(move || {
         let figures = figures(&standing, large);
@@ -200,12 +234,12 @@ async fn read_live(app: &AppState, id: StudyId) -> Result<Live, Error> {
         .trials
         .iter()
         .filter(|trial| trial.state == TrialState::Running)
-        .map(|trial| running_row(trial, app.director.board().track(trial.id)))
+        .map(|trial| running_row(trial, app.director.board().track(trial.id).as_ref()))
         .collect();
-    Ok(view(standing, counts, &figures, running))
+    Ok(view(standing, counts, &figures, running, table, caller.may(Run::NEEDED)))
 }
 
-fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
+pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
     if large {
         let best = standing.trials.last().and_then(|newest| newest.best_before);
         let question = standing.study.state == StudyState::Waiting;
@@ -218,46 +252,46 @@ fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::Le
     Ok(Figures { unanswered: false, best: best_trial(standing)?, history: history::of(standing)?, question })
 }
 
-fn running_row(trial: &Trial, track: Option<Track>) -> RunningRow {
-    let text = track.and_then(|track| track.records.last().copied()).map_or_else(
+fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
+    let records = track.map_or(&[][..], |track| &track.records);
+    let text = records.last().map_or_else(
         || "starting".to_owned(),
         |r| {
             format!("iteration {}, objective {:.4}, violation {:.1e}", r.iteration, r.objective, r.constraint_violation)
         },
     );
-    RunningRow { id: trial.id, number: trial.number, text }
+    RunningRow { id: trial.id, number: trial.number, text, chart: gait_charts::of_iterations(records) }
 }
 
-fn view(standing: Standing, counts: TrialCounts, figures: &Figures, running: Vec<RunningRow>) -> Live {
+fn view(
+    standing: Standing,
+    counts: TrialCounts,
+    figures: &Figures,
+    running: Vec<RunningRow>,
+    table: TrialsTable,
+    may_run: bool,
+) -> Live {
     let best = figures.best.and_then(|id| standing.trial(id)).map(|trial| Best {
         id: trial.id,
         number: trial.number,
         rmse: format::figure(trial.gait_rmse_rad),
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
+        has_gait: trial.state == TrialState::Converged,
     });
-    let number_of = |id: TrialId| standing.trial(id).map(|trial| (id, trial.number));
-    let trials = standing.trials.iter().rev().map(|trial| trial_row(trial, number_of, figures.best)).collect();
     let answers = standing.feedback.iter().rev().filter_map(|row| answer_row(row, &standing)).collect();
     let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
-    let chart = chart(&standing, &figures.history);
-    let (chart, legend) = match chart {
-        Some(chart) => {
-            let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-            (Some(chart.svg()), legend)
-        }
-        None => (None, Vec::new()),
-    };
+    let acts = if may_run { acts_of_people(standing.study.state) } else { Vec::new() };
     Live {
         state: words(standing.study.state.as_str()),
-        acts: acts_of_people(standing.study.state).into_iter().filter_map(button).collect(),
+        acts: acts.into_iter().filter_map(button).collect(),
         counts,
         running,
         best,
         unanswered: figures.unanswered,
-        chart,
-        legend,
-        trials,
+        chart: chart(&standing, &figures.history).map(|chart| Drawn::new(&chart, "")),
+        table,
+        tree: warm_starts(&standing, figures.best),
         answers,
         question: figures.question && standing.study.state != StudyState::Stopped,
         can_compare: converged >= 2,
@@ -265,22 +299,17 @@ fn view(standing: Standing, counts: TrialCounts, figures: &Figures, running: Vec
     }
 }
 
-fn trial_row(trial: &Trial, number_of: impl Fn(TrialId) -> Option<(TrialId, u32)>, best: Option<TrialId>) -> TrialRow {
-    TrialRow {
-        id: trial.id,
-        number: trial.number,
-        state: trial.state.as_str(),
-        state_words: words(trial.state.as_str()),
-        rmse: format::figure(trial.gait_rmse_rad),
-        cost: format::figure(trial.cost_of_transport),
-        iterations: trial.iterations.map_or_else(|| "–".to_owned(), |n| n.to_string()),
-        seconds: format::seconds(trial.seconds_total),
-        from: trial.warm_started_from.and_then(number_of),
-        action: trial.action.to_array().iter().map(f64::to_string).collect(),
-        reason: trial.reason.clone(),
-        message: trial.message.clone(),
-        is_best: best == Some(trial.id),
-    }
+/// Which gait grew out of which; none before anything did.
+fn warm_starts(standing: &Standing, best: Option<TrialId>) -> Option<String> {
+    let places: HashMap<TrialId, usize> = standing.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
+    let node = |trial: &Trial| Node {
+        parent: trial.warm_started_from.and_then(|from| places.get(&from).copied()),
+        label: format!("trial {}", trial.number),
+        link: format!("/trials/{}", trial.id),
+        class: if best == Some(trial.id) { "best" } else { trial.state.as_str() },
+    };
+    let nodes: Vec<Node> = standing.trials.iter().map(node).collect();
+    nodes.iter().any(|node| node.parent.is_some()).then(|| tree("Which trial started from which", &nodes))
 }
 
 /// Answers that people gave; those of Gait RMSE are in the table of trials already.
@@ -290,7 +319,7 @@ fn answer_row(row: &FeedbackRow, standing: &Standing) -> Option<AnswerRow> {
     }
     Some(AnswerRow {
         text: answer_in_words(row, standing)?,
-        source: words(row.source.as_str()),
+        source: format::source(row.source),
         at: row.created_at.minute(),
         row: row.clone(),
     })

@@ -1,0 +1,54 @@
+//! The audit trail: who did what, and whether the chain of its rows is whole.
+
+use super::error::{Page, page};
+use crate::access::Administer;
+use crate::http::AppState;
+use crate::http::extract::Params;
+use crate::http::may::May;
+use crate::store::audit::{self, AuditRow, Verdict};
+use askama::Template;
+use axum::extract::State;
+use serde::Deserialize;
+
+/// Rows of a page.
+const PAGE: u32 = 100;
+
+/// Which rows, and whether to walk the chain.
+#[derive(Debug, Deserialize)]
+pub(super) struct Choice {
+    before: Option<i64>,
+    #[serde(default)]
+    verify: bool,
+}
+
+#[derive(Template)]
+#[template(path = "audit.html")]
+struct AuditPage {
+    rows: Vec<AuditRow>,
+    older: Option<i64>,
+    verdict: Option<Verdict>,
+}
+
+impl AuditPage {
+    /// `study 0190...` as a link, where there is a page for it.
+    fn link(&self, row: &AuditRow) -> Option<String> {
+        let (kind, id) = row.object.split_once(' ')?;
+        let folder = match kind {
+            "study" => "studies",
+            "trial" => "trials",
+            _ => return None,
+        };
+        Some(format!("/{folder}/{id}"))
+    }
+}
+
+/// `GET /audit`.
+pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+    let mut reader = app.read().await?;
+    let mut rows = audit::page(&mut reader, choice.before, PAGE + 1).await?;
+    let more = rows.len() > PAGE as usize;
+    rows.truncate(PAGE as usize);
+    let older = rows.last().filter(|_| more).map(|row| row.seq);
+    let verdict = if choice.verify { Some(audit::verify(&mut reader).await?) } else { None };
+    page(&AuditPage { rows, older, verdict })
+}

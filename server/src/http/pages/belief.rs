@@ -1,0 +1,273 @@
+//! What the learner believes about the search space of a study.
+
+use super::drawn::Drawn;
+use super::error::{Page, page};
+use super::format::{self, meaning, percent, signed};
+use super::study::answer_in_words;
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Params;
+use crate::http::may::May;
+use crate::http::shown::Shown;
+use crate::plots::{Cell, Chart, HeatMap, Stroke};
+use crate::store::studies::Study;
+use crate::store::trials::{Trial, TrialState};
+use crate::store::{StudyId, TrialId, studies, trials};
+use crate::studies::belief::{Belief, Beliefs, Comparison, MOST_ANSWERS};
+use crate::studies::choice::MANY;
+use crate::studies::standing::Standing;
+use askama::Template;
+use axum::extract::State;
+use gait_learner::{Agreement, Dimension, LearnerError, Marginal, SearchSpace};
+use serde::Deserialize;
+
+/// So many actions and answers are listed.
+const LISTED: usize = 12;
+
+/// Which two bounds the maps show.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Choice {
+    right: Option<String>,
+    down: Option<String>,
+}
+
+#[derive(Template)]
+#[template(path = "belief.html")]
+struct BeliefPage {
+    study: Study,
+    /// Why nothing is shown; none: it is.
+    absent: Option<String>,
+    shown: Option<Everything>,
+}
+
+struct Everything {
+    agreement: Agreement,
+    marginals: Vec<Drawn>,
+    maps: Maps,
+    best: Vec<BestRow>,
+    answers: Vec<AnswerRow>,
+    more_answers: usize,
+}
+
+/// Two bounds, the others held.
+struct Maps {
+    dimensions: Vec<DimensionChoice>,
+    held: Option<(TrialId, u32)>,
+    charts: Vec<Drawn>,
+}
+
+struct DimensionChoice {
+    name: String,
+    meaning: &'static str,
+    right: bool,
+    down: bool,
+}
+
+struct BestRow {
+    id: TrialId,
+    number: u32,
+    percent: String,
+    probability: f64,
+    utility: String,
+}
+
+struct AnswerRow {
+    text: String,
+    source: &'static str,
+    percent: String,
+    agrees: bool,
+}
+
+/// `GET /studies/{id}/belief`.
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+    Params(choice): Params<Choice>,
+) -> Page {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let total = trials::counts(&mut reader, id).await?.total as usize;
+    if total >= MANY {
+        return absent(study, format!("From {MANY} trials on the belief takes longer to compute than a page may."));
+    }
+    let standing = Standing::read(&mut reader, study.clone()).await?;
+    drop(reader);
+    let answers = standing.log().feedback.len();
+    if answers == 0 {
+        return absent(
+            study,
+            "Nothing was heard yet: the first result gives the learner something to believe.".to_owned(),
+        );
+    }
+    if answers > MOST_ANSWERS {
+        return absent(
+            study,
+            format!("From {MOST_ANSWERS} answers on the belief takes longer to compute than a page may."),
+        );
+    }
+    let beliefs = app.beliefs.clone();
+    let shown = tokio::task::spawn_blocking(move || show(&standing, &beliefs, &choice))
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))??;
+    page(&BeliefPage { study, absent: None, shown: Some(shown) })
+}
+
+fn absent(study: Study, why: String) -> Page {
+    page(&BeliefPage { study, absent: Some(why), shown: None })
+}
+
+fn show(standing: &Standing, beliefs: &Beliefs, choice: &Choice) -> Result<Everything, Error> {
+    let belief = beliefs.of(standing).map_err(Error::Learner)?;
+    let chosen = chosen(belief.posterior.space(), choice)?;
+    Ok(Everything {
+        agreement: belief.agreement,
+        marginals: marginals(&belief),
+        maps: maps(&belief, standing, chosen).map_err(Error::Learner)?,
+        best: best(&belief, standing).map_err(Error::Learner)?,
+        answers: belief.comparisons.iter().take(LISTED).filter_map(|c| answer_row(c, standing)).collect(),
+        more_answers: belief.comparisons.len().saturating_sub(LISTED),
+    })
+}
+
+/// The two dimensions of the maps: those asked for, else the first two; none where there is one dimension only.
+fn chosen(space: &SearchSpace, choice: &Choice) -> Result<Option<(usize, usize)>, Error> {
+    let names: Vec<&str> = space.dimensions().iter().map(|d| d.name.as_str()).collect();
+    if names.len() < 2 {
+        return Ok(None);
+    }
+    let place = |field: &str, asked: &Option<String>, default: usize| match asked {
+        None => Ok(default),
+        Some(name) => {
+            let found = names.iter().position(|known| known == name);
+            found.ok_or_else(|| Error::invalid(field, name.as_str(), &names.join(", ")))
+        }
+    };
+    let (right, down) = (place("right", &choice.right, 0)?, place("down", &choice.down, 1)?);
+    if right == down {
+        return Err(Error::invalid("down", names[down], &format!("another bound than {}", names[right])));
+    }
+    Ok(Some((right, down)))
+}
+
+/// All on one scale: what matters is which bound matters.
+fn marginals(belief: &Belief) -> Vec<Drawn> {
+    let ends =
+        |m: &Marginal| [m.average.mean - m.average.standard_deviation, m.average.mean + m.average.standard_deviation];
+    let all = || belief.marginals.iter().flatten().flat_map(ends);
+    let range = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+    let draw = |(dimension, levels): (&Dimension, &Vec<Marginal>)| {
+        let line = levels.iter().map(|m| (m.value, m.average.mean)).collect();
+        let band = levels.iter().map(|m| (m.value, ends(m)[0], ends(m)[1])).collect();
+        let label = format!("{}: {}", dimension.name, meaning(&dimension.name));
+        let mut chart = Chart::new(&dimension.name, &label, "utility")
+            .with_band("one standard deviation", 0, band)
+            .with("mean", 0, Stroke::Marked, line);
+        chart.y_range = Some(range);
+        chart.x_ticks.clone_from(&dimension.values);
+        Drawn::new(&chart, "")
+    };
+    belief.posterior.space().dimensions().iter().zip(&belief.marginals).map(draw).collect()
+}
+
+fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) -> Result<Maps, LearnerError> {
+    let space = belief.posterior.space();
+    let dimensions = space.dimensions().iter().enumerate();
+    let dimensions = dimensions
+        .map(|(place, dimension)| DimensionChoice {
+            name: dimension.name.clone(),
+            meaning: meaning(&dimension.name),
+            right: chosen.is_some_and(|(right, _)| right == place),
+            down: chosen.is_some_and(|(_, down)| down == place),
+        })
+        .collect();
+    let (Some((right, down)), Some(best)) = (chosen, belief.posterior.best()) else {
+        return Ok(Maps { dimensions, held: None, charts: Vec::new() });
+    };
+    let held = standing.trial_of(best).map(|trial| (trial.id, trial.number));
+    let slice = belief.posterior.slice(down, right, best)?;
+    let at = |row: usize, column: usize| {
+        let mut levels = space.levels(best);
+        (levels[down], levels[right]) = (row, column);
+        space.index_of_levels(&levels)
+    };
+    let mut utility = Vec::new();
+    let mut converging = Vec::new();
+    for (row, predictions) in slice.predictions.iter().enumerate() {
+        let (mut utilities, mut chances) = (Vec::new(), Vec::new());
+        for (column, prediction) in predictions.iter().enumerate() {
+            let action = at(row, column)?;
+            let framed = action == best;
+            utilities.push(Cell {
+                value: prediction.mean,
+                text: signed(prediction.mean),
+                below: format!("± {:.2}", prediction.standard_deviation),
+                framed,
+            });
+            let chance = belief.posterior.probability_of_converging(action)?;
+            let below = tried(standing, space, [(down, row), (right, column)]);
+            chances.push(Cell { value: chance, text: percent(chance), below, framed });
+        }
+        utility.push(utilities);
+        converging.push(chances);
+    }
+    let means = || utility.iter().flatten().map(|cell| cell.value);
+    let range = (means().fold(f64::INFINITY, f64::min), means().fold(f64::NEG_INFINITY, f64::max));
+    let axis = |place: usize| {
+        let dimension = &space.dimensions()[place];
+        (format!("{}: {}", dimension.name, meaning(&dimension.name)), dimension.values.clone())
+    };
+    let draw = |title: &str, cells, range, note| {
+        let map = HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range };
+        Drawn { title: title.to_owned(), note, svg: map.svg(), legend: Vec::new() }
+    };
+    let charts = vec![
+        draw("Utility", utility, range, "Mean and standard deviation. Framed: the best action tried."),
+        draw(
+            "Probability of converging",
+            converging,
+            (0.0, 1.0),
+            "Below: trials with these two values, whatever the others: converged, not converged.",
+        ),
+    ];
+    Ok(Maps { dimensions, held, charts })
+}
+
+/// How many trials with these levels converged and how many did not.
+fn tried(standing: &Standing, space: &SearchSpace, levels: [(usize, usize); 2]) -> String {
+    let here = |trial: &&Trial| {
+        let own = space.levels(trial.action_index);
+        levels.iter().all(|(dimension, level)| own[*dimension] == *level)
+    };
+    let count = |state| standing.trials.iter().filter(here).filter(|trial| trial.state == state).count();
+    match (count(TrialState::Converged), count(TrialState::NotConverged)) {
+        (0, 0) => String::new(),
+        (converged, not) => format!("{converged} yes, {not} no"),
+    }
+}
+
+fn best(belief: &Belief, standing: &Standing) -> Result<Vec<BestRow>, LearnerError> {
+    let mut rows = Vec::new();
+    for entry in belief.best.iter().take(LISTED) {
+        let Some(trial) = standing.trial_of(entry.action) else { continue };
+        let prediction = belief.posterior.predict(entry.action)?;
+        rows.push(BestRow {
+            id: trial.id,
+            number: trial.number,
+            percent: percent(entry.probability),
+            probability: entry.probability,
+            utility: format!("{} ± {:.2}", signed(prediction.mean), prediction.standard_deviation),
+        });
+    }
+    Ok(rows)
+}
+
+fn answer_row(comparison: &Comparison, standing: &Standing) -> Option<AnswerRow> {
+    Some(AnswerRow {
+        text: answer_in_words(&comparison.given, standing)?,
+        source: format::source(comparison.given.source),
+        percent: percent(comparison.probability),
+        agrees: comparison.probability > 0.5,
+    })
+}

@@ -1,0 +1,313 @@
+//! The form for a new study.
+
+mod space_editor;
+
+use self::space_editor::SpaceEditor;
+use super::error::{Page, PageError, page};
+use crate::access::{Caller, Run};
+use crate::error::{Error, FieldError};
+use crate::http::AppState;
+use crate::http::extract::Form;
+use crate::http::may::May;
+use crate::store::devices::Device;
+use crate::store::reference_gaits::ReferenceGait;
+use crate::store::studies::{FeedbackMode, Study};
+use crate::store::subjects::{self, Subject};
+use crate::store::{Connection, SubjectId, Writer, commit, devices, reference_gaits, trials};
+use crate::studies::person::{self, NewSubject};
+use crate::studies::plan::{self, NewStudy};
+use askama::Template;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
+use gait_learner::{LearnerSettings, Method};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+/// The fields as typed, so that a refused form comes back as it was.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Fields {
+    #[serde(default)]
+    name: String,
+    subject: String,
+    #[serde(default)]
+    pseudonym: String,
+    #[serde(default)]
+    height_m: String,
+    #[serde(default)]
+    body_mass_kg: String,
+    #[serde(default)]
+    device: String,
+    #[serde(default)]
+    reference_gait: String,
+    muscles: String,
+    feedback_mode: String,
+    #[serde(default = "linecospar")]
+    learner: String,
+    trial_budget: String,
+    #[serde(default)]
+    unchanged_limit: String,
+    parallel_trials: String,
+    seed: String,
+    /// The search space: what the editor knows, and nothing else.
+    #[serde(flatten)]
+    space: BTreeMap<String, String>,
+}
+
+fn linecospar() -> String {
+    LEARNERS[0].0.to_owned()
+}
+
+impl Default for Fields {
+    fn default() -> Self {
+        let text = str::to_owned;
+        Self {
+            name: String::new(),
+            subject: String::new(),
+            pseudonym: String::new(),
+            height_m: String::new(),
+            body_mass_kg: String::new(),
+            device: String::new(),
+            reference_gait: String::new(),
+            muscles: text("on"),
+            feedback_mode: text("automatic"),
+            learner: linecospar(),
+            trial_budget: text("15"),
+            unchanged_limit: String::new(),
+            parallel_trials: text("1"),
+            seed: text("1"),
+            space: BTreeMap::new(),
+        }
+    }
+}
+
+/// The learners to choose from: name, name for people, when to take it. The measurements behind this are in the learner's
+/// README.
+const LEARNERS: [(&str, &str, &str); 3] = [
+    ("linecospar", "LineCoSpar", "the paper's method: people answer, and an answer may now and then be wrong"),
+    ("eubo", "EUBO", "Gait RMSE answers: from 10 comparisons on it is nearer to the best than LineCoSpar"),
+    (
+        "eubo_uncertain",
+        "EUBO for uncertain answers",
+        "people answer, are often unsure, and will answer 50 times or more",
+    ),
+];
+
+fn learner(name: &str) -> Option<LearnerSettings> {
+    match name {
+        "linecospar" => Some(LearnerSettings::of(Method::LineCoSpar)),
+        "eubo" => Some(LearnerSettings::of(Method::Eubo)),
+        "eubo_uncertain" => Some(LearnerSettings::for_uncertain_answers()),
+        _ => None,
+    }
+}
+
+/// The subject option that means: the person described below it.
+const NEW_SUBJECT: &str = "new";
+
+/// What there is to choose from, and how long solves took.
+struct Offered {
+    subjects: Vec<Subject>,
+    devices: Vec<Device>,
+    references: Vec<ReferenceGait>,
+    measured: [Option<trials::Measured>; 2],
+}
+
+impl Offered {
+    async fn read(db: &mut Connection) -> Result<Self, Error> {
+        Ok(Self {
+            subjects: subjects::all(db).await?,
+            devices: devices::all(db).await?,
+            references: reference_gaits::all(db).await?,
+            measured: [trials::measured(db, true).await?, trials::measured(db, false).await?],
+        })
+    }
+}
+
+#[derive(Template)]
+#[template(path = "study_new.html")]
+struct NewStudyPage {
+    offered: Offered,
+    learners: &'static [(&'static str, &'static str, &'static str)],
+    fields: Fields,
+    editor: SpaceEditor,
+    refused: Option<FieldError>,
+}
+
+impl NewStudyPage {
+    fn selected(&self, subject: &Subject) -> bool {
+        self.fields.subject == subject.id.to_string()
+            || (self.fields.subject.is_empty() && subject.pseudonym == "paper-1")
+    }
+
+    fn refuses(&self, field: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.field == field)
+    }
+
+    fn refuses_part(&self, part: &str, bound: &str) -> bool {
+        self.refuses(&format!("{part}_{bound}")) || self.refuses(bound)
+    }
+
+    /// How long solves took, in words; the first with muscles, the second without.
+    fn measured(&self) -> String {
+        let words = |measured: &Option<trials::Measured>, variant: &str| {
+            measured.as_ref().map(|m| format!("{variant} muscles {:.1} s (median of {})", m.median_seconds, m.solves))
+        };
+        let [with, without] = &self.offered.measured;
+        let both: Vec<String> = [words(with, "with"), words(without, "without")].into_iter().flatten().collect();
+        if both.is_empty() {
+            return "No solve was measured yet: seconds to a minute each.".to_owned();
+        }
+        format!("A solve took here {}.", both.join(", "))
+    }
+}
+
+/// `GET /studies/new`.
+pub(super) async fn get(_: May<Run>, State(app): State<AppState>) -> Page {
+    let offered = Offered::read(&mut *app.read().await?).await?;
+    let fields = Fields::default();
+    let editor = SpaceEditor::typed(&fields.space)?;
+    page(&NewStudyPage { offered, learners: &LEARNERS, fields, editor, refused: None })
+}
+
+/// `POST /studies/new`.
+pub(super) async fn post(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Form(fields): Form<Fields>,
+) -> Result<Response, PageError> {
+    let editor = SpaceEditor::typed(&fields.space)?;
+    let mut writer = app.write().await?;
+    let refused = match make(&mut writer, &may.caller, &fields, &editor).await {
+        Ok(study) => {
+            commit(writer).await?;
+            app.director.changed();
+            return Ok(Redirect::to(&format!("/studies/{}", study.id)).into_response());
+        }
+        Err(error) => as_refusal(error, &fields)?,
+    };
+    drop(writer);
+    let offered = Offered::read(&mut *app.read().await?).await?;
+    let form = page(&NewStudyPage { offered, learners: &LEARNERS, fields, editor, refused: Some(refused) })?;
+    Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
+}
+
+/// What is thought of a form that is still being filled in.
+#[derive(Debug, Serialize)]
+pub(super) struct Checked {
+    /// The field that would be refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    field: Option<String>,
+    /// Why, or what the study would be.
+    text: String,
+}
+
+/// `POST /studies/new/check`: makes the study and takes it back, so that what is said here is what would happen.
+pub(super) async fn check(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Form(fields): Form<Fields>,
+) -> Result<Json<Checked>, PageError> {
+    let editor = SpaceEditor::typed(&fields.space)?;
+    let mut writer = app.write().await?;
+    let made = make(&mut writer, &may.caller, &fields, &editor).await;
+    drop(writer);
+    let checked = match made {
+        Ok(study) => Checked { field: None, text: outlook(&mut *app.read().await?, &study).await? },
+        Err(error) => {
+            let refused = as_refusal(error, &fields)?;
+            Checked { field: Some(refused.field), text: refused.message }
+        }
+    };
+    Ok(Json(checked))
+}
+
+/// A refusal that belongs to a field; any other error is passed on.
+fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
+    match error {
+        Error::Invalid(field) => Ok(*field),
+        Error::Conflict(message) => Ok(FieldError {
+            field: "pseudonym".to_owned(),
+            value: fields.pseudonym.clone().into(),
+            allowed: "another pseudonym".to_owned(),
+            message,
+        }),
+        other => Err(other),
+    }
+}
+
+/// How large the study is, and how long it will take.
+async fn outlook(db: &mut Connection, study: &Study) -> Result<String, Error> {
+    let plan = &study.plan;
+    let size = format!("{} of {} combinations of bounds will be tried", plan.trial_budget, plan.search_space.len());
+    let Some(measured) = trials::measured(db, plan.muscles).await? else {
+        return Ok(format!("{size}."));
+    };
+    // Trials that run at the same time share the machine: no gain is promised.
+    let seconds = measured.median_seconds * f64::from(plan.trial_budget);
+    let people = if plan.feedback_mode == FeedbackMode::Human { ", and the time people take to answer" } else { "" };
+    Ok(format!("{size}, in about {}{people}.", super::format::duration(seconds)))
+}
+
+async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &SpaceEditor) -> Result<Study, Error> {
+    let subject = if fields.subject == NEW_SUBJECT {
+        let new = NewSubject {
+            pseudonym: fields.pseudonym.clone(),
+            height_m: number("height_m", &fields.height_m, "a number of metres")?,
+            body_mass_kg: number("body_mass_kg", &fields.body_mass_kg, "a number of kilograms")?,
+            notes: String::new(),
+        };
+        person::add(writer, &caller.actor, &new).await?.id
+    } else {
+        nothing_described(fields)?;
+        number::<SubjectId>("subject", &fields.subject, "a subject of the list")?
+    };
+    let (search_space, base_bounds) = editor.read()?;
+    let learners = LEARNERS.map(|(name, ..)| name).join(", ");
+    let new = NewStudy {
+        name: Some(fields.name.clone()),
+        device_id: optional("device", &fields.device, "a device of the list")?,
+        reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait of the list")?,
+        muscles: match fields.muscles.as_str() {
+            "on" => true,
+            "off" => false,
+            other => return Err(Error::invalid("muscles", other, "on, off")),
+        },
+        search_space: Some(search_space),
+        base_bounds,
+        feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
+            .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human, mixed"))?,
+        learner: learner(&fields.learner)
+            .ok_or_else(|| Error::invalid("learner", fields.learner.as_str(), &learners))?,
+        trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
+        unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or nothing")?,
+        parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
+        seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
+        ..NewStudy::of(subject)
+    };
+    plan::create(writer, &caller.actor, new).await
+}
+
+/// A person who is described but not chosen would be left out without a word.
+fn nothing_described(fields: &Fields) -> Result<(), Error> {
+    for (field, text) in
+        [("pseudonym", &fields.pseudonym), ("height_m", &fields.height_m), ("body_mass_kg", &fields.body_mass_kg)]
+    {
+        if !text.trim().is_empty() {
+            let allowed = "nothing, as a subject of the list is chosen; or choose \"A new subject\"";
+            return Err(Error::invalid(field, text.as_str(), allowed));
+        }
+    }
+    Ok(())
+}
+
+fn number<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<T, Error> {
+    text.trim().parse().map_err(|_| Error::invalid(field, text, allowed))
+}
+
+/// The same for what may be left empty.
+fn optional<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<Option<T>, Error> {
+    if text.trim().is_empty() { Ok(None) } else { number(field, text, allowed).map(Some) }
+}

@@ -1,0 +1,160 @@
+//! Users and tokens: who may come in.
+
+use super::error::{Page, PageError, page};
+use crate::access::people::{self, NewUser};
+use crate::access::tokens::{self as making, NewToken};
+use crate::access::{Administer, Caller, Right, Role};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Form;
+use crate::http::may::May;
+use crate::http::problem::Problem;
+use crate::store::tokens::Token;
+use crate::store::users::User;
+use crate::store::{TokenId, UserId, Writer, commit, tokens, users};
+use askama::Template;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use std::str::FromStr;
+
+/// What a token may be allowed: people administer, programs do not.
+const SCOPES: [(Right, &str); 4] = [
+    (Right::Read, "see studies, trials and gaits"),
+    (Right::Run, "make, start and end studies; ask for trials and tell what they gave"),
+    (Right::Answer, "say which gait is better"),
+    (Right::Rate, "compare gaits blindly"),
+];
+
+#[derive(Template)]
+#[template(path = "people.html")]
+struct PeoplePage {
+    users: Vec<User>,
+    tokens: Vec<Token>,
+    roles: [Role; 3],
+    scopes: [(Right, &'static str); 4],
+    outcome: Outcome,
+    refused: Option<String>,
+}
+
+impl PeoplePage {
+    fn scopes_of(&self, token: &Token) -> String {
+        token.scopes.iter().map(|scope| scope.as_str()).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// What was just done.
+#[derive(Default)]
+struct Outcome {
+    done: Option<String>,
+    /// Something that is shown once and never again: what it is, and itself.
+    secret: Option<(&'static str, String)>,
+}
+
+/// What a form asks for.
+#[derive(Debug, Deserialize)]
+pub(super) struct Asked {
+    act: String,
+    #[serde(default)]
+    id: String,
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    role: String,
+    #[serde(default)]
+    days: String,
+    read: Option<String>,
+    run: Option<String>,
+    answer: Option<String>,
+    rate: Option<String>,
+}
+
+impl Asked {
+    fn scopes(&self) -> Vec<Right> {
+        let given = [&self.read, &self.run, &self.answer, &self.rate];
+        SCOPES.iter().zip(given).filter(|(_, given)| given.is_some()).map(|((right, _), _)| *right).collect()
+    }
+
+    fn id<T: FromStr>(&self) -> Result<T, Error> {
+        self.id.parse().map_err(|_| Error::invalid("id", self.id.as_str(), "an identifier of this page"))
+    }
+}
+
+/// `GET /people`.
+pub(super) async fn get(_: May<Administer>, State(app): State<AppState>) -> Page {
+    show(&app, Outcome::default(), None).await
+}
+
+async fn show(app: &AppState, outcome: Outcome, refused: Option<String>) -> Page {
+    let mut reader = app.read().await?;
+    let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
+    page(&PeoplePage { users, tokens, roles: Role::ALL, scopes: SCOPES, outcome, refused })
+}
+
+/// `POST /people`. A link or token is in the answer itself: it is not stored, and a reload does not make another one
+/// without asking.
+pub(super) async fn post(
+    may: May<Administer>,
+    State(app): State<AppState>,
+    Form(asked): Form<Asked>,
+) -> Result<Response, PageError> {
+    let mut writer = app.write().await?;
+    match act(&mut writer, &may.caller, &asked).await {
+        Ok(outcome) => {
+            commit(writer).await?;
+            Ok(show(&app, outcome, None).await?.into_response())
+        }
+        Err(error) if error.is_input() => {
+            drop(writer);
+            let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
+            Ok((status, show(&app, Outcome::default(), Some(error.to_string())).await?).into_response())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+async fn act(writer: &mut Writer, caller: &Caller, asked: &Asked) -> Result<Outcome, Error> {
+    let actor = &caller.actor;
+    let done = |text: String| Outcome { done: Some(text), secret: None };
+    match asked.act.as_str() {
+        "add_user" => {
+            let roles = Role::ALL.map(Role::as_str).join(", ");
+            let role = asked.role.parse().map_err(|_| Error::invalid("role", asked.role.as_str(), &roles))?;
+            let user = people::add(writer, actor, &NewUser { name: asked.name.clone(), role }).await?;
+            let secret = people::link(writer, actor, user.id).await?;
+            Ok(link(&user, &secret))
+        }
+        "link" => {
+            let id: UserId = asked.id()?;
+            let secret = people::link(writer, actor, id).await?;
+            Ok(link(&users::get(writer, id).await?, &secret))
+        }
+        "disable" | "enable" => {
+            let disabled = asked.act == "disable";
+            let user = people::set_disabled(writer, actor, asked.id()?, disabled).await?;
+            Ok(done(format!("{} is {}.", user.name, if disabled { "shut out" } else { "let in again" })))
+        }
+        "make_token" => {
+            let days = match asked.days.trim() {
+                "" => None,
+                text => Some(text.parse().map_err(|_| Error::invalid("days", text, "1 to 3660, or nothing"))?),
+            };
+            let new = NewToken { name: asked.name.clone(), scopes: asked.scopes(), days };
+            let (token, secret) = making::make(writer, actor, &new).await?;
+            Ok(Outcome { done: Some(format!("Token {} was made.", token.name)), secret: Some(("Token", secret)) })
+        }
+        "revoke" => {
+            let token = making::revoke(writer, actor, asked.id::<TokenId>()?).await?;
+            Ok(done(format!("Token {} was ended.", token.name)))
+        }
+        other => Err(Error::invalid("act", other, "add_user, link, disable, enable, make_token, revoke")),
+    }
+}
+
+fn link(user: &User, secret: &str) -> Outcome {
+    Outcome {
+        done: Some(format!("A sign-in link for {}: it works once, within a day.", user.name)),
+        secret: Some(("Path of the link on this service", format!("/sign-in/{secret}"))),
+    }
+}

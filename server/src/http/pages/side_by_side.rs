@@ -1,0 +1,152 @@
+//! Two studies on one plot: with and without muscles, two subjects, two learners.
+
+use super::drawn::Drawn;
+use super::error::{Page, page};
+use super::format::{self, words};
+use super::study::{Figures, figures};
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Params;
+use crate::http::may::May;
+use crate::plots::{Chart, Stroke};
+use crate::store::studies::Study;
+use crate::store::trials::TrialCounts;
+use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
+use crate::studies::choice::MANY;
+use crate::studies::standing::Standing;
+use askama::Template;
+use axum::extract::State;
+use gait_optimizer::TunedBounds;
+use serde::Deserialize;
+
+/// So many of the newest studies are offered, and of the newest trials of a large one drawn.
+const OFFERED: u32 = 200;
+
+/// Which two.
+#[derive(Debug, Deserialize)]
+pub(super) struct Choice {
+    a: Option<StudyId>,
+    b: Option<StudyId>,
+}
+
+#[derive(Template)]
+#[template(path = "side_by_side.html")]
+struct SideBySide {
+    offered: Vec<Study>,
+    a: Option<StudyId>,
+    b: Option<StudyId>,
+    compared: Option<Compared>,
+}
+
+impl SideBySide {
+    fn is(&self, chosen: &Option<StudyId>, study: &Study) -> bool {
+        *chosen == Some(study.id)
+    }
+}
+
+struct Compared {
+    a: Study,
+    b: Study,
+    chart: Option<Drawn>,
+    /// What, of the one, of the other, and whether these differ.
+    rows: Vec<(String, String, String, bool)>,
+}
+
+/// `GET /studies/compare`.
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+    let mut reader = app.read().await?;
+    let offered = studies::page(&mut reader, None, OFFERED).await?;
+    let compared = match (choice.a, choice.b) {
+        (Some(a), Some(b)) if a == b => {
+            return Err(Error::invalid("b", b.to_string(), "another study than a").into());
+        }
+        (Some(a), Some(b)) => {
+            let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);
+            drop(reader);
+            Some(
+                tokio::task::spawn_blocking(move || compare(a, b))
+                    .await
+                    .map_err(|e| Error::Internal(e.to_string()))??,
+            )
+        }
+        _ => None,
+    };
+    page(&SideBySide { offered, a: choice.a, b: choice.b, compared })
+}
+
+/// A study as read.
+struct Side {
+    standing: Standing,
+    subject: String,
+    counts: TrialCounts,
+}
+
+impl Side {
+    async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
+        let study = studies::get(db, id).await?;
+        consents::may_be_shown(db, id).await?;
+        let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+        let counts = trials::counts(db, id).await?;
+        let standing = if counts.total as usize >= MANY {
+            Standing::newest(db, study, OFFERED).await?
+        } else {
+            Standing::read(db, study).await?
+        };
+        Ok(Self { standing, subject, counts })
+    }
+
+    fn figures(&self) -> Result<Figures, Error> {
+        figures(&self.standing, self.counts.total as usize >= MANY).map_err(Error::Learner)
+    }
+
+    /// What the study is, and what it found.
+    fn rows(&self, figures: &Figures) -> Vec<(String, String)> {
+        let plan = &self.standing.study.plan;
+        let best = figures.best.and_then(|id| self.standing.trial(id));
+        let seconds: f64 = self.standing.trials.iter().filter_map(|trial| trial.seconds_total).sum();
+        let mut rows = vec![
+            ("State".to_owned(), words(self.standing.study.state.as_str())),
+            ("Subject".to_owned(), self.subject.clone()),
+            ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
+            ("Answers by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
+            ("Combinations of bounds".to_owned(), plan.search_space.len().to_string()),
+            ("Seed".to_owned(), plan.seed.to_string()),
+            ("Trials with a result".to_owned(), format!("{} of {}", self.counts.results(), plan.trial_budget)),
+            ("Converged".to_owned(), self.counts.converged.to_string()),
+            ("Time of the solves, s".to_owned(), format!("{seconds:.0}")),
+            ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
+            ("Its Gait RMSE, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
+            ("Its cost of transport".to_owned(), format::figure(best.and_then(|trial| trial.cost_of_transport))),
+        ];
+        let bounds = best.map(|trial| trial.action.to_array());
+        for (place, name) in TunedBounds::NAMES.iter().enumerate() {
+            let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
+            rows.push((format!("{name}: {}", TunedBounds::MEANINGS[place]), value));
+        }
+        rows
+    }
+}
+
+fn compare(a: Side, b: Side) -> Result<Compared, Error> {
+    let (of_a, of_b) = (a.figures()?, b.figures()?);
+    let line = |figures: &Figures| -> Vec<(f64, f64)> {
+        let point = |m: &crate::studies::history::Milestone| Some((f64::from(m.iteration), m.gait_rmse_rad?));
+        figures.history.iter().filter_map(point).collect()
+    };
+    let mut chart = Chart::new(
+        "Gait RMSE of the best action by iteration",
+        "iteration (in order of the results)",
+        "Gait RMSE, rad",
+    )
+    .with(&a.standing.study.plan.name, 0, Stroke::Steps, line(&of_a))
+    .with(&b.standing.study.plan.name, 1, Stroke::DashedSteps, line(&of_b));
+    chart.whole_x = true;
+    let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
+    Ok(Compared {
+        rows: rows.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
+        chart: (!chart.legend().is_empty()).then(|| Drawn::new(&chart, "")),
+        a: a.standing.study,
+        b: b.standing.study,
+    })
+}

@@ -1,0 +1,52 @@
+//! A stride as a row of stick figures: for paper, and for those who do not want things to move.
+
+use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure};
+use std::fmt::Write;
+
+/// So many pictures of one stride.
+const TILES: usize = 9;
+const WIDTH: f64 = 104.0;
+const HEIGHT: f64 = 190.0;
+const GROUND: f64 = 164.0;
+/// Units of the drawing per metre.
+const SCALE: f64 = 86.0;
+
+/// Figures at even times as one SVG element; each stands on its hip, with its percent of the cycle below.
+pub fn gait_tiles(figures: &[StickFigure]) -> String {
+    let mut svg = String::with_capacity(16 * 1024);
+    // Writing to a String cannot fail.
+    let _ = draw(&mut svg, figures);
+    svg
+}
+
+fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
+    let end = figures.last().map_or(0.0, |figure| figure.time_s);
+    write!(
+        svg,
+        "<svg class=\"tiles\" viewBox=\"0 0 {} {HEIGHT}\" role=\"img\" aria-label=\"The stride as {TILES} stick figures\">",
+        WIDTH * TILES as f64
+    )?;
+    for tile in 0..TILES {
+        let share = tile as f64 / (TILES - 1) as f64;
+        let Some(figure) = figures.iter().find(|figure| figure.time_s >= share * end - 1e-9) else { continue };
+        let middle = WIDTH * (tile as f64 + 0.5);
+        let at = |[x, z]: [f64; 2]| (middle + (x - figure.hip[0]) * SCALE, GROUND - z * SCALE);
+        let mut line = |class: &str, joints: &[[f64; 2]]| -> std::fmt::Result {
+            write!(svg, "<path class=\"{class}\" d=\"")?;
+            for (i, (x, y)) in joints.iter().map(|joint| at(*joint)).enumerate() {
+                write!(svg, "{}{x:.1} {y:.1}", if i == 0 { 'M' } else { 'L' })?;
+            }
+            write!(svg, "\"/>")
+        };
+        let half = WIDTH / 2.0 / SCALE;
+        line("ground", &[[figure.hip[0] - half, 0.0], [figure.hip[0] + half, 0.0]])?;
+        let foot = |leg: &LegPoints| [leg.ankle, leg.heel, leg.toe, leg.ankle];
+        line("left", &[figure.hip, figure.left.knee, figure.left.ankle])?;
+        line("left", &foot(&figure.left))?;
+        line("right", &[figure.hip, figure.right.knee, figure.right.ankle])?;
+        line("right", &foot(&figure.right))?;
+        line("trunk", &[figure.hip, figure.shoulder])?;
+        write!(svg, "<text x=\"{middle:.1}\" y=\"{}\">{:.0} %</text>", HEIGHT - 6.0, 100.0 * share)?;
+    }
+    write!(svg, "</svg>")
+}

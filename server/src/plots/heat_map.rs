@@ -1,0 +1,130 @@
+//! A table of values over two quantities, shaded by value. Every cell says its value in figures: the shade helps to find
+//! a place and carries nothing alone.
+
+use super::chart::escape;
+use std::fmt::Write;
+
+/// One cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// What decides the shade.
+    pub value: f64,
+    /// What is written in it.
+    pub text: String,
+    /// What is written below that; may be empty.
+    pub below: String,
+    /// Whether it is framed.
+    pub framed: bool,
+}
+
+/// A shaded table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeatMap {
+    /// What it shows.
+    pub title: String,
+    /// What runs to the right, with its unit, and its levels.
+    pub columns: (String, Vec<f64>),
+    /// What runs downwards, with its unit, and its levels.
+    pub rows: (String, Vec<f64>),
+    /// For each row its cells.
+    pub cells: Vec<Vec<Cell>>,
+    /// The values of the lightest and of the darkest shade.
+    pub range: (f64, f64),
+}
+
+const WIDTH: f64 = 640.0;
+const LEFT: f64 = 74.0;
+const TOP: f64 = 34.0;
+const ROW: f64 = 52.0;
+const BOTTOM: f64 = 60.0;
+/// The darkest shade: text stays readable on it in light and in dark.
+const DARKEST: f64 = 0.5;
+
+impl HeatMap {
+    /// The map as an SVG element.
+    pub fn svg(&self) -> String {
+        let mut svg = String::with_capacity(8 * 1024);
+        // Writing to a String cannot fail.
+        let _ = self.draw(&mut svg);
+        svg
+    }
+
+    fn draw(&self, svg: &mut String) -> std::fmt::Result {
+        let bottom = TOP + ROW * self.cells.len() as f64;
+        let width = (WIDTH - LEFT - 8.0) / self.columns.1.len().max(1) as f64;
+        let (low, high) = self.range;
+        let label = escape(&format!("{}: {} by {}", self.title, self.rows.0, self.columns.0));
+        write!(
+            svg,
+            "<svg class=\"chart map\" viewBox=\"0 0 {WIDTH} {}\" role=\"img\" aria-label=\"{label}\">",
+            bottom + BOTTOM
+        )?;
+        for (row, (cells, level)) in self.cells.iter().zip(&self.rows.1).enumerate() {
+            let y = TOP + ROW * row as f64;
+            let middle = y + ROW / 2.0;
+            write!(svg, "<text class=\"tick y\" x=\"{}\" y=\"{:.1}\">{level}</text>", LEFT - 8.0, middle + 5.0)?;
+            for (column, cell) in cells.iter().enumerate() {
+                let x = LEFT + width * column as f64;
+                let share = ((cell.value - low) / (high - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let class = if cell.framed { "cell framed" } else { "cell" };
+                write!(
+                    svg,
+                    "<rect class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill-opacity=\"{:.3}\"/>",
+                    x + 1.5,
+                    y + 1.5,
+                    width - 3.0,
+                    ROW - 3.0,
+                    DARKEST * share
+                )?;
+                let (centre, raised) = (x + width / 2.0, if cell.below.is_empty() { 5.0 } else { -2.0 });
+                write!(
+                    svg,
+                    "<text class=\"value\" x=\"{centre:.1}\" y=\"{:.1}\">{}</text>",
+                    middle + raised,
+                    escape(&cell.text)
+                )?;
+                if !cell.below.is_empty() {
+                    write!(
+                        svg,
+                        "<text class=\"below\" x=\"{centre:.1}\" y=\"{:.1}\">{}</text>",
+                        middle + 17.0,
+                        escape(&cell.below)
+                    )?;
+                }
+            }
+        }
+        for (column, level) in self.columns.1.iter().enumerate() {
+            let x = LEFT + width * (column as f64 + 0.5);
+            write!(svg, "<text class=\"tick x\" x=\"{x:.1}\" y=\"{:.1}\">{level}</text>", bottom + 22.0)?;
+        }
+        let middle = f64::midpoint(LEFT, WIDTH - 8.0);
+        write!(
+            svg,
+            "<text class=\"label\" x=\"{middle:.1}\" y=\"{:.1}\">{}</text>",
+            bottom + 50.0,
+            escape(&self.columns.0)
+        )?;
+        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text></svg>", escape(&self.rows.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_says_its_value_and_equal_values_have_one_shade() {
+        let cell = |value: f64| Cell { value, text: format!("<{value}>"), below: String::new(), framed: value > 1.0 };
+        let map = HeatMap {
+            title: "t".to_owned(),
+            columns: ("x".to_owned(), vec![1.0, 2.0]),
+            rows: ("y".to_owned(), vec![3.0]),
+            cells: vec![vec![cell(1.0), cell(2.0)]],
+            range: (1.0, 1.0),
+        };
+        let svg = map.svg();
+        assert_eq!(svg.matches("<rect").count(), 2);
+        assert_eq!(svg.matches("framed").count(), 1);
+        assert!(svg.contains("&lt;1&gt;") && !svg.contains("NaN") && !svg.contains("inf"));
+    }
+}

@@ -1,0 +1,116 @@
+//! A tree drawn from left to right: what grew out of what.
+
+use super::chart::escape;
+use std::fmt::Write;
+
+/// One node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// Its place in the list of the one it grew out of: before its own.
+    pub parent: Option<usize>,
+    /// Its name.
+    pub label: String,
+    /// Where it leads.
+    pub link: String,
+    /// Class of its mark.
+    pub class: &'static str,
+}
+
+const STEP: f64 = 86.0;
+const ROW: f64 = 26.0;
+const MARGIN: f64 = 18.0;
+
+/// The tree as an SVG element.
+pub fn tree(title: &str, nodes: &[Node]) -> String {
+    let places = places(nodes);
+    let width = places.iter().map(|p| p.0).fold(0.0, f64::max) + MARGIN + STEP;
+    let height = places.iter().map(|p| p.1).fold(0.0, f64::max) + MARGIN;
+    let mut svg = String::with_capacity(8 * 1024);
+    // Writing to a String cannot fail.
+    let _ = draw(&mut svg, title, nodes, &places, (width, height));
+    svg
+}
+
+fn draw(
+    svg: &mut String,
+    title: &str,
+    nodes: &[Node],
+    places: &[(f64, f64)],
+    (width, height): (f64, f64),
+) -> std::fmt::Result {
+    write!(
+        svg,
+        "<svg class=\"tree\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" role=\"group\" aria-label=\"{}\">",
+        escape(title)
+    )?;
+    for (node, (x, y)) in nodes.iter().zip(places) {
+        if let Some((from_x, from_y)) = node.parent.and_then(|parent| places.get(parent)) {
+            let bend = from_x + STEP / 2.0;
+            write!(svg, "<path class=\"branch\" d=\"M{from_x} {from_y}C{bend} {from_y} {bend} {y} {x} {y}\"/>")?;
+        }
+    }
+    for (node, (x, y)) in nodes.iter().zip(places) {
+        let (link, label) = (escape(&node.link), escape(&node.label));
+        write!(svg, "<a href=\"{link}\"><circle class=\"{}\" cx=\"{x}\" cy=\"{y}\" r=\"6\"/>", node.class)?;
+        write!(svg, "<text x=\"{}\" y=\"{}\">{label}</text></a>", x + 10.0, y + 4.5)?;
+    }
+    write!(svg, "</svg>")
+}
+
+/// The first child continues the row of its parent, every other one begins a row below all that grew before.
+fn places(nodes: &[Node]) -> Vec<(f64, f64)> {
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+    let mut open: Vec<usize> = Vec::new();
+    for (index, node) in nodes.iter().enumerate() {
+        match node.parent.filter(|parent| *parent < index) {
+            Some(parent) => children[parent].push(index),
+            None => open.push(index),
+        }
+    }
+    let mut places = vec![(MARGIN, MARGIN); nodes.len()];
+    let mut rows = 0.0;
+    open.reverse();
+    let mut open: Vec<(usize, f64, bool)> = open.into_iter().map(|root| (root, 0.0, false)).collect();
+    while let Some((index, depth, continues)) = open.pop() {
+        if !continues {
+            rows += 1.0;
+        }
+        places[index] = (MARGIN + STEP * depth, MARGIN + ROW * (rows - 1.0));
+        for (place, &child) in children[index].iter().enumerate().rev() {
+            open.push((child, depth + 1.0, place == 0));
+        }
+    }
+    places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn nodes(parents: &[Option<usize>]) -> Vec<Node> {
+        let node =
+            |parent: &Option<usize>| Node { parent: *parent, label: "<1>".to_owned(), link: String::new(), class: "" };
+        parents.iter().map(node).collect()
+    }
+
+    #[test]
+    fn a_chain_is_one_row_and_text_cannot_leave_it() {
+        let chain = nodes(&[None, Some(0), Some(1)]);
+        assert_eq!(places(&chain).iter().map(|p| p.1).collect::<Vec<_>>(), [MARGIN; 3]);
+        assert!(!tree("\"", &chain).contains("<1>"));
+    }
+
+    proptest! {
+        #[test]
+        fn no_two_nodes_share_a_place(choices in proptest::collection::vec(any::<Option<prop::sample::Index>>(), 1..60)) {
+            let parents: Vec<Option<usize>> =
+                choices.iter().enumerate().map(|(i, c)| c.filter(|_| i > 0).map(|c| c.index(i))).collect();
+            let mut seen: Vec<(i64, i64)> =
+                places(&nodes(&parents)).iter().map(|p| (p.0 as i64, p.1 as i64)).collect();
+            seen.sort_unstable();
+            seen.dedup();
+            prop_assert_eq!(seen.len(), parents.len());
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The table of a study's trials, sorted and filtered by the database: a page of ten thousand is as quick as one of ten.
+
+use super::trials::TrialState;
+use super::{Connection, StoreResult, StudyId, TrialId, json};
+use gait_optimizer::TunedBounds;
+use sqlx::Row;
+
+/// By what trials can be sorted: figures by the names of their columns, bounds by their own.
+pub const SORTS: [&str; 14] = [
+    "number",
+    "state",
+    "gait_rmse_rad",
+    "cost_of_transport",
+    "iterations",
+    "seconds_total",
+    "a1",
+    "a2",
+    "a3",
+    "a4",
+    "a5",
+    "a6",
+    "a7",
+    "a8",
+];
+
+/// Which trials, and in which order.
+#[derive(Debug, Clone)]
+pub struct Listing {
+    /// One of [`SORTS`].
+    pub sort: &'static str,
+    /// The largest first. What has no figure comes last either way.
+    pub descending: bool,
+    /// Only those in this state.
+    pub state: Option<TrialState>,
+    /// Only those whose reason or message contains this, whatever the case.
+    pub contains: String,
+    /// At most so many.
+    pub limit: u32,
+    /// After so many.
+    pub offset: u32,
+}
+
+/// A trial in the table.
+#[derive(Debug, Clone)]
+pub struct Listed {
+    /// Identifier.
+    pub id: TrialId,
+    /// 1, 2, ... within the study.
+    pub number: u32,
+    /// The action as bounds.
+    pub action: TunedBounds,
+    /// Why the learner chose it.
+    pub reason: String,
+    /// The trial whose gait it starts from, and its number.
+    pub from: Option<(TrialId, u32)>,
+    /// Where it stands.
+    pub state: TrialState,
+    /// Gait RMSE, rad.
+    pub gait_rmse_rad: Option<f64>,
+    /// Cost of transport.
+    pub cost_of_transport: Option<f64>,
+    /// Interior-point iterations.
+    pub iterations: Option<u32>,
+    /// Wall time of the solve, s.
+    pub seconds_total: Option<f64>,
+    /// What to tell people about how it ended; may be empty.
+    pub message: String,
+    /// How many trials there are with this filter.
+    pub matching: u32,
+}
+
+/// The trials of a study.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<Listed>> {
+    let rows = sqlx::query(
+        "select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
+         t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
+         count(*) over () as matching, \
+         case ?2 when 'number' then t.number when 'state' then t.state when 'gait_rmse_rad' then t.gait_rmse_rad \
+             when 'cost_of_transport' then t.cost_of_transport when 'iterations' then t.iterations \
+             when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
+         from trials t \
+         where t.study_id = ?1 and (?4 is null or t.state = ?4) \
+             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0) \
+         order by key is null, case when ?3 then key end desc, case when ?3 then null else key end, t.number desc \
+         limit ?6 offset ?7",
+    )
+    .bind(study)
+    .bind(listing.sort)
+    .bind(listing.descending)
+    .bind(listing.state.map(TrialState::as_str))
+    .bind(&listing.contains)
+    .bind(listing.limit)
+    .bind(listing.offset)
+    .fetch_all(db)
+    .await?;
+    rows.iter()
+        .map(|row| {
+            let from: Option<TrialId> = row.try_get("warm_started_from")?;
+            Ok(Listed {
+                id: row.try_get("id")?,
+                number: row.try_get("number")?,
+                action: json::column(row, "action")?,
+                reason: row.try_get("reason")?,
+                from: from.zip(row.try_get("from_number")?),
+                state: row.try_get::<&str, _>("state")?.parse()?,
+                gait_rmse_rad: row.try_get("gait_rmse_rad")?,
+                cost_of_transport: row.try_get("cost_of_transport")?,
+                iterations: row.try_get("iterations")?,
+                seconds_total: row.try_get("seconds_total")?,
+                message: row.try_get("message")?,
+                matching: row.try_get("matching")?,
+            })
+        })
+        .collect()
+}

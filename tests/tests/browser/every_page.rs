@@ -1,0 +1,119 @@
+//! What holds of every page: it fits, it is clean, it can be used by everybody.
+
+use crate::chromium::{Chromium, Tab};
+use crate::site::Site;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright_tests::analytic::Analytic;
+use std::path::{Path, PathBuf};
+
+/// Every page with something on it: name and address.
+async fn pages(site: &Site) -> Vec<(&'static str, String)> {
+    let study =
+        site.service.study(|new| (new.trial_budget, new.name) = (24, Some("S01, first tuning".to_owned()))).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let other = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    site.service.wait_for(other, &[StudyState::Waiting]).await;
+    let trials = site.service.trials(study).await;
+    let of = |state| trials.iter().find(|trial| trial.state == state).map(|trial| trial.id);
+    let (gait, no_gait) = (of(TrialState::Converged).unwrap(), of(TrialState::NotConverged).unwrap());
+    let taken = site.service.post_text(&format!("/rate/{other}"), "application/x-www-form-urlencoded", "").await;
+    let pair = taken.headers["location"].to_str().unwrap().to_owned();
+    vec![
+        ("home", "/".to_owned()),
+        ("subjects", "/subjects".to_owned()),
+        ("subject", format!("/subjects/{}", site.service.subject().await)),
+        ("new-study", "/studies/new".to_owned()),
+        ("study", format!("/studies/{study}")),
+        ("belief", format!("/studies/{study}/belief?right=a5&down=a6")),
+        ("side-by-side", format!("/studies/compare?a={study}&b={other}")),
+        ("compare", format!("/studies/{other}/compare")),
+        ("gait", format!("/trials/{gait}")),
+        ("no-gait", format!("/trials/{no_gait}")),
+        ("rate", "/rate".to_owned()),
+        ("pair", pair),
+        ("people", "/people".to_owned()),
+        ("audit", "/audit".to_owned()),
+        ("system", "/system".to_owned()),
+        ("words", "/glossary".to_owned()),
+        ("interface", "/api".to_owned()),
+        ("sign-in", "/sign-in".to_owned()),
+        ("error", "/nothing".to_owned()),
+    ]
+}
+
+const WIDTHS: [i64; 3] = [1280, 768, 360];
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_every_page_fits_and_is_for_everybody() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let pictures = std::env::var_os("GAITWRIGHT_PICTURES").map(PathBuf::from);
+    let mut wrong = Vec::new();
+    for (name, path) in pages(&site).await {
+        let page = browser.open(&site.at(&path)).await;
+        for scheme in ["light", "dark"] {
+            page.prefer("prefers-color-scheme", scheme).await;
+            for complaint in own_checks(&page).await {
+                wrong.push(format!("{name}, {scheme}: {complaint}"));
+            }
+            for width in WIDTHS {
+                page.resize(width, 900).await;
+                let beyond = "document.documentElement.scrollWidth - document.documentElement.clientWidth";
+                let beyond = page.value(beyond).await;
+                if beyond != "0" {
+                    wrong.push(format!("{name}: {beyond} px beyond {width} px"));
+                }
+                if let Some(folder) = pictures.as_deref().filter(|_| width > 360) {
+                    page.picture(&folder.join(format!("{name}-{width}-{scheme}.png"))).await;
+                }
+            }
+            page.resize(1280, 900).await;
+        }
+        if name != "error" {
+            page.is_clean(&site.origin).await;
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    browser.close().await;
+}
+
+async fn own_checks(page: &Tab) -> Vec<String> {
+    serde_json::from_str(&page.value(include_str!("accessibility.js")).await).unwrap()
+}
+
+/// axe-core, which is not ours to give on: `.ci/run` brings it.
+fn axe() -> Option<String> {
+    let default = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/axe/node_modules/axe-core/axe.min.js");
+    let file = std::env::var_os("GAITWRIGHT_AXE").map_or(default, PathBuf::from);
+    if let Ok(script) = std::fs::read_to_string(&file) {
+        return Some(script);
+    }
+    assert!(std::env::var_os("GAITWRIGHT_REQUIRE_AXE").is_none(), "no axe-core at {}", file.display());
+    eprintln!("skipped: no axe-core at {}", file.display());
+    None
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_every_page_passes_axe() {
+    let (Some(script), Some(browser)) = (axe(), Chromium::launch().await) else { return };
+    let site = Site::start(Analytic::default()).await;
+    let mut wrong = Vec::new();
+    for (name, path) in pages(&site).await {
+        let page = browser.open(&site.at(&path)).await;
+        for scheme in ["light", "dark"] {
+            page.prefer("prefers-color-scheme", scheme).await;
+            page.define(&script).await;
+            let found = page
+                .value(
+                    "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }) \
+                     .then(r => r.violations.flatMap(v => v.nodes.map(n => v.id + ': ' + n.html.slice(0, 120))))",
+                )
+                .await;
+            let found: Vec<String> = serde_json::from_str(&found).unwrap();
+            wrong.extend(found.into_iter().map(|complaint| format!("{name}, {scheme}: {complaint}")));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    browser.close().await;
+}

@@ -1,0 +1,12 @@
+//! The pages in a real browser. Every name contains `browser`; without a Chromium they say so and are skipped,
+//! unless `GAITWRIGHT_REQUIRE_BROWSER` is set.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod chromium;
+mod every_page;
+mod gait;
+mod rater;
+mod sign_in;
+mod site;
+mod study;

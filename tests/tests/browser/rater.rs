@@ -1,0 +1,198 @@
+//! A rater compares two gaits blindly: with whatever is at hand, and when things go wrong.
+
+use crate::chromium::{Chromium, Tab};
+use crate::site::Site;
+use gaitwright::store::StudyId;
+use gaitwright::store::feedback::{FeedbackRow, Source};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright_tests::analytic::Analytic;
+
+/// A study that waits for a comparison.
+async fn waiting(site: &Site) -> StudyId {
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    study
+}
+
+/// Answers of people, also those that were taken back.
+async fn answers(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
+    let mut rows = site.service.feedback(study).await;
+    rows.retain(|row| row.source == Source::Clinician);
+    rows
+}
+
+/// The page of the pair, ready to be answered.
+async fn at_the_pair(browser: &Chromium, site: &Site) -> Tab {
+    let page = browser.open(&site.at("/rate")).await;
+    page.click("main form button").await;
+    page.wait_until("document.querySelector('[data-answer] [type=submit]')?.disabled === false").await;
+    page
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_answers_with_the_mouse_and_takes_it_back() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    page.click("input[value=second]").await;
+    page.click("[data-answer] [type=submit]").await;
+    page.wait_for(".notice.good").await;
+    assert!(page.text(".notice.good").await.contains("answer 1: second"));
+    assert_eq!(answers(&site, study).await.len(), 1);
+    page.click(".notice.good button").await;
+    page.wait_until("document.querySelector('.notice.good').textContent.includes('taken back')").await;
+    assert!(answers(&site, study).await[0].retraction.is_some());
+    // What was asked is open again.
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    page.click("main form[action^='/rate/'] button").await;
+    page.wait_until("document.querySelector('h1').textContent === 'Pair 2'").await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_answers_with_a_finger_on_a_tablet() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    for (width, height) in [(768, 1024), (1024, 768)] {
+        page.resize(width, height).await;
+        // Both gaits and the three answers can be seen without moving the page.
+        let bottom = "Math.max(...[...document.querySelectorAll('canvas, .verdict')].map(e => e.getBoundingClientRect().bottom))";
+        let bottom: f64 = page.value(bottom).await.parse().unwrap();
+        assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
+    }
+    page.tap("input[value=no_difference]").await;
+    page.wait_until("document.querySelector('input:checked')?.value === 'no_difference'").await;
+    page.tap("[data-answer] [type=submit]").await;
+    page.wait_for(".notice.good").await;
+    assert_eq!(answers(&site, study).await.len(), 1);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_answers_with_the_keyboard() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    for (key, value) in [("1", "first"), ("3", "second"), ("2", "no_difference")] {
+        page.press(key).await;
+        assert_eq!(page.value("document.querySelector('input:checked')?.value ?? ''").await, value);
+    }
+    page.press("Enter").await;
+    page.wait_for(".notice.good").await;
+    assert_eq!(answers(&site, study).await.len(), 1);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_answers_without_scripts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = browser.open_without_scripts(&site.at("/rate")).await;
+    page.click_plainly("main form button").await;
+    page.wait_for("svg.tiles").await;
+    assert_eq!(page.count("svg.tiles").await, 2);
+    page.resize(1280, 2400).await;
+    page.click_plainly("input[value=first]").await;
+    page.click_plainly("[data-answer] [type=submit]").await;
+    page.wait_for(".notice.good").await;
+    assert_eq!(answers(&site, study).await.len(), 1);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_reloads_in_the_middle_and_sees_the_same_pair() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    let pair = page.address().await;
+    page.click("input[value=first]").await;
+    page.reload().await;
+    assert_eq!(page.address().await, pair);
+    // Also from the beginning: what is open comes back.
+    let again = at_the_pair(&browser, &site).await;
+    assert_eq!(again.address().await, pair);
+    assert!(answers(&site, study).await.is_empty());
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_double_clicks_and_one_answer_counts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    page.click("input[value=first]").await;
+    page.run("const b = document.querySelector('[data-answer] [type=submit]'); b.click(); b.click()").await;
+    page.wait_for(".notice.good").await;
+    assert_eq!(answers(&site, study).await.len(), 1);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_with_two_tabs_answers_once() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let (one, other) = (at_the_pair(&browser, &site).await, at_the_pair(&browser, &site).await);
+    for (page, value) in [(&one, "first"), (&other, "second")] {
+        page.run(&format!(
+            "document.querySelector('input[value={value}]').checked = true; \
+                           document.querySelector('[data-answer] [type=submit]').click()"
+        ))
+        .await;
+        page.wait_until(
+            "!location.pathname.startsWith('/rate/pair') || document.querySelector('form[data-answer]') === null",
+        )
+        .await;
+    }
+    assert!(other.text("main").await.contains("was answered already"));
+    assert_eq!(answers(&site, study).await.len(), 1);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_who_wants_no_motion_gets_none() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    waiting(&site).await;
+    let page = browser.open(&site.at("/rate")).await;
+    page.prefer("prefers-reduced-motion", "reduce").await;
+    page.click("main form button").await;
+    page.wait_until("document.querySelector('[data-play]')?.textContent === 'Play'").await;
+    let pictures = "[...document.querySelectorAll('canvas')].map(c => c.toDataURL()).join()";
+    let before = page.value(pictures).await;
+    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+    assert_eq!(page.value(pictures).await, before, "it stands still");
+    page.click("[data-play]").await;
+    page.wait_until(&format!("{pictures} !== {before:?}")).await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_loses_the_connection_and_nothing_else() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    page.click("input[value=first]").await;
+    page.disconnect(true).await;
+    page.run("document.querySelector('[data-answer] [type=submit]').click()").await;
+    page.wait_until("document.querySelector('[data-state]').textContent.includes('no connection')").await;
+    assert!(answers(&site, study).await.is_empty());
+    page.disconnect(false).await;
+    page.run("document.querySelector('[data-answer] [type=submit]').click()").await;
+    page.wait_for(".notice.good").await;
+    assert_eq!(answers(&site, study).await.len(), 1);
+    browser.close().await;
+}

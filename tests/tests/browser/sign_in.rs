@@ -1,0 +1,83 @@
+//! Signing in, and what an administrator does.
+
+use crate::chromium::Chromium;
+use crate::site::Site;
+use gaitwright::access::Role;
+use gaitwright::access::people::{self, NewUser};
+use gaitwright::http::Access;
+use gaitwright::store::audit::Actor;
+use gaitwright::store::commit;
+use gaitwright_tests::analytic::Analytic;
+use std::sync::Arc;
+
+/// A service where everybody signs in, and the link of its first administrator.
+async fn guarded() -> (Site, String) {
+    let site = Site::start_with(Analytic::default(), |service| {
+        service.access = Arc::new(Access::by_sign_in(3600.0));
+    })
+    .await;
+    let mut writer = site.service.store.write().await.unwrap();
+    let new = NewUser { name: "Ada".to_owned(), role: Role::Admin };
+    let user = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let link = people::link(&mut writer, &Actor::program(), user.id).await.unwrap();
+    commit(writer).await.unwrap();
+    (site, link)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_signs_in_by_link_then_by_password() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let (site, link) = guarded().await;
+    let page = browser.open(&site.origin).await;
+    page.wait_for("#password").await;
+    assert!(page.address().await.ends_with("/sign-in"));
+    page.goto(&site.at(&format!("/sign-in/{link}"))).await;
+    page.click("main button").await;
+    page.wait_for("a[href='/studies/new']").await;
+    page.click("nav a[href='/account']").await;
+    page.fill("#password", "correct horse battery").await;
+    page.click("main form[action='/account'] button").await;
+    page.wait_for(".notice.good").await;
+    page.click("form[action='/sign-out'] button").await;
+    page.wait_for("#name").await;
+    page.fill("#name", "Ada").await;
+    page.fill("#password", "correct horse battery").await;
+    page.click("main button").await;
+    page.wait_for("a[href='/studies/new']").await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let (site, link) = guarded().await;
+    let page = browser.open(&site.at(&format!("/sign-in/{link}"))).await;
+    page.click("main button").await;
+    page.click("nav a[href='/system']").await;
+    page.click("main a[href='/people']").await;
+    page.wait_for("#user-name").await;
+    page.fill("#user-name", "R1").await;
+    page.click("button[value=add_user]").await;
+    page.wait_for(".secret").await;
+    let path = page.text(".secret").await;
+    assert!(path.starts_with("/sign-in/"), "{path}");
+    page.fill("#token-name", "treadmill").await;
+    page.click("button[value=make_token]").await;
+    page.wait_until("document.querySelector('.secret')?.textContent.startsWith('gait_') ?? false").await;
+    // The same name again is refused, and says so.
+    page.fill("#token-name", "treadmill").await;
+    page.click("button[value=make_token]").await;
+    page.wait_for(".notice.bad").await;
+    page.goto(&site.at("/audit?verify=true")).await;
+    page.wait_for(".notice.good").await;
+    let rows = page.text("tbody").await;
+    assert!(rows.contains("token.make") && rows.contains("user.add"), "{rows}");
+    // The rater sees comparisons and nothing else.
+    page.goto(&site.at(&path)).await;
+    page.click("main button").await;
+    page.wait_for("main h1").await;
+    page.wait_until("location.pathname === '/rate'").await;
+    assert_eq!(page.count("nav").await, 0);
+    browser.close().await;
+}

@@ -1,0 +1,230 @@
+//! Studies: making one, watching it, answering, asking the learner.
+
+use crate::chromium::Chromium;
+use crate::site::Site;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::large;
+use std::path::PathBuf;
+use std::time::Duration;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_from_nothing_to_a_finished_study_in_three_clicks() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(15))).await;
+    let page = browser.open(&site.origin).await;
+    page.click("a.button").await;
+    page.wait_for("#trial_budget").await;
+    page.fill("#trial_budget", "3").await;
+    page.click("button[type=submit]").await;
+    // The page follows the study by itself.
+    page.wait_for("[data-trial]").await;
+    page.wait_for("[data-part=state] .state.finished").await;
+    page.wait_until("document.querySelectorAll('.trials tbody tr').length === 3").await;
+    assert_eq!(page.count("[data-part=history] svg.chart").await, 1);
+    // What is recommended can be taken along.
+    let bounds = page.value("document.querySelector('[data-part=best] a[download]').getAttribute('href')").await;
+    let told = site.service.fetch(&bounds).await.json();
+    assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
+    page.click(".trials tbody tr a").await;
+    page.wait_for(".walker canvas").await;
+    page.wait_for("[data-phase]").await;
+    assert!(page.count("svg.chart").await >= 12);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_follows_a_running_solve() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(400))).await;
+    let study = site.service.study(|new| new.trial_budget = 1).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.wait_for("[data-trial] [data-chart] svg.chart").await;
+    let text = "document.querySelector('[data-trial] [data-text]')?.textContent ?? ''";
+    let drawing = "document.querySelector('[data-trial] .chart .line')?.getAttribute('d') ?? ''";
+    let (early, drawn) = (page.value(text).await, page.value(drawing).await);
+    page.wait_until(&format!("({text}) !== {early:?} && ({drawing}) !== {drawn:?}")).await;
+    page.wait_for("[data-part=state] .state.finished").await;
+    assert_eq!(page.count("[data-trial]").await, 0);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 40).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let errors =
+        "[...document.querySelectorAll('.trials tbody tr')].map(r => r.cells[2].textContent).filter(t => t !== '–')";
+    let sorted = format!(
+        "(() => {{ const e = {errors}; return e.every((v, i) => i === 0 || Number(e[i - 1]) <= Number(v)) }})()"
+    );
+    let rows = "document.querySelectorAll('.trials tbody tr').length";
+    let by_error = ".trials thead a[href*='sort=gait_rmse_rad']";
+
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    assert_eq!(page.value(&sorted).await, "false", "by number at first");
+    page.click(by_error).await;
+    page.wait_for("th[aria-sort=ascending] a[href*='sort=gait_rmse_rad']").await;
+    assert_eq!(page.value(&sorted).await, "true");
+    let all: usize = page.value(rows).await.parse().unwrap();
+    page.run(
+        "const s = document.querySelector('select[name=state]'); s.value = 'not_converged'; \
+              s.dispatchEvent(new Event('input', { bubbles: true }))",
+    )
+    .await;
+    page.wait_until(&format!("{rows} < {all} && {rows} > 0")).await;
+    assert_eq!(page.value("document.querySelectorAll('.trials .state:not(.not_converged)').length").await, "0");
+    // The address says what is shown: it can be sent to somebody.
+    assert!(page.value("location.search").await.contains("state=not_converged"));
+    page.is_clean(&site.origin).await;
+
+    let plain = browser
+        .open_without_scripts(&site.at(&format!("/studies/{study}?sort=gait_rmse_rad&order=ascending&state=converged")))
+        .await;
+    assert_eq!(plain.value(&sorted).await, "true");
+    assert_eq!(plain.value("document.querySelectorAll('.trials .state:not(.converged)').length").await, "0");
+    let refused = site.service.fetch(&format!("/studies/{study}?sort=shoe_size")).await;
+    assert!(refused.status.is_client_error() && refused.text.contains("gait_rmse_rad"), "{}", refused.text);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_what_the_learner_believes_and_where_gaits_grew() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 8).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}/belief?right=a5&down=a6"))).await;
+    assert_eq!(page.count("#marginals svg.chart .band").await, 8);
+    // Four clearances by six leans, twice.
+    assert_eq!(page.count("#maps svg.map .cell").await, 48);
+    assert_eq!(page.count("#maps svg.map .framed").await, 2);
+    let shares = "[...document.querySelectorAll('#best meter')].reduce((sum, m) => sum + m.value, 0)";
+    let total: f64 = page.value(shares).await.parse().unwrap();
+    assert!((total - 1.0).abs() < 1e-9, "{total}");
+    assert!(page.count("#answers tbody tr").await > 0);
+    page.is_clean(&site.origin).await;
+    let wrong = site.service.fetch(&format!("/studies/{study}/belief?right=a5&down=a5")).await;
+    assert!(wrong.status.is_client_error(), "{}", wrong.status);
+
+    let other = site.service.study(|new| (new.trial_budget, new.muscles) = (4, false)).await;
+    site.service.wait_for(other, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/compare?a={study}&b={other}"))).await;
+    assert_eq!(page.count("svg.chart path.line").await, 2);
+    assert!(page.text(".sides").await.contains("without muscles"));
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    assert_eq!(page.count("svg.tree circle").await, 8);
+    assert!(page.count("svg.tree .branch").await >= 1);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_checks_a_new_study_while_it_is_typed() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let page = browser.open(&site.at("/studies/new")).await;
+    page.wait_until("document.querySelector('[data-outlook]').textContent.includes('11664')").await;
+    page.fill("#trial_budget", "many").await;
+    page.wait_for("#trial_budget[aria-invalid=true]").await;
+    page.wait_for("[data-outlook].bad").await;
+    page.fill("#trial_budget", "2").await;
+    page.run("document.querySelector('.editor').closest('details').open = true; \
+              for (const box of document.querySelectorAll('.editor [type=checkbox]')) box.checked = box.name === 'tuned_a5'")
+        .await;
+    page.fill("[name=values_a5]", "0, 0.02").await;
+    page.wait_until("document.querySelector('[data-outlook]').textContent.includes('2 of 2')").await;
+    assert_eq!(page.count("[aria-invalid]").await, 0);
+    // Nothing was made by asking.
+    assert_eq!(site.service.fetch("/api/v1/studies").await.json()["studies"].as_array().unwrap().len(), 0);
+    page.click("button[type=submit]").await;
+    page.wait_for("[data-part=state] .state.finished").await;
+    let studies = site.service.fetch("/api/v1/studies").await.json();
+    assert_eq!(studies["studies"][0]["search_space"]["dimensions"].as_array().map(Vec::len), Some(1), "{studies}");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+
+    // What waits is on the first page.
+    let page = browser.open(&site.origin).await;
+    page.click("[aria-labelledby=waits] a").await;
+    page.wait_for("input[name=answer]").await;
+    page.run("document.querySelector('input[name=answer]').focus()").await;
+    page.press("ArrowRight").await;
+    let chosen = "document.querySelector('input[name=answer]:checked')?.value ?? 'nothing'";
+    assert_eq!(page.value(chosen).await, "no_difference");
+    page.run("document.querySelector('#author').focus()").await;
+    page.type_text("K1").await;
+    assert_eq!(page.value("document.querySelector('#author').value").await, "K1");
+    page.press("Enter").await;
+    page.wait_for(".notice.good").await;
+    assert!(page.text(".notice.good").await.contains("no difference between trial"));
+
+    while site.service.trials(study).await.len() < 3 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    let plain = browser.open_without_scripts(&site.at(&format!("/studies/{study}/compare"))).await;
+    // The answers stand below the pictures of both gaits.
+    plain.resize(1280, 2000).await;
+    plain.click_plainly("input[value=b]").await;
+    plain.click_plainly("#author").await;
+    plain.type_text("K2").await;
+    plain.click_plainly("main > form button[type=submit]").await;
+    plain.wait_for(".notice.good").await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    assert_eq!(site.service.feedback(study).await.iter().filter(|row| row.author.starts_with('K')).count(), 2);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_hears_of_trials_again_after_the_service_restarted() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
+    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.wait_until("document.querySelectorAll('.trials tbody .converged').length >= 1").await;
+    let away = |_| tokio::time::sleep(Duration::from_millis(300));
+    let site = site.restart(Analytic::slow(Duration::from_millis(60)), away).await;
+    // The same page, not loaded anew.
+    page.run("window.same = true").await;
+    page.wait_for("[data-part=state] .state.finished").await;
+    assert_eq!(page.value("window.same ?? false").await, "true");
+    page.wait_until("document.querySelectorAll('.trials tbody tr').length === 6").await;
+    assert_eq!(site.service.trials(study).await.len(), 6);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_opens_ten_thousand_trials_within_a_second() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 3).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let fill = |database: PathBuf| async move { large::fill(&database, study).await };
+    let site = site.restart(Analytic::default(), fill).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let mut fastest = f64::INFINITY;
+    for _ in 0..5 {
+        page.goto(&site.at(&format!("/studies/{study}?sort=gait_rmse_rad&order=ascending"))).await;
+        let took = "(() => { const n = performance.getEntriesByType('navigation')[0]; return n.loadEventEnd - n.startTime })()";
+        page.wait_until(&format!("{took} > 0")).await;
+        fastest = fastest.min(page.value(took).await.parse().unwrap());
+    }
+    println!("{fastest:.0} ms until a study of 10,000 trials is loaded, sorted by Gait RMSE");
+    assert_eq!(page.count(".trials tbody tr").await, 200);
+    assert!(fastest < 1000.0, "{fastest} ms");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}

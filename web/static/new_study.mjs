@@ -1,0 +1,38 @@
+// @ts-check
+// Asks the service about the form while it is being filled in. What is refused here would be refused when sent, too;
+// without this script it is said then.
+
+const form = /** @type {HTMLFormElement | null} */ (document.querySelector("form[data-check]"));
+
+/** Time without typing before the service is asked, ms. */
+const PAUSE = 350;
+
+if (form) {
+  const outlook = /** @type {HTMLElement} */ (form.querySelector("[data-outlook]"));
+  let timer = 0;
+  let asked = 0;
+
+  const check = async () => {
+    const turn = (asked += 1);
+    const body = new URLSearchParams();
+    for (const [name, value] of new FormData(form)) body.append(name, String(value));
+    const answer = await fetch("/studies/new/check", { method: "POST", body }).catch(() => null);
+    // A later question has its own answer.
+    if (!answer?.ok || turn !== asked) return;
+    const { field, text } = await answer.json();
+    for (const input of form.querySelectorAll("[aria-invalid]")) input.removeAttribute("aria-invalid");
+    if (field) form.querySelector(`[name="${CSS.escape(field)}"]`)?.setAttribute("aria-invalid", "true");
+    outlook.classList.toggle("bad", Boolean(field));
+    outlook.textContent = text;
+  };
+
+  form.addEventListener("input", () => {
+    clearTimeout(timer);
+    timer = window.setTimeout(() => void check(), PAUSE);
+  });
+  // A new subject is described where it is chosen.
+  const subject = /** @type {HTMLSelectElement} */ (form.elements.namedItem("subject"));
+  const description = form.querySelector("details[data-new-subject]");
+  subject.addEventListener("change", () => description?.toggleAttribute("open", subject.value === "new"));
+  void check();
+}
