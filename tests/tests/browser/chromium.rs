@@ -3,10 +3,10 @@
 use chromiumoxide::Page;
 use chromiumoxide::browser::{Browser, BrowserConfig};
 use chromiumoxide::cdp::browser_protocol::emulation::{
-    MediaFeature, SetDeviceMetricsOverrideParams, SetEmulatedMediaParams, SetScriptExecutionDisabledParams,
-    SetTouchEmulationEnabledParams,
+    MediaFeature, SetDeviceMetricsOverrideParams, SetEmitTouchEventsForMouseParams, SetEmulatedMediaParams,
+    SetScriptExecutionDisabledParams, SetTouchEmulationEnabledParams,
 };
-use chromiumoxide::cdp::browser_protocol::input::{InsertTextParams, SynthesizeTapGestureParams};
+use chromiumoxide::cdp::browser_protocol::input::InsertTextParams;
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
 use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent, OverrideNetworkStateParams};
 use chromiumoxide::cdp::js_protocol::runtime::EventExceptionThrown;
@@ -159,7 +159,8 @@ impl Tab {
         element.scroll_into_view().await.unwrap();
         let place = element.clickable_point().await.unwrap();
         self.page.execute(SetTouchEmulationEnabledParams::new(true)).await.unwrap();
-        self.page.execute(SynthesizeTapGestureParams::new(place.x, place.y)).await.unwrap();
+        self.page.execute(SetEmitTouchEventsForMouseParams::new(true)).await.unwrap();
+        self.page.click(place).await.unwrap();
     }
 
     /// Sets what the person prefers: `prefers-color-scheme`, `prefers-reduced-motion`.
