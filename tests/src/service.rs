@@ -97,6 +97,11 @@ impl Service {
         subjects::by_pseudonym(&mut reader, "paper-1").await.unwrap().unwrap().id
     }
 
+    /// The built-in reference gait.
+    pub async fn reference(&self) -> ReferenceGaitId {
+        reference_gaits::all(&mut self.store.read().await.unwrap()).await.unwrap()[0].id
+    }
+
     /// Makes and starts a study of that subject.
     pub async fn study(&self, change: impl FnOnce(&mut NewStudy)) -> StudyId {
         let mut new = NewStudy::of(self.subject().await);

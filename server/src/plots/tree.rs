@@ -106,9 +106,8 @@ mod tests {
         fn no_two_nodes_share_a_place(choices in proptest::collection::vec(any::<Option<prop::sample::Index>>(), 1..60)) {
             let parents: Vec<Option<usize>> =
                 choices.iter().enumerate().map(|(i, c)| c.filter(|_| i > 0).map(|c| c.index(i))).collect();
-            let mut seen: Vec<(i64, i64)> =
-                places(&nodes(&parents)).iter().map(|p| (p.0 as i64, p.1 as i64)).collect();
-            seen.sort_unstable();
+            let mut seen = places(&nodes(&parents));
+            seen.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
             seen.dedup();
             prop_assert_eq!(seen.len(), parents.len());
         }

@@ -23,6 +23,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("home", "/".to_owned()),
         ("subjects", "/subjects".to_owned()),
         ("subject", format!("/subjects/{}", site.service.subject().await)),
+        ("references", "/references".to_owned()),
+        ("reference", format!("/references/{}", site.service.reference().await)),
         ("new-study", "/studies/new".to_owned()),
         ("study", format!("/studies/{study}")),
         ("belief", format!("/studies/{study}/belief?right=a5&down=a6")),

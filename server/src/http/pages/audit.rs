@@ -31,7 +31,7 @@ struct AuditPage {
 
 impl AuditPage {
     /// `study 0190...` as a link, where there is a page for it.
-    fn link(&self, row: &AuditRow) -> Option<String> {
+    fn link(row: &AuditRow) -> Option<String> {
         let (kind, id) = row.object.split_once(' ')?;
         let folder = match kind {
             "study" => "studies",

@@ -39,7 +39,7 @@ struct PeoplePage {
 }
 
 impl PeoplePage {
-    fn scopes_of(&self, token: &Token) -> String {
+    fn scopes_of(token: &Token) -> String {
         token.scopes.iter().map(|scope| scope.as_str()).collect::<Vec<_>>().join(", ")
     }
 }

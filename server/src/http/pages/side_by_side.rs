@@ -40,8 +40,8 @@ struct SideBySide {
 }
 
 impl SideBySide {
-    fn is(&self, chosen: &Option<StudyId>, study: &Study) -> bool {
-        *chosen == Some(study.id)
+    fn is(chosen: Option<&StudyId>, study: &Study) -> bool {
+        chosen == Some(&study.id)
     }
 }
 

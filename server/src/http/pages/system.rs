@@ -30,7 +30,7 @@ impl SystemPage {
     }
 
     /// `3 finished, 1 running`.
-    fn by_state(&self, counts: &[(String, i64)]) -> String {
+    fn by_state(counts: &[(String, i64)]) -> String {
         if counts.is_empty() {
             return "none".to_owned();
         }

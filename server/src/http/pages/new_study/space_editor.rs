@@ -38,24 +38,21 @@ impl SpaceEditor {
             return Err(Error::Malformed(format!("unknown field {field}")));
         }
         let defaults = TunedBounds::default().to_array();
-        let rows = TABLE_I.iter().zip(TunedBounds::MEANINGS).zip(TunedBounds::RANGES).zip(defaults);
-        let row = |((((name, values, lengthscale), meaning), (low, high)), default): (
-            ((&(&'static str, &[f64], f64), &'static str), (f64, f64)),
-            f64,
-        )| {
+        let row = |(bound, (name, values, lengthscale)): (usize, &(&'static str, &[f64], f64))| {
+            let (low, high) = TunedBounds::RANGES[bound];
             let text = |part: &str, preset: String| fields.get(&format!("{part}_{name}")).cloned().unwrap_or(preset);
             let preset: Vec<String> = values.iter().map(f64::to_string).collect();
             BoundRow {
                 name,
-                meaning,
+                meaning: TunedBounds::MEANINGS[bound],
                 allowed: format!("{low} to {high}"),
                 tuned: fields.is_empty() || fields.contains_key(&format!("tuned_{name}")),
                 values: text("values", preset.join(", ")),
                 lengthscale: text("lengthscale", lengthscale.to_string()),
-                fixed: text("fixed", default.to_string()),
+                fixed: text("fixed", defaults[bound].to_string()),
             }
         };
-        Ok(Self { rows: rows.map(row).collect() })
+        Ok(Self { rows: TABLE_I.iter().enumerate().map(row).collect() })
     }
 
     /// The search space, and the values of the bounds that are not tuned.
