@@ -9,7 +9,10 @@ if (text) {
   input.type = "file";
   input.accept = ".mot,.sto,.csv,text/plain,text/csv";
   label.append(input);
-  field.prepend(label);
+  const box = document.createElement("div");
+  box.className = "field";
+  box.append(label);
+  field.before(box);
   input.addEventListener("change", async () => {
     const [file] = input.files;
     if (!file) return;

@@ -78,12 +78,16 @@ fn rmse_chart(verdict: &Verdict, pair: &[&Outcome]) -> Chart {
     chart
 }
 
+/// The coordinates as people call them.
+const NAMES: [&str; COORDINATES.len()] = ["torso lean", "left hip", "left knee", "left ankle", "right hip"];
+
 /// Figure 3c of the paper, one coordinate.
 fn angle_chart(verdict: &Verdict, pair: &[&Outcome], coordinate: usize) -> Chart {
-    let name = COORDINATES[coordinate];
+    let name = NAMES[coordinate];
     let title = format!("Subject {}, seed {}: {name} of the best gaits", verdict.subject, verdict.seed);
-    let mut chart = Chart::new(&title, "stride, %", "angle, rad");
-    let points = |curve: &[[f64; 5]]| curve.iter().enumerate().map(|(i, a)| (i as f64, a[coordinate])).collect();
+    let mut chart = Chart::new(&title, "gait cycle from right heel strike, %", "angle, °");
+    let points =
+        |curve: &[[f64; 5]]| curve.iter().enumerate().map(|(i, a)| (i as f64, a[coordinate].to_degrees())).collect();
     if let Some(first) = pair.first() {
         chart = chart.with("reference", 3, Stroke::Dashed, points(&first.reference.0));
     }
