@@ -8,7 +8,9 @@ use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
 use gaitwright::store::trials::Trial;
-use gaitwright::store::{Store, StudyId, SubjectId, commit, feedback, studies, subjects, trials};
+use gaitwright::store::{
+    ReferenceGaitId, Store, StudyId, SubjectId, commit, feedback, reference_gaits, studies, subjects, trials,
+};
 use gaitwright::studies::catalogue;
 use gaitwright::studies::director::Director;
 use gaitwright::studies::plan::{self, NewStudy};
