@@ -131,6 +131,18 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let revoke = format!("{api}/tokens/{}/revoke", text(&token["id"]));
     scene.one(done, "post /tokens/{id}/revoke", &revoke, json!({})).await;
 
+    let mut device = service.fetch(&format!("{api}/devices")).await.json()[0]["definition"].clone();
+    device["name"] = json!("a heavier one");
+    scene.one(done, "post /devices", &format!("{api}/devices"), device).await;
+    let mut recording = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
+    for k in 0..440 {
+        let (time, swing) = (f64::from(k) / 100.0, (std::f64::consts::TAU * f64::from(k) / 110.0).cos());
+        recording +=
+            &format!("{time},0.1,{},0.4,0.05,{},{}\n", 0.2 - 0.4 * swing, 0.2 + 0.4 * swing, 0.4 - 0.35 * swing);
+    }
+    let reference = json!({"name": "R", "form": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
+    scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
+
     // Examines a real gait only; tests/certificates.rs counts its row.
     done.insert("post /trials/{id}/certificate".to_owned());
 
