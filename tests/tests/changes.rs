@@ -134,12 +134,12 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let mut device = service.fetch(&format!("{api}/devices")).await.json()[0]["definition"].clone();
     device["name"] = json!("a heavier one");
     scene.one(done, "post /devices", &format!("{api}/devices"), device).await;
-    let mut recording = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
-    for k in 0..440 {
+    let row = |k: u32| {
         let (time, swing) = (f64::from(k) / 100.0, (std::f64::consts::TAU * f64::from(k) / 110.0).cos());
-        recording +=
-            &format!("{time},0.1,{},0.4,0.05,{},{}\n", 0.2 - 0.4 * swing, 0.2 + 0.4 * swing, 0.4 - 0.35 * swing);
-    }
+        format!("{time},0.1,{},0.4,0.05,{},{}", 0.2 - 0.4 * swing, 0.2 + 0.4 * swing, 0.4 - 0.35 * swing)
+    };
+    let header = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad".to_owned();
+    let recording = std::iter::once(header).chain((0..440).map(row)).collect::<Vec<_>>().join("\n");
     let reference = json!({"name": "R", "form": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
     scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
 
