@@ -4,6 +4,7 @@ mod naturalness;
 
 pub use naturalness::Naturalness;
 
+use crate::device::Device;
 use crate::muscle::MuscleParameters;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
@@ -150,6 +151,19 @@ impl Default for GaitLimits {
 }
 
 impl GaitLimits {
+    /// Lowest and highest torque of hip_L, knee_L, ankle_L, hip_R and the prosthetic knee and ankle, N m.
+    pub fn joint_torques_n_m(&self, device: &Device) -> [(f64, f64); 6] {
+        let both = |largest: f64| (-largest, largest);
+        [
+            both(self.hip_torque_n_m),
+            both(self.knee_torque_n_m),
+            (-self.ankle_plantarflexion_torque_n_m, self.ankle_dorsiflexion_torque_n_m),
+            both(self.hip_torque_n_m),
+            both(device.knee_torque_limit_n_m),
+            both(device.ankle_torque_limit_n_m),
+        ]
+    }
+
     /// Checks every limit against its allowed range, and that bands have an interior.
     ///
     /// # Errors

@@ -35,21 +35,23 @@ fn residuals_of_the_golden_gaits() {
 /// What a solve may take that begins at its answer.
 const HANDFUL: usize = 5;
 
+/// Begins at a golden gait with the barrier at which the golden solver stopped (tolerance / 11).
+fn from_a_golden_gait() -> NlpSettings {
+    NlpSettings {
+        tolerance: 1e-6,
+        mu_initial: 1e-6 / 11.0,
+        bound_push: 1e-9,
+        bound_fraction: 1e-9,
+        bound_multiplier_start: BoundMultiplierStart::Centred,
+        ..NlpSettings::default()
+    }
+}
+
 #[test]
 fn the_solver_stays_at_the_golden_gaits() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let golden = golden(subject, muscles);
-        let settings = NlpSettings {
-            tolerance: 1e-6,
-            // The barrier at which the golden solver stopped (tolerance / 11).
-            mu_initial: 1e-6 / 11.0,
-            bound_push: 1e-9,
-            bound_fraction: 1e-9,
-            bound_multiplier_start: BoundMultiplierStart::Centred,
-            linear_solver: nlp::LinearSolver::Auto,
-            max_iterations: HANDFUL,
-            ..NlpSettings::default()
-        };
+        let settings = NlpSettings { max_iterations: HANDFUL, ..from_a_golden_gait() };
         let result =
             nlp::solve(&golden.programme, &StartPoint::Cold(golden.x.clone()), &settings, &mut |_| {}, &|| false)
                 .unwrap();
@@ -84,14 +86,7 @@ fn activations_do_not_alternate_with_the_default_weights() {
         let (problem, zigzag) = golden_gait(subject, true);
         assert!(activation_alternations(&zigzag) >= 10, "{}", activation_alternations(&zigzag));
         let golden = golden_with(&problem.settings, subject, true);
-        let settings = NlpSettings {
-            tolerance: 1e-6,
-            mu_initial: 1e-6 / 11.0,
-            bound_push: 1e-9,
-            bound_fraction: 1e-9,
-            bound_multiplier_start: BoundMultiplierStart::Centred,
-            ..NlpSettings::default()
-        };
+        let settings = from_a_golden_gait();
         let result =
             nlp::solve(&golden.programme, &StartPoint::Cold(golden.x), &settings, &mut |_| {}, &|| false).unwrap();
         assert_eq!(result.status, NlpStatus::Converged);

@@ -58,6 +58,7 @@ impl Limits {
             angle: [both(torso), both(hip), knee, both(ankle), both(hip), knee, prosthetic_ankle],
             speed,
             acceleration: bounds.a2,
+            // Written out again, as everything here: the certificate must not agree with the optimiser by construction.
             torque: [
                 both(limits.hip_torque_n_m),
                 both(limits.knee_torque_n_m),

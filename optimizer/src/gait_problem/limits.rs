@@ -92,14 +92,7 @@ pub fn variable_bounds(
         (device.ankle_min_rad.max(-ankle), device.ankle_max_rad.min(ankle)),
     ];
     let device_speed = bounds.a1.min(device.joint_speed_limit_rad_s);
-    let torque = [
-        (-limits.hip_torque_n_m, limits.hip_torque_n_m),
-        (-limits.knee_torque_n_m, limits.knee_torque_n_m),
-        (-limits.ankle_plantarflexion_torque_n_m, limits.ankle_dorsiflexion_torque_n_m),
-        (-limits.hip_torque_n_m, limits.hip_torque_n_m),
-        (-device.knee_torque_limit_n_m, device.knee_torque_limit_n_m),
-        (-device.ankle_torque_limit_n_m, device.ankle_torque_limit_n_m),
-    ];
+    let torque = limits.joint_torques_n_m(device);
     for (d, domain) in layout.domains.iter().enumerate() {
         let contacts = CYCLE[d].contact_rows();
         for k in 0..domain.points {

@@ -121,7 +121,7 @@ fn forces(cycle: &Cycle<'_>) -> Group {
 }
 
 fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
-    let limits = torque_limits(gait);
+    let limits = gait.settings.limits.joint_torques_n_m(&gait.device);
     let draw = |(joint, name): (usize, &&str)| {
         let (low, high) = limits[joint];
         // Two lines with a gap between them.
@@ -137,20 +137,6 @@ fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
     let charts = JOINTS.iter().enumerate().map(draw).collect();
     let hint = "The right knee and ankle are driven by the prosthesis, the other joints by the person.";
     Group { id: "torques", heading: "Joint torques", hint, charts }
-}
-
-/// Lowest and highest torque of each joint, N m.
-fn torque_limits(gait: &Gait) -> [(f64, f64); 6] {
-    let (limits, device) = (&gait.settings.limits, &gait.device);
-    let both = |largest: f64| (-largest, largest);
-    [
-        both(limits.hip_torque_n_m),
-        both(limits.knee_torque_n_m),
-        (-limits.ankle_plantarflexion_torque_n_m, limits.ankle_dorsiflexion_torque_n_m),
-        both(limits.hip_torque_n_m),
-        both(device.knee_torque_limit_n_m),
-        both(device.ankle_torque_limit_n_m),
-    ]
 }
 
 fn muscles(cycle: &Cycle<'_>) -> Group {
