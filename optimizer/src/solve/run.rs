@@ -134,13 +134,11 @@ impl<'a> Run<'a> {
         let plain = tracked_problem.programme(false)?.with_timing(&guess.timing.fractions());
         let postures = cold_start::posture::solve(&plain, &settings);
         let first = cold_start::motion::guess(&plain, &postures, &settings);
+        let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..NlpSettings::default() };
         let tracking_settings =
-            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..NlpSettings::default() };
-        let cost_settings = |mu_initial| NlpSettings {
-            tolerance: self.context.options.tolerance,
-            mu_initial,
-            ..NlpSettings::default()
-        };
+            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..every_phase.clone() };
+        let cost_settings =
+            |mu_initial| NlpSettings { tolerance: self.context.options.tolerance, mu_initial, ..every_phase.clone() };
         let mut tracked = self.phase(
             Phase::Tracking,
             &plain.for_tracking(TRACKING_WEIGHT),
