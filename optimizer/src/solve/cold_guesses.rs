@@ -62,6 +62,8 @@ pub struct ColdGuess {
     pub barrier: f64,
     /// Scaled violation from which on the constraints' curvature counts (`NlpSettings::curvature_from_violation`).
     pub curvature_from: f64,
+    /// Whether the cost phase may raise and lower the barrier parameter by the complementarity it meets.
+    pub adaptive_barrier: bool,
 }
 
 impl ColdGuess {
@@ -74,20 +76,23 @@ impl ColdGuess {
         timing: GuessTiming::Even,
         barrier: 1e-4,
         curvature_from: 0.03,
+        adaptive_barrier: false,
     };
     /// The basin with the lowest objective, mostly: stiff swing knee with muscles.
     pub const EARLY_RISE: Self = Self { timing: GuessTiming::EarlyRise, curvature_from: 0.3, ..Self::NATURAL };
 
-    /// The guesses of a cold start, the first [`SolveOptions::cold_guesses`](super::SolveOptions) of which are tried.
+    /// The guesses of a cold start: the first [`SolveOptions::cold_guesses`](super::SolveOptions) of them are tried, the
+    /// others one after the other only while none has converged.
     /// The timing decides the basin most (with muscles: natural or stiff swing knee), then when the curvature of the
     /// constraints counts; route, knee flexion, stride and barrier hardly matter (`examples/basins.rs`).
-    pub const CATALOGUE: [Self; 6] = [
+    pub const CATALOGUE: [Self; 7] = [
         Self::NATURAL,
         Self::EARLY_RISE,
         Self { curvature_from: WHOLE_HESSIAN, ..Self::NATURAL },
         Self { route: ColdRoute::MuscleTracking, ..Self::NATURAL },
         Self { route: ColdRoute::MuscleTracking, ..Self::EARLY_RISE },
         Self { route: ColdRoute::PlainOptimum, ..Self::NATURAL },
+        Self { adaptive_barrier: true, ..Self::NATURAL },
     ];
 
     /// Checks every field.
@@ -126,6 +131,9 @@ impl ColdGuess {
         .to_owned();
         if self.timing == GuessTiming::EarlyRise {
             label.push_str(", early rise");
+        }
+        if self.adaptive_barrier {
+            label.push_str(", adaptive barrier");
         }
         let normal = match self.timing {
             GuessTiming::Even => Self::NATURAL,
