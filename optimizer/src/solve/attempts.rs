@@ -1,6 +1,6 @@
 //! What a solve tries: a warm start, then cold guesses side by side; and which attempt is the answer.
 
-use super::cold_guesses::ColdGuess;
+use super::cold_guesses::{ColdGuess, ColdRoute};
 use super::run::{Context, Run};
 use super::{Attempt, BasinChoice, IterationRecord, SolveError, SolveStatus};
 use crate::gait::Gait;
@@ -167,7 +167,9 @@ pub(super) fn try_catalogue(
 ) -> Result<Vec<Tried>, SolveError> {
     let (first, others) = ColdGuess::CATALOGUE.split_at(context.options.cold_guesses);
     let mut tried = try_guesses(context, first, 0, observer)?;
-    for guess in others.iter().filter(|_| context.options.retry) {
+    // Without muscles all routes are one.
+    let differs = |guess: &&ColdGuess| context.problem.muscles || guess.route == ColdRoute::Direct;
+    for guess in others.iter().filter(|_| context.options.retry).filter(differs) {
         if tried.iter().any(Tried::is_final) {
             break;
         }
