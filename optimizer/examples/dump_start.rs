@@ -1,37 +1,32 @@
-//! Prints the first guess of a cold start (posture and motion, without muscles) as JSON: the scaled variables in the
-//! order of `Layout`, for solvers outside this crate that are to start from the same point.
+//! Prints the first point of a cold start (posture and motion, without muscles) as JSON: the scaled variables in the order
+//! of `Layout`, for solvers outside this crate that are to start from the same point.
 //!
-//! `cargo run --release -p gait-optimizer --example dump_start -- [--subject 1|2] [--a5 0.013]`
+//! `cargo run --release -p gait-optimizer --example dump_start -- [--subject 1|2] [--a5 0.013] [--guess 1]` (number of the
+//! guess in the catalogue)
 
-use gait_optimizer::cold_start::{GuessSettings, motion, posture};
-use gait_optimizer::gait_problem::GaitProgramme;
-use gait_optimizer::{GaitProblem, Subject};
+use gait_optimizer::{ColdGuess, GaitProblem, Subject};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut subject = 1;
     let mut a5 = 0.0;
+    let mut guess: usize = 1;
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let value = arguments.next().ok_or_else(|| format!("{argument} needs a value"))?;
         match argument.as_str() {
             "--subject" => subject = value.parse()?,
             "--a5" => a5 = value.parse()?,
+            "--guess" => guess = value.parse()?,
             other => return Err(format!("unknown argument {other}").into()),
         }
     }
+    let Some(guess) = ColdGuess::CATALOGUE.get(guess.wrapping_sub(1)) else {
+        return Err(format!("--guess: 1 to {}", ColdGuess::CATALOGUE.len()).into());
+    };
     let mut problem = GaitProblem::new(Subject::builtin(subject)?, false)?;
     problem.bounds.a5 = a5;
-    let programme = GaitProgramme::new(
-        &problem.subject,
-        &problem.device,
-        &problem.bounds,
-        false,
-        &problem.settings,
-        &problem.reference,
-    )?;
-    let guess = GuessSettings::default();
-    let x = motion::guess(&programme, &posture::solve(&programme, &guess), &guess);
-    println!("{}", serde_json::json!({ "subject": problem.subject, "bounds": problem.bounds, "start": x }));
+    let start = guess.first_point(&problem)?;
+    println!("{}", serde_json::json!({ "subject": problem.subject, "bounds": problem.bounds, "start": start }));
     Ok(())
 }

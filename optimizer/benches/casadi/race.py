@@ -116,13 +116,14 @@ def main():
     parser.add_argument("--muscles", action="store_true")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--backend", default="vm", choices=["vm", "c"])
-    parser.add_argument("--guess", type=int, default=1, help="number of our guess in the catalogue")
+    parser.add_argument("--guess", type=int, default=1, help="number of the guess in our catalogue that both start from")
     parser.add_argument("--threads", type=int, default=1, help="of ours; IPOPT's linear algebra has one")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a single run is given up")
     parser.add_argument("--json", help="file for all figures")
     arguments = parser.parse_args()
     ours = example("timed_solve")
-    start = json.loads(subprocess.check_output([example("dump_start"), "--subject", str(arguments.subject)]))
+    place = ["--subject", str(arguments.subject), "--guess", str(arguments.guess)]
+    start = json.loads(subprocess.check_output([example("dump_start"), *place]))
     runs = []
     header = {
         "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),

@@ -1,7 +1,8 @@
 //! The guesses that a cold start may begin with, several because the problem has several local optima.
 
 use super::GaitProblem;
-use crate::cold_start::GuessSettings;
+use crate::cold_start::{self, GuessSettings};
+use crate::gait_problem::GaitProgramme;
 use crate::gait_problem::programme::{EVEN_TIMING, StrideTiming};
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
@@ -108,8 +109,26 @@ impl ColdGuess {
         Ok(())
     }
 
-    pub(super) fn settings(&self) -> GuessSettings {
+    fn settings(&self) -> GuessSettings {
         GuessSettings { stride_time_s: self.stride_time_s, stride_length_m: self.stride_length_m }
+    }
+
+    /// The first point of the first phase: scaled variables without muscles, for solvers elsewhere that are to start from
+    /// the same point.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the problem is invalid.
+    pub fn first_point(&self, problem: &GaitProblem) -> Result<Vec<f64>, ModelError> {
+        Ok(self.begin(&self.tracked(problem))?.1)
+    }
+
+    /// The programme without muscles of the first phase, and its first point.
+    pub(super) fn begin(&self, tracked: &GaitProblem) -> Result<(GaitProgramme, Vec<f64>), ModelError> {
+        let settings = self.settings();
+        let plain = tracked.programme(false)?.with_timing(&self.timing.fractions());
+        let postures = cold_start::posture::solve(&plain, &settings);
+        let first = cold_start::motion::guess(&plain, &postures, &settings);
+        Ok((plain, first))
     }
 
     /// The problem whose reference is tracked.

@@ -129,11 +129,8 @@ impl<'a> Run<'a> {
     /// Tracking, with muscles by the guess's route, then cost.
     pub(super) fn cold(&mut self, guess: &ColdGuess) -> Result<NlpResult, SolveError> {
         let (problem, programme) = (self.context.problem, self.context.programme);
-        let settings = guess.settings();
         let tracked_problem = guess.tracked(problem);
-        let plain = tracked_problem.programme(false)?.with_timing(&guess.timing.fractions());
-        let postures = cold_start::posture::solve(&plain, &settings);
-        let first = cold_start::motion::guess(&plain, &postures, &settings);
+        let (plain, first) = guess.begin(&tracked_problem)?;
         let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..NlpSettings::default() };
         let tracking_settings =
             NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..every_phase.clone() };
