@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 39] = [
+const PAGES: [(&str, Option<Right>); 47] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -149,6 +149,14 @@ const PAGES: [(&str, Option<Right>); 39] = [
     ("get /rate/pair/{token}", Some(Right::Rate)),
     ("post /rate/pair/{token}", Some(Right::Rate)),
     ("post /rate/pair/{token}/take-back", Some(Right::Rate)),
+    ("get /studies/{id}/lab", Some(Right::Read)),
+    ("post /studies/{id}/lab", Some(Right::Run)),
+    ("get /lab-sessions/{id}", Some(Right::Read)),
+    ("post /lab-sessions/{id}/close", Some(Right::Run)),
+    ("post /lab-sessions/{id}/unblind", Some(Right::Administer)),
+    ("get /lab", Some(Right::Rate)),
+    ("get /lab/{id}", Some(Right::Rate)),
+    ("post /lab/{id}", Some(Right::Rate)),
     ("get /people", Some(Right::Administer)),
     ("post /people", Some(Right::Administer)),
     ("get /audit", Some(Right::Administer)),

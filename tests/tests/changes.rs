@@ -143,6 +143,14 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let reference = json!({"name": "R", "form": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
     scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
 
+    let plan = format!("{api}/studies/{finished}/lab-sessions");
+    let pair = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let session = scene.one(done, "post /studies/{id}/lab-sessions", &plan, pair).await;
+    let (session, lab) = (format!("{api}/lab-sessions/{}", text(&session["id"])), text(&session["id"]).to_owned());
+    scene.one(done, "post /lab/{id}/walks", &format!("{api}/lab/{lab}/walks"), json!({"walk": 1})).await;
+    scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
+    scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
+
     // Examines a real gait only; tests/certificates.rs counts its row.
     done.insert("post /trials/{id}/certificate".to_owned());
 

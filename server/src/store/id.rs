@@ -76,3 +76,4 @@ identifier!(JobId, "job");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(PresentationId, "presentation");
+identifier!(LabSessionId, "lab session");

@@ -5,6 +5,7 @@ use crate::site::Site;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Every page with something on it: name and address.
@@ -19,7 +20,16 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let (gait, no_gait) = (of(TrialState::Converged).unwrap(), of(TrialState::NotConverged).unwrap());
     let taken = site.service.post_text(&format!("/rate/{other}"), "application/x-www-form-urlencoded", "").await;
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
+    let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id, "notes": "treadmill, 1.1 m/s"});
+    let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
+    let session = session["id"].as_str().unwrap();
+    site.service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": 1, "note": "slow at first"})).await;
     vec![
+        ("lab-sessions", format!("/studies/{study}/lab")),
+        ("lab-session", format!("/lab-sessions/{session}")),
+        ("lab", "/lab".to_owned()),
+        ("lab-walk", format!("/lab/{session}")),
         ("home", "/".to_owned()),
         ("subjects", "/subjects".to_owned()),
         ("subject", format!("/subjects/{}", site.service.subject().await)),

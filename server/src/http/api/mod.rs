@@ -12,6 +12,7 @@ mod exports;
 mod gaits;
 pub mod health;
 mod history;
+mod lab_sessions;
 mod motion;
 mod preferences;
 mod recommendation;
@@ -86,6 +87,14 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(blind::answer))
         .routes(routes!(blind::raters))
         .routes(routes!(blind::unblind))
+        // in the lab
+        .routes(routes!(lab_sessions::of_study, lab_sessions::create))
+        .routes(routes!(lab_sessions::get))
+        .routes(routes!(lab_sessions::controller))
+        .routes(routes!(lab_sessions::close))
+        .routes(routes!(lab_sessions::unblind))
+        .routes(routes!(lab_sessions::in_the_lab))
+        .routes(routes!(lab_sessions::walk))
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))

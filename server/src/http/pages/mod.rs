@@ -12,6 +12,8 @@ mod gait;
 mod gait_charts;
 mod glossary;
 mod home;
+mod lab;
+mod lab_walk;
 mod new_study;
 mod people;
 mod rate;
@@ -54,6 +56,12 @@ pub fn routes() -> Router<AppState> {
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
         .route("/rate/pair/{token}/take-back", post(rate::take_back))
+        .route("/studies/{id}/lab", get(lab::list).post(lab::plan))
+        .route("/lab-sessions/{id}", get(lab::get))
+        .route("/lab-sessions/{id}/close", post(lab::close))
+        .route("/lab-sessions/{id}/unblind", post(lab::unblind))
+        .route("/lab", get(lab_walk::list))
+        .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/people", get(people::get).post(people::post))
         .route("/audit", get(audit::get))
         .route("/system", get(system::get))
