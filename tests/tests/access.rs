@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 47] = [
+const PAGES: [(&str, Option<Right>); 50] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -154,6 +154,9 @@ const PAGES: [(&str, Option<Right>); 47] = [
     ("get /lab-sessions/{id}", Some(Right::Read)),
     ("post /lab-sessions/{id}/close", Some(Right::Run)),
     ("post /lab-sessions/{id}/unblind", Some(Right::Administer)),
+    ("post /lab-sessions/{id}/electromyograms", Some(Right::Run)),
+    ("post /lab-sessions/{id}/motions", Some(Right::Run)),
+    ("post /lab-sessions/{id}/process", Some(Right::Run)),
     ("get /lab", Some(Right::Rate)),
     ("get /lab/{id}", Some(Right::Rate)),
     ("post /lab/{id}", Some(Right::Rate)),

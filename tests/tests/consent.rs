@@ -72,6 +72,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
         (format!("/api/v1/lab/{session}/walks"), json!({"walk": 1})),
         (format!("/api/v1/lab-sessions/{session}/close"), json!({})),
+        (format!("/api/v1/lab-sessions/{session}/emg-results"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/unblind"), json!({"reason": "r"})),
         (
             format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),

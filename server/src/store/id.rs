@@ -77,3 +77,5 @@ identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(PresentationId, "presentation");
 identifier!(LabSessionId, "lab session");
+identifier!(LabRecordingId, "recording of a lab session");
+identifier!(EmgResultId, "result of electromyograms");

@@ -19,6 +19,7 @@ mod id;
 pub mod idempotency;
 pub mod jobs;
 mod json;
+pub mod lab_recordings;
 pub mod lab_sessions;
 pub mod listing;
 mod migrations;
@@ -38,8 +39,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, FeedbackId, JobId, LabSessionId, PresentationId, ReferenceGaitId, StudyId, SubjectId, TokenId, TrialId,
-    UserId,
+    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, StudyId,
+    SubjectId, TokenId, TrialId, UserId,
 };
 pub use time::{Instant, now};
 pub use writing::Writer;

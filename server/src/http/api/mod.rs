@@ -12,6 +12,7 @@ mod exports;
 mod gaits;
 pub mod health;
 mod history;
+mod lab_recordings;
 mod lab_sessions;
 mod motion;
 mod preferences;
@@ -93,6 +94,11 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(lab_sessions::controller))
         .routes(routes!(lab_sessions::close))
         .routes(routes!(lab_sessions::unblind))
+        .routes(routes!(lab_recordings::list))
+        .routes(routes!(lab_recordings::electromyogram).layer(recordings()))
+        .routes(routes!(lab_recordings::motion).layer(recordings()))
+        .routes(routes!(lab_recordings::result, lab_recordings::process))
+        .routes(routes!(lab_recordings::limit_cycles))
         .routes(routes!(lab_sessions::in_the_lab))
         .routes(routes!(lab_sessions::walk))
         // answers

@@ -1,7 +1,9 @@
 //! Lab sessions: those of a study with the form that plans one, and each with its walks.
 
+use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::format::{self, words};
+use super::lab_charts;
 use crate::access::{Administer, Caller, Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
@@ -9,13 +11,16 @@ use crate::http::extract::{Form, Id};
 use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::http::shown::Shown;
+use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
 use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
-use crate::studies::lab::{self, Condition, NewSession, SessionView, WalkView};
+use crate::store::{Connection, LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
+use crate::studies::lab::{self, Condition, EmgView, LimitCycles, NewSession, SessionView, WalkActivity, WalkView};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::Gait;
+use gait_optimizer::emg::EmgSettings;
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -122,8 +127,71 @@ struct SessionPage {
     walks: Vec<WalkRow>,
     may_run: bool,
     may_unblind: bool,
+    /// Walks that were recorded: what is measured can be brought for them.
+    recorded: Vec<u8>,
+    recordings: Vec<LabRecording>,
+    has_emg: bool,
+    settings: EmgSettings,
+    measured: Option<Measured>,
+    portraits: Vec<Drawn>,
     refused: Option<String>,
     session: SessionView,
+}
+
+/// What was made of the electromyograms.
+struct Measured {
+    how: String,
+    walks: Vec<String>,
+    /// EMG RMSE of each muscle and in all, then the average activation of each.
+    rows: Vec<(String, Vec<String>)>,
+    /// Walk, muscle as measured, muscle of the model, RMS difference, correlation.
+    model: Vec<[String; 5]>,
+    charts: Vec<Drawn>,
+}
+
+impl Measured {
+    fn of(session: &SessionView, emg: &EmgView) -> Self {
+        let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
+        let strides = |walk: &WalkActivity| walk.channels.first().map_or(0, |channel| channel.strides).to_string();
+        let counts: Vec<String> = emg.result.walks.iter().map(strides).collect();
+        let walks = || emg.result.walks.iter();
+        let mut rows = Vec::new();
+        let channels = emg.result.walks.first().map_or(&[][..], |walk| &walk.channels);
+        for (place, channel) in channels.iter().enumerate() {
+            let name = format!("EMG RMSE, {}", lab_charts::muscle_name(&channel.channel));
+            let part = |walk: &WalkActivity| walk.emg_rmse.as_ref().and_then(|rmse| rmse.parts.get(place).copied());
+            rows.push((name, walks().map(|walk| format::figure(part(walk))).collect()));
+        }
+        let total = |walk: &WalkActivity| format::figure(walk.emg_rmse.as_ref().map(|rmse| rmse.total));
+        rows.push(("EMG RMSE in all".to_owned(), walks().map(total).collect()));
+        for (place, channel) in channels.iter().enumerate() {
+            let name = format!("average activation, {}", lab_charts::muscle_name(&channel.channel));
+            let average = |walk: &WalkActivity| format::figure(walk.averages.get(place).copied());
+            rows.push((name, walks().map(average).collect()));
+        }
+        let model = emg.model.iter().flat_map(|walk| {
+            walk.muscles.iter().map(|muscle| {
+                [
+                    lab_charts::walk_name(session, walk.walk),
+                    lab_charts::muscle_name(&muscle.channel).to_owned(),
+                    muscle.muscle.clone(),
+                    format::figure(Some(muscle.rms_difference)),
+                    muscle.correlation.map_or_else(|| "–".to_owned(), format::signed),
+                ]
+            })
+        });
+        Self {
+            how: format!(
+                "Band-pass {band_low_hz} to {band_high_hz} Hz, rectified, low-pass {envelope_hz} Hz, order {order}, all \
+                 zero-phase; mean of {} strides of the walks; in shares of the peak without the device.",
+                counts.join(", ")
+            ),
+            walks: walks().map(|walk| lab_charts::walk_name(session, walk.walk)).collect(),
+            rows,
+            model: model.collect(),
+            charts: lab_charts::electromyograms(session, emg).iter().map(|chart| Drawn::new(chart, "")).collect(),
+        }
+    }
 }
 
 /// A trial with its number.
@@ -149,6 +217,9 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, refused: Option
     let study = studies::get(&mut reader, session.study_id).await?;
     let one = trials::get(&mut reader, session.gait_one).await?.number;
     let two = trials::get(&mut reader, session.gait_two).await?.number;
+    let recordings = lab_recordings::of_session(&mut reader, id).await?;
+    let emg = lab::emg(&mut reader, id).await?;
+    let portraits = lab_charts::limit_cycles(&session, &measured_cycles(&mut reader, id).await?);
     drop(reader);
     page(&SessionPage {
         study,
@@ -161,9 +232,25 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, refused: Option
             .collect(),
         may_run: caller.may(Run::NEEDED),
         may_unblind: caller.may(Administer::NEEDED),
+        recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
+        has_emg: recordings.iter().any(|recording| recording.kind == RecordingKind::Electromyogram),
+        recordings,
+        settings: emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default(),
+        measured: emg.as_ref().map(|emg| Measured::of(&session, emg)),
+        portraits: portraits.iter().map(|chart| Drawn::new(chart, "")).collect(),
         refused,
         session,
     })
+}
+
+/// The limit cycles of each walk, with its gait where that may be known.
+async fn measured_cycles(db: &mut Connection, id: LabSessionId) -> Result<Vec<(LimitCycles, Option<Gait>)>, Error> {
+    let mut found = Vec::new();
+    for cycles in lab::limit_cycles(db, id).await? {
+        let gait = lab::known_gait(db, id, cycles.walk).await?;
+        found.push((cycles, gait));
+    }
+    Ok(found)
 }
 
 fn in_words(condition: Option<Condition>) -> &'static str {
@@ -213,7 +300,7 @@ pub(super) async fn unblind(
 }
 
 /// Shows the session anew; what was refused, with the reason.
-async fn answer(
+pub(super) async fn answer(
     app: &AppState,
     id: LabSessionId,
     caller: &Caller,

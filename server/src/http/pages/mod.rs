@@ -13,6 +13,8 @@ mod gait_charts;
 mod glossary;
 mod home;
 mod lab;
+mod lab_charts;
+mod lab_recordings;
 mod lab_walk;
 mod new_study;
 mod people;
@@ -60,6 +62,9 @@ pub fn routes() -> Router<AppState> {
         .route("/lab-sessions/{id}", get(lab::get))
         .route("/lab-sessions/{id}/close", post(lab::close))
         .route("/lab-sessions/{id}/unblind", post(lab::unblind))
+        .route("/lab-sessions/{id}/electromyograms", post(lab_recordings::electromyogram).layer(recordings()))
+        .route("/lab-sessions/{id}/motions", post(lab_recordings::motion).layer(recordings()))
+        .route("/lab-sessions/{id}/process", post(lab_recordings::process))
         .route("/lab", get(lab_walk::list))
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/people", get(people::get).post(people::post))

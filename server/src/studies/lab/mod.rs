@@ -4,8 +4,14 @@
 //! study's seed in balanced blocks and kept; it is given out by an act of an administrator alone, as in blind
 //! comparisons. What is measured is known by the number of its walk until then.
 
+mod measured;
+mod recording;
 mod session;
 
+pub use measured::{
+    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
+};
+pub use recording::{Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, keep};
 pub use session::{
     Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
     gait_of, in_the_lab, plan, record_walk, still_open, unblind,

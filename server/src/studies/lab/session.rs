@@ -226,8 +226,7 @@ pub struct InTheLab {
 /// # Errors
 /// [`Error::NotFound`], a conflict when the subject withdrew, or what the database reports.
 pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLab, Error> {
-    let session = lab_sessions::get(db, id).await?;
-    consents::may_be_shown(db, session.study_id).await?;
+    let session = still_shown(db, id).await?;
     let closed = session.done(Act::Closed).is_some();
     let walk = next_walk(&session).filter(|_| !closed);
     Ok(InTheLab { session: id, walk, walks: WALKS, closed })
@@ -274,13 +273,22 @@ pub async fn record_walk(
     in_the_lab(writer, id).await
 }
 
+/// The session, if its subject did not withdraw.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when the subject withdrew.
+pub(super) async fn still_shown(db: &mut Connection, id: LabSessionId) -> Result<LabSession, Error> {
+    let session = lab_sessions::get(db, id).await?;
+    consents::may_be_shown(db, session.study_id).await?;
+    Ok(session)
+}
+
 /// The session, if something may still be added to it.
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] when it is closed or the subject withdrew.
 pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSession, Error> {
-    let session = lab_sessions::get(writer, id).await?;
-    consents::may_be_shown(writer, session.study_id).await?;
+    let session = still_shown(writer, id).await?;
     if session.done(Act::Closed).is_some() {
         return Err(Error::conflict("the session is closed: nothing is added to it"));
     }
@@ -306,8 +314,7 @@ pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &
 /// [`Error::Invalid`] without a reason, [`Error::Conflict`] when that was told before.
 pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
     let reason = printable::reason("reason", reason, ": why blindness ends")?;
-    let session = lab_sessions::get(writer, id).await?;
-    consents::may_be_shown(writer, session.study_id).await?;
+    still_shown(writer, id).await?;
     if !lab_sessions::act(writer, actor, id, Act::Unblinded, reason).await? {
         return Err(Error::conflict("the order of this session was told before"));
     }
