@@ -95,7 +95,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
         for (method, operation) in item.as_object().unwrap() {
             let needed = &operation["security"][0]["token"];
             let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown");
+            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{file}", "a.svg");
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, "application/json", "{}").await;
                 let what = format!("{method} {path} as {who:?}: {} {}", answer.status, answer.text);
@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 50] = [
+const PAGES: [(&str, Option<Right>); 51] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -130,6 +130,7 @@ const PAGES: [(&str, Option<Right>); 50] = [
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
     ("get /studies/{id}/belief", Some(Right::Read)),
+    ("get /studies/{id}/figures", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),
     ("post /studies/{id}/compare", Some(Right::Answer)),
@@ -189,7 +190,7 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
             let (_, needed) = PAGES.iter().find(|(known, _)| *known == entry).unwrap_or_else(|| panic!("{entry}"));
             let Some(needed) = needed else { continue };
             let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown");
+            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{file}", "a.svg");
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, FORM, "").await;
                 let what = format!("{entry} as {who:?}: {}", answer.status);

@@ -13,6 +13,7 @@ use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::trials::Trial;
 use gaitwright::store::{StudyId, feedback};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -148,17 +149,10 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let session = scene.one(done, "post /studies/{id}/lab-sessions", &plan, pair).await;
     let (session, lab) = (format!("{api}/lab-sessions/{}", text(&session["id"])), text(&session["id"]).to_owned());
     scene.one(done, "post /lab/{id}/walks", &format!("{api}/lab/{lab}/walks"), json!({"walk": 1})).await;
-    let emg: String = std::iter::once("RF_L,TA_L,BF_L,GAS_L,RF_R,BF_R".to_owned())
-        .chain((0..2000).map(|k| vec![(f64::from(k * k % 97) / 50.0 - 1.0).to_string(); 6].join(",")))
-        .collect::<Vec<_>>()
-        .join("\n");
-    let reading = json!({"rate_hz": 1000.0, "heel_strikes_s": [0.2, 1.3]});
-    let emg = json!({"walk": 1, "recording": emg, "reading": reading});
+    let emg = json!({"walk": 1, "recording": electromyogram(1.0), "reading": {"heel_strike_column": "heel"}});
     scene.one(done, "post /lab-sessions/{id}/electromyograms", &format!("{session}/electromyograms"), emg).await;
     scene.one(done, "post /lab-sessions/{id}/emg-results", &format!("{session}/emg-results"), json!({})).await;
-    let row = |k: u32| format!("{},{}", f64::from(k) / 100.0, (f64::from(k) / 20.0).sin());
-    let motion = std::iter::once("time_s,knee_R_rad".to_owned()).chain((0..300).map(row)).collect::<Vec<_>>();
-    let motion = json!({"walk": 1, "recording": motion.join("\n")});
+    let motion = json!({"walk": 1, "recording": motion()});
     scene.one(done, "post /lab-sessions/{id}/motions", &format!("{session}/motions"), motion).await;
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
     scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;

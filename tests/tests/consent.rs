@@ -106,7 +106,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         let Some((of, id)) = named.iter().find(|(of, _)| path.starts_with(&format!("/api/v1{of}"))) else { continue };
         let name = of.rsplit('/').next().unwrap();
         for kind in item["get"]["responses"]["200"]["content"].as_object().unwrap().keys() {
-            let answer = service.fetch_as(&path.replace(name, id), kind).await;
+            let answer = service.fetch_as(&path.replace(name, id).replace("{file}", "a.svg"), kind).await;
             let open = path == "/api/v1/studies/{id}";
             let expected = if open { StatusCode::OK } else { StatusCode::CONFLICT };
             assert_eq!(answer.status, expected, "{path} as {kind}: {}", answer.text);
@@ -128,6 +128,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         format!("/trials/{}", trials[0].id),
         format!("/rate/pair/{token}"),
         format!("/studies/{finished}/lab"),
+        format!("/studies/{finished}/figures"),
         format!("/lab-sessions/{session}"),
         format!("/lab/{session}"),
     ] {

@@ -10,9 +10,9 @@ use gaitwright::store::trials::{Trial, TrialState};
 use gaitwright::store::{LabSessionId, Store, StudyId, archive, audit, lab_sessions};
 use gaitwright::studies::lab;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
-use std::fmt::Write;
 use tempfile::TempDir;
 
 const FORM: &str = "application/x-www-form-urlencoded";
@@ -100,7 +100,7 @@ async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
         bytes.push_str(&answer.text);
-        bytes.push_str(&format!("{:?}", answer.headers));
+        bytes.extend(answer.headers.values().map(|value| value.to_str().unwrap().to_owned()));
     }
     assert!(bytes.contains("Walk 1") && bytes.contains(id(&session)));
     let words = bytes.to_lowercase();
@@ -219,34 +219,8 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     other.close().await;
 }
 
-/// Six seconds of strides of 1.1 s at 1000 Hz: each channel a noise whose strength swings over the stride, and a switch under the
-/// right heel.
-fn electromyogram(strength: f64) -> String {
-    let mut text = "time_s,RF_L,TA_L,BF_L,GAS_L,RF_R,BF_R,heel\n".to_owned();
-    for k in 0..6000_u32 {
-        let phase = std::f64::consts::TAU * f64::from(k) / 1100.0;
-        write!(text, "{}", f64::from(k) / 1000.0).unwrap();
-        for channel in 0..6 {
-            let swing = 1.0 + (phase + f64::from(channel)).cos();
-            let carrier = (std::f64::consts::TAU * 0.083 * f64::from(k) + f64::from(channel)).sin();
-            write!(text, ",{:.6}", (if channel == 1 { strength } else { 1.0 }) * swing * carrier).unwrap();
-        }
-        writeln!(text, ",{}", u8::from(k % 1100 > 400)).unwrap();
-    }
-    text
-}
-
 /// What six decimals in the file leave.
 const ROUNDED: f64 = 1e-5;
-
-fn motion() -> String {
-    let mut text = "time_s,knee_R_rad,ankle_R_rad\n".to_owned();
-    for k in 0..1000 {
-        let phase = std::f64::consts::TAU * f64::from(k) / 110.0;
-        writeln!(text, "{},{:.6},{:.6}", f64::from(k) / 100.0, 0.4 + 0.4 * phase.cos(), 0.2 * phase.sin()).unwrap();
-    }
-    text
-}
 
 fn with_heel(walk: u8, recording: &str) -> Value {
     json!({"walk": walk, "recording": recording, "reading": {"heel_strike_column": "heel"}})

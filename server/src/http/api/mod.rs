@@ -9,6 +9,7 @@ mod comparison;
 mod devices;
 mod events;
 mod exports;
+mod figures;
 mod gaits;
 pub mod health;
 mod history;
@@ -78,6 +79,10 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(exports::controller))
         .routes(routes!(motion::get))
         .routes(routes!(certificates::get, certificates::create))
+        // figures
+        .routes(routes!(figures::of_study))
+        .routes(routes!(figures::of_trial))
+        .routes(routes!(figures::of_session))
         // scripts of the lab
         .routes(routes!(scripts::ask))
         .routes(routes!(scripts::tell))

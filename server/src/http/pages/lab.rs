@@ -2,6 +2,7 @@
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
+use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
 use crate::access::{Administer, Caller, Permission, Read, Run};
@@ -11,15 +12,15 @@ use crate::http::extract::{Form, Id};
 use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::http::shown::Shown;
+use crate::plots::Figure;
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
 use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
-use crate::studies::lab::{self, Condition, EmgView, LimitCycles, NewSession, SessionView, WalkActivity, WalkView};
+use crate::store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
+use crate::studies::lab::{self, Condition, EmgView, NewSession, SessionView, WalkActivity, WalkView};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gait_optimizer::Gait;
 use gait_optimizer::emg::EmgSettings;
 use serde::Deserialize;
 
@@ -150,7 +151,7 @@ struct Measured {
 }
 
 impl Measured {
-    fn of(session: &SessionView, emg: &EmgView) -> Self {
+    fn of(session: &SessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
         let strides = |walk: &WalkActivity| walk.channels.first().map_or(0, |channel| channel.strides).to_string();
         let counts: Vec<String> = emg.result.walks.iter().map(strides).collect();
@@ -189,7 +190,7 @@ impl Measured {
             walks: walks().map(|walk| lab_charts::walk_name(session, walk.walk)).collect(),
             rows,
             model: model.collect(),
-            charts: lab_charts::electromyograms(session, emg).iter().map(|chart| Drawn::new(chart, "")).collect(),
+            charts,
         }
     }
 }
@@ -220,6 +221,8 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, refused: Option
     let recordings = lab_recordings::of_session(&mut reader, id).await?;
     let emg = lab::emg(&mut reader, id).await?;
     let portraits = lab_charts::limit_cycles(&session, &measured_cycles(&mut reader, id).await?);
+    let files = format!("/api/v1/lab-sessions/{id}/figures");
+    let drawn = |figures: &[Figure]| figures.iter().map(|figure| Drawn::of(figure, &files, "")).collect();
     drop(reader);
     page(&SessionPage {
         study,
@@ -236,21 +239,13 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, refused: Option
         has_emg: recordings.iter().any(|recording| recording.kind == RecordingKind::Electromyogram),
         recordings,
         settings: emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default(),
-        measured: emg.as_ref().map(|emg| Measured::of(&session, emg)),
-        portraits: portraits.iter().map(|chart| Drawn::new(chart, "")).collect(),
+        measured: emg
+            .as_ref()
+            .map(|emg| Measured::of(&session, emg, drawn(&lab_charts::electromyograms(&session, emg)))),
+        portraits: drawn(&portraits),
         refused,
         session,
     })
-}
-
-/// The limit cycles of each walk, with its gait where that may be known.
-async fn measured_cycles(db: &mut Connection, id: LabSessionId) -> Result<Vec<(LimitCycles, Option<Gait>)>, Error> {
-    let mut found = Vec::new();
-    for cycles in lab::limit_cycles(db, id).await? {
-        let gait = lab::known_gait(db, id, cycles.walk).await?;
-        found.push((cycles, gait));
-    }
-    Ok(found)
 }
 
 fn in_words(condition: Option<Condition>) -> &'static str {

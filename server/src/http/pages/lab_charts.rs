@@ -1,6 +1,6 @@
 //! The charts of a lab session: muscle activity over the cycle, limit cycles.
 
-use crate::plots::{Chart, Stroke};
+use crate::plots::{Chart, Figure, Stroke};
 use crate::studies::lab::{Condition, EmgView, LimitCycles, SessionView};
 use gait_optimizer::Gait;
 use gait_optimizer::emg::CycleActivity;
@@ -38,7 +38,7 @@ pub(super) fn muscle_name(channel: &str) -> &str {
 
 /// Muscle activity over the cycle (figure 6 of the paper): a chart per channel, each walk with its deviation, the model
 /// beside it where the gait is known.
-pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Chart> {
+pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
     let Some(normal) = emg.result.walks.first() else { return Vec::new() };
     let chart = |(place, channel): (usize, &CycleActivity)| {
         let mut chart = Chart::new(
@@ -64,7 +64,7 @@ pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Chart
             let line = muscle.activation.iter().enumerate().map(|(point, value)| (point as f64, *value)).collect();
             chart = chart.with(&label, 2 + usize::from(walk.walk), Stroke::Dashed, line);
         }
-        chart
+        Figure::chart("", chart)
     };
     normal.channels.iter().enumerate().map(chart).collect()
 }
@@ -79,7 +79,7 @@ fn look(walk: u8) -> (usize, Stroke) {
 }
 
 /// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the orbit of the gait where it is known.
-pub(super) fn limit_cycles(session: &SessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Chart> {
+pub(super) fn limit_cycles(session: &SessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
     let mut charts = Vec::new();
     for (place, joint) in JOINTS.iter().enumerate() {
         for (walk, gait) in measured {
@@ -92,7 +92,7 @@ pub(super) fn limit_cycles(session: &SessionView, measured: &[(LimitCycles, Opti
             if let Some(gait) = gait {
                 chart = chart.with("orbit of the gait", 1, Stroke::Solid, orbit(gait, place + 2));
             }
-            charts.push(chart);
+            charts.push(Figure::chart("limit-cycle", chart));
         }
     }
     charts

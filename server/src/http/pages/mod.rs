@@ -7,6 +7,7 @@ mod certificate;
 mod compare;
 mod drawn;
 pub mod error;
+pub(super) mod figures;
 mod format;
 mod gait;
 mod gait_charts;
@@ -42,6 +43,7 @@ pub fn routes() -> Router<AppState> {
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
         .route("/studies/{id}/belief", get(belief::get))
+        .route("/studies/{id}/figures", get(figures::get))
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
