@@ -28,7 +28,7 @@ mod table;
 pub mod walking;
 
 pub use bounds::TunedBounds;
-pub use device::Device;
+pub use device::{Device, DeviceField};
 pub use gait::{DomainTrajectory, Gait};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};

@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 51] = [
+const PAGES: [(&str, Option<Right>); 56] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -139,6 +139,11 @@ const PAGES: [(&str, Option<Right>); 51] = [
     ("get /subjects/{id}", Some(Right::Read)),
     ("post /subjects/{id}/consent", Some(Right::Run)),
     ("post /subjects/{id}/withdraw", Some(Right::Run)),
+    ("get /subjects/{id}/muscles", Some(Right::Read)),
+    ("post /subjects/{id}/muscles", Some(Right::Run)),
+    ("get /devices", Some(Right::Read)),
+    ("get /devices/{id}", Some(Right::Read)),
+    ("post /devices/{id}", Some(Right::Run)),
     ("get /trials/{id}", Some(Right::Read)),
     ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),

@@ -80,6 +80,8 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let of_subject = format!("{api}/subjects/{}", text(&subject["id"]));
     let form = json!({"form": "version 3 of 2026-05-01"});
     scene.one(done, "post /subjects/{id}/consents", &format!("{of_subject}/consents"), form).await;
+    let stronger = json!({"sol": {"max_force_n": 4200.0}});
+    scene.one(done, "post /subjects/{id}/muscles", &format!("{of_subject}/muscles"), stronger).await;
     let why = json!({"reason": "no time"});
     scene.one(done, "post /subjects/{id}/withdraw", &format!("{of_subject}/withdraw"), why).await;
     let study = json!({"subject_id": service.subject().await, "start": false});

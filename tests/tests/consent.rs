@@ -69,6 +69,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/studies/{human}/blind/next"), json!({})),
         (format!("/api/v1/blind/{token}/answer"), json!({"answer": "first"})),
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
+        (format!("{of_subject}/muscles"), json!({})),
         (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
         (format!("/api/v1/lab/{session}/walks"), json!({"walk": 1})),
         (format!("/api/v1/lab-sessions/{session}/close"), json!({})),

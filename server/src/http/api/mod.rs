@@ -44,6 +44,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(subjects::get))
         .routes(routes!(subjects::consents, subjects::consent))
         .routes(routes!(subjects::withdraw))
+        .routes(routes!(subjects::muscles, subjects::set_muscles))
         .routes(routes!(reference_gaits::of_subject))
         .routes(routes!(devices::list, devices::create))
         .routes(routes!(devices::get))

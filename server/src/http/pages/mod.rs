@@ -5,6 +5,7 @@ mod belief;
 mod bound_use;
 mod certificate;
 mod compare;
+mod devices;
 mod drawn;
 pub mod error;
 pub(super) mod figures;
@@ -17,6 +18,7 @@ mod lab;
 mod lab_charts;
 mod lab_recordings;
 mod lab_walk;
+mod muscles;
 mod new_study;
 mod people;
 mod rate;
@@ -51,6 +53,9 @@ pub fn routes() -> Router<AppState> {
         .route("/subjects/{id}", get(subject::get))
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
+        .route("/subjects/{id}/muscles", get(muscles::get).post(muscles::post))
+        .route("/devices", get(devices::list))
+        .route("/devices/{id}", get(devices::get).post(devices::post))
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
