@@ -1,7 +1,7 @@
 //! Phase portraits of measured walking: joint angles over some seconds, each against its velocity.
 //!
 //! Velocities are central differences of the angles after a zero-phase Butterworth low-pass of order 4 (of one pass);
-//! the portrait shows the filtered angle. The first and last samples have no neighbour on one side and are left out.
+//! the portrait shows the filtered angle. Rows that are not evenly spaced are put on an even grid first, linearly. The first and last samples have no neighbour on one side and are left out.
 
 use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
@@ -14,6 +14,9 @@ use std::f64::consts::PI;
 const ORDER: usize = 4;
 /// Largest angle of a recording, rad: a wrong unit exceeds it.
 const LARGEST_ANGLE_RAD: f64 = PI;
+
+/// Longest time between two rows, s: what lies in a longer one is not known.
+const LONGEST_GAP_S: f64 = 0.05;
 
 /// The joints of the walker, as columns of our own table. Forward lean, flexion and dorsiflexion are positive, hips are
 /// measured from the trunk.
@@ -104,7 +107,14 @@ impl JointRecording {
                 return Err(malformed(what, first_line + 1 + row, None, reason));
             }
         }
-        Ok(Self { rate_hz: table.even_rate_hz(first_line)?, joints })
+        let times = table.times();
+        if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S) {
+            let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
+            return Err(malformed(what, first_line + 2 + row, Some(1), reason));
+        }
+        let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
+        let joints = joints.into_iter().map(|(joint, angles)| (joint, evenly(&times, &angles))).collect();
+        Ok(Self { rate_hz, joints })
     }
 
     /// The phase portrait of every joint; `cutoff_hz` is the edge of the low-pass.
@@ -129,4 +139,22 @@ impl JointRecording {
         };
         self.joints.iter().map(portrait).collect()
     }
+}
+
+/// A signal at as many evenly spaced times, linear between its samples.
+fn evenly(times: &[f64], signal: &[f64]) -> Vec<f64> {
+    let last = times.len() - 1;
+    let step = (times[last] - times[0]) / last as f64;
+    let mut after = 1;
+    (0..times.len())
+        .map(|k| {
+            let time = times[0] + step * k as f64;
+            while after < last && times[after] < time {
+                after += 1;
+            }
+            let (before, behind) = (times[after - 1], times[after]);
+            let share = ((time - before) / (behind - before)).clamp(0.0, 1.0);
+            signal[after - 1] + share * (signal[after] - signal[after - 1])
+        })
+        .collect()
 }

@@ -1,4 +1,4 @@
-//! Adding a subject: one way in for the form and the REST interface.
+//! Adding a subject, and what is known of the muscles: one way in for the forms and the REST interface.
 
 use crate::error::Error;
 use crate::printable;

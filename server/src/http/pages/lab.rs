@@ -14,8 +14,9 @@ use crate::http::problem::Problem;
 use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
+use crate::store::listing::{self, Listed, Listing};
 use crate::store::studies::Study;
-use crate::store::trials::{Trial, TrialState};
+use crate::store::trials::TrialState;
 use crate::store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use crate::studies::lab::{self, Condition, EmgView, NewSession, SessionView, WalkActivity, WalkView};
 use askama::Template;
@@ -24,12 +25,15 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::emg::EmgSettings;
 use serde::Deserialize;
 
+/// So many gaits are offered: those with the lowest Gait RMSE.
+const OFFERED: u32 = 200;
+
 #[derive(Template)]
 #[template(path = "lab_sessions.html")]
 struct SessionsPage {
     study: Study,
     sessions: Vec<(SessionView, String)>,
-    /// Converged trials of the study, the lowest Gait RMSE first, with what they are called.
+    /// Converged trials of the study, the lowest Gait RMSE first, as many as are offered, with what they are called.
     gaits: Vec<(TrialId, String)>,
     may_run: bool,
     fields: Fields,
@@ -71,15 +75,18 @@ async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, r
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
-    let mut converged = trials::of_study(&mut reader, id).await?;
+    let listing = Listing {
+        sort: "gait_rmse_rad",
+        descending: false,
+        state: Some(TrialState::Converged),
+        contains: String::new(),
+        limit: OFFERED,
+        offset: 0,
+    };
+    let converged = listing::of_study(&mut reader, id, &listing).await?;
     drop(reader);
-    converged.retain(|trial| trial.state == TrialState::Converged);
-    converged.sort_by(|a, b| {
-        let rmse = |trial: &Trial| trial.gait_rmse_rad.unwrap_or(f64::INFINITY);
-        rmse(a).total_cmp(&rmse(b))
-    });
     let named =
-        |trial: Trial| (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)));
+        |trial: Listed| (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)));
     let shown = |session| {
         let view = SessionView::from(&session);
         let state = words(view.state.as_str());

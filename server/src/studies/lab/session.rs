@@ -5,7 +5,9 @@ use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
 use crate::store::trials::TrialState;
-use crate::store::{Connection, Instant, LabSessionId, StudyId, TrialId, Writer, consents, studies, trials};
+use crate::store::{
+    Connection, Instant, LabSessionId, StoreError, StudyId, TrialId, Writer, consents, studies, trials,
+};
 use crate::studies::balance::comes_first;
 use crate::studies::seed::{Purpose, derive};
 use serde::{Deserialize, Serialize};
@@ -184,8 +186,12 @@ pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewS
     let seed = studies::get(writer, study).await?.plan.seed;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
     for (field, id) in [("gait_one", new.gait_one), ("gait_two", new.gait_two)] {
-        let of_study = trials::of_study(writer, study).await?;
-        if !of_study.iter().any(|trial| trial.id == id && trial.state == TrialState::Converged) {
+        let converged = match trials::get(writer, id).await {
+            Ok(trial) => trial.study_id == study && trial.state == TrialState::Converged,
+            Err(StoreError::Missing { .. }) => false,
+            Err(error) => return Err(error.into()),
+        };
+        if !converged {
             return Err(Error::invalid(field, id.to_string(), "a converged trial of this study"));
         }
     }
