@@ -60,10 +60,68 @@ pub struct Device {
     pub sources: BTreeMap<String, String>,
 }
 
+/// A number of a device: its name with its unit, what it means, and its allowed range.
+#[derive(Debug, Clone, Copy)]
+pub struct DeviceField {
+    /// As in the file: `shank_mass_kg`.
+    pub name: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Smallest allowed value.
+    pub minimum: f64,
+    /// Largest allowed value.
+    pub maximum: f64,
+    /// What a device has there.
+    pub value: fn(&Device) -> f64,
+}
+
+const fn field(
+    name: &'static str,
+    meaning: &'static str,
+    (minimum, maximum): (f64, f64),
+    value: fn(&Device) -> f64,
+) -> DeviceField {
+    DeviceField { name, meaning, minimum, maximum, value }
+}
+
 /// The built-in device file.
 const AMPRO3_JSON: &str = include_str!("../data/ampro3.json");
 
 impl Device {
+    /// Every number of a device, in the order of its file.
+    pub const FIELDS: [DeviceField; 20] = [
+        field("knee_housing_mass_kg", "mass at the prosthetic knee that moves with the thigh", (0.0, 10.0), |d| {
+            d.knee_housing_mass_kg
+        }),
+        field("knee_housing_inertia_kg_m2", "its moment of inertia about its own centre", (0.0, 0.5), |d| {
+            d.knee_housing_inertia_kg_m2
+        }),
+        field("adapter_mass_kg", "adapter midway between human and prosthetic knee", (0.0, 10.0), |d| {
+            d.adapter_mass_kg
+        }),
+        field("adapter_gyration_radius_m", "its radius of gyration", (0.0, 0.5), |d| d.adapter_gyration_radius_m),
+        field("shank_mass_kg", "prosthetic shank", (0.2, 15.0), |d| d.shank_mass_kg),
+        field("shank_length_m", "knee to ankle", (0.2, 0.6), |d| d.shank_length_m),
+        field("shank_com_fraction", "centre of mass below the knee, in shank lengths", (0.05, 0.95), |d| {
+            d.shank_com_fraction
+        }),
+        field("shank_gyration_fraction", "radius of gyration about it, in shank lengths", (0.05, 0.6), |d| {
+            d.shank_gyration_fraction
+        }),
+        field("foot_mass_kg", "foot with shoe", (0.1, 5.0), |d| d.foot_mass_kg),
+        field("foot_com_forward_m", "its centre of mass ahead of the ankle", (-0.1, 0.2), |d| d.foot_com_forward_m),
+        field("foot_com_down_m", "and below the ankle", (0.0, 0.15), |d| d.foot_com_down_m),
+        field("foot_inertia_kg_m2", "moment of inertia about it", (1e-4, 0.2), |d| d.foot_inertia_kg_m2),
+        field("ankle_height_m", "ankle above the sole", (0.01, 0.2), |d| d.ankle_height_m),
+        field("heel_behind_m", "heel contact behind the ankle", (0.01, 0.15), |d| d.heel_behind_m),
+        field("toe_ahead_m", "toe contact ahead of the ankle", (0.05, 0.3), |d| d.toe_ahead_m),
+        field("knee_torque_limit_n_m", "largest knee torque", (1.0, 500.0), |d| d.knee_torque_limit_n_m),
+        field("ankle_torque_limit_n_m", "largest ankle torque", (1.0, 500.0), |d| d.ankle_torque_limit_n_m),
+        field("joint_speed_limit_rad_s", "largest knee and ankle speed", (0.5, 50.0), |d| d.joint_speed_limit_rad_s),
+        field("ankle_min_rad", "plantarflexion stop (dorsiflexion positive)", (-1.2, -0.02), |d| d.ankle_min_rad),
+        field("ankle_max_rad", "dorsiflexion stop", (0.02, 1.2), |d| d.ankle_max_rad),
+    ];
+
     /// The AMPRO3 powered knee-ankle prosthesis (values and sources in `data/ampro3.json`).
     ///
     /// # Errors
@@ -88,30 +146,8 @@ impl Device {
     /// # Errors
     /// [`ModelError::OutOfRange`] naming the field.
     pub fn validate(&self) -> Result<(), ModelError> {
-        let checks = [
-            ("knee_housing_mass_kg", self.knee_housing_mass_kg, 0.0, 10.0),
-            ("knee_housing_inertia_kg_m2", self.knee_housing_inertia_kg_m2, 0.0, 0.5),
-            ("adapter_mass_kg", self.adapter_mass_kg, 0.0, 10.0),
-            ("adapter_gyration_radius_m", self.adapter_gyration_radius_m, 0.0, 0.5),
-            ("shank_mass_kg", self.shank_mass_kg, 0.2, 15.0),
-            ("shank_length_m", self.shank_length_m, 0.2, 0.6),
-            ("shank_com_fraction", self.shank_com_fraction, 0.05, 0.95),
-            ("shank_gyration_fraction", self.shank_gyration_fraction, 0.05, 0.6),
-            ("foot_mass_kg", self.foot_mass_kg, 0.1, 5.0),
-            ("foot_com_forward_m", self.foot_com_forward_m, -0.1, 0.2),
-            ("foot_com_down_m", self.foot_com_down_m, 0.0, 0.15),
-            ("foot_inertia_kg_m2", self.foot_inertia_kg_m2, 1e-4, 0.2),
-            ("ankle_height_m", self.ankle_height_m, 0.01, 0.2),
-            ("heel_behind_m", self.heel_behind_m, 0.01, 0.15),
-            ("toe_ahead_m", self.toe_ahead_m, 0.05, 0.3),
-            ("knee_torque_limit_n_m", self.knee_torque_limit_n_m, 1.0, 500.0),
-            ("ankle_torque_limit_n_m", self.ankle_torque_limit_n_m, 1.0, 500.0),
-            ("joint_speed_limit_rad_s", self.joint_speed_limit_rad_s, 0.5, 50.0),
-            ("ankle_min_rad", self.ankle_min_rad, -1.2, -0.02),
-            ("ankle_max_rad", self.ankle_max_rad, 0.02, 1.2),
-        ];
-        for (field, value, minimum, maximum) in checks {
-            ModelError::check_range(&format!("device.{field}"), value, minimum, maximum)?;
+        for DeviceField { name, minimum, maximum, value, .. } in &Self::FIELDS {
+            ModelError::check_range(&format!("device.{name}"), value(self), *minimum, *maximum)?;
         }
         Ok(())
     }

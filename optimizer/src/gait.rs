@@ -128,20 +128,32 @@ pub struct MuscleTrajectory {
 impl Gait {
     /// Coordinates at a time of the stride, s, linear between mesh points; clamped to the stride.
     pub fn coordinates_at(&self, time_s: f64) -> [f64; 9] {
-        let mut result = [0.0; 9];
+        self.between(time_s, |domain| Some(&domain.q)).unwrap_or([0.0; 9])
+    }
+
+    /// Activations of the ten muscles at a time of the stride, s, linear between mesh points; none without muscles.
+    pub fn activations_at(&self, time_s: f64) -> Option<[f64; 10]> {
+        self.between(time_s, |domain| domain.muscles.as_ref().map(|muscles| &muscles.activation))
+    }
+
+    /// What the mesh points have at a time of the stride.
+    fn between<const N: usize>(
+        &self,
+        time_s: f64,
+        values: impl Fn(&DomainTrajectory) -> Option<&Vec<[f64; N]>>,
+    ) -> Option<[f64; N]> {
+        let mut last = None;
         for domain in &self.domains {
+            let values = values(domain)?;
             for k in 1..domain.time_s.len() {
                 let (before, after) = (domain.time_s[k - 1], domain.time_s[k]);
                 if time_s <= after || after <= before {
                     let share = ((time_s - before) / (after - before)).clamp(0.0, 1.0);
-                    for i in 0..9 {
-                        result[i] = domain.q[k - 1][i] + share * (domain.q[k][i] - domain.q[k - 1][i]);
-                    }
-                    return result;
+                    return Some(std::array::from_fn(|i| values[k - 1][i] + share * (values[k][i] - values[k - 1][i])));
                 }
-                result = domain.q[k];
+                last = Some(values[k]);
             }
         }
-        result
+        last
     }
 }

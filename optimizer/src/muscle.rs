@@ -5,5 +5,5 @@ pub mod parameters;
 pub mod unit;
 
 pub use curves::{CurveValue, force_length, force_velocity, tendon_force};
-pub use parameters::{MuscleOverride, MuscleParameters};
+pub use parameters::{MuscleField, MuscleOverride, MuscleParameters};
 pub use unit::{Attachment, MUSCLE_COUNT, MUSCLES, Muscle};

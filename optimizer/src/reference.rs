@@ -7,9 +7,11 @@ mod matching;
 mod recording;
 mod strides;
 
+pub use crate::opensim::AngleUnit;
 pub use matching::{distance, nearest};
-pub use recording::{AngleUnit, Recording};
+pub use recording::Recording;
 pub use strides::{HeelStrikes, STRIDE_RANGE_S, Walker};
+pub(crate) use strides::{contacts, given};
 
 /// The built-in reference (citation, licence and processing in its header).
 const BUILTIN_CSV: &str = include_str!("../data/reference_gait.csv");

@@ -2,16 +2,30 @@
 
 use crate::subject::ModelError;
 
-/// Named columns of equal length; the first is the time, s, strictly increasing.
+/// Named columns of equal length over time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Table {
     what: String,
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
+    /// Rows per second, where no column has the time.
+    rate_hz: Option<f64>,
+}
+
+/// Where the time of a row comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Clock<'a> {
+    /// The first column, which has this name: s, strictly increasing.
+    Column(&'a str),
+    /// No column: so many rows per second, the first at 0 s.
+    Rate(f64),
 }
 
 /// Fewest rows of a table over time.
 const FEWEST_ROWS: usize = 20;
+
+/// Largest deviation of a sample from its place on an even grid, sampling intervals.
+const UNEVENNESS: f64 = 0.5;
 
 /// What separates the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,14 +53,16 @@ impl Table {
         lines: &[&str],
         first_line: usize,
         separator: Separator,
-        time_name: &str,
+        clock: Clock<'_>,
     ) -> Result<Self, ModelError> {
         let malformed = |line: usize, reason: String| malformed(what, line, None, reason);
         let names: Vec<String> = match lines.first() {
             Some(line) => separator.split(line).into_iter().map(str::to_owned).collect(),
             None => return Err(malformed(first_line, "the line of column names is missing".to_owned())),
         };
-        if names.first().map(String::as_str) != Some(time_name) {
+        if let Clock::Column(time_name) = clock
+            && names.first().map(String::as_str) != Some(time_name)
+        {
             let found = names.first().map_or("", String::as_str);
             return Err(malformed(first_line, format!("the first column is {found:?}, expected {time_name:?}")));
         }
@@ -57,7 +73,8 @@ impl Table {
         }
         let body = &lines[1..];
         let filled = body.iter().rposition(|line| !line.trim().is_empty()).map_or(0, |last| last + 1);
-        let mut table = Self { what: what.to_owned(), names, rows: Vec::with_capacity(filled) };
+        let rate_hz = if let Clock::Rate(rate_hz) = clock { Some(rate_hz) } else { None };
+        let mut table = Self { what: what.to_owned(), names, rows: Vec::with_capacity(filled), rate_hz };
         for (index, line) in body[..filled].iter().enumerate() {
             table.add_row(first_line + 1 + index, &separator.split(line))?;
         }
@@ -81,7 +98,7 @@ impl Table {
             })?;
             row.push(value);
         }
-        if let Some(before) = self.rows.last()
+        if let Some(before) = self.rows.last().filter(|_| self.rate_hz.is_none())
             && row[0] <= before[0]
         {
             let reason = format!("the time {} does not follow {}", row[0], before[0]);
@@ -101,14 +118,32 @@ impl Table {
         self.names.len()
     }
 
-    /// Names of the columns, that of the time first.
+    /// Names of the columns, without that of the time.
     pub(crate) fn names(&self) -> &[String] {
-        &self.names
+        if self.rate_hz.is_some() { &self.names } else { &self.names[1..] }
     }
 
     /// The times, s.
     pub(crate) fn times(&self) -> Vec<f64> {
-        self.rows.iter().map(|row| row[0]).collect()
+        match self.rate_hz {
+            Some(rate_hz) => (0..self.rows.len()).map(|row| row as f64 / rate_hz).collect(),
+            None => self.rows.iter().map(|row| row[0]).collect(),
+        }
+    }
+
+    /// Samples per second of an evenly sampled table; `first_line` is the line of its names.
+    pub(crate) fn even_rate_hz(&self, first_line: usize) -> Result<f64, ModelError> {
+        let times = self.times();
+        let start_s = times[0];
+        let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - start_s);
+        let uneven = |(k, time): (usize, &f64)| ((time - start_s) * rate_hz - k as f64).abs() > UNEVENNESS;
+        match times.iter().enumerate().position(uneven) {
+            None => Ok(rate_hz),
+            Some(k) => {
+                let reason = format!("{} s is not on an even grid of {rate_hz:.3} samples per second", times[k]);
+                Err(malformed(&self.what, first_line + 1 + k, Some(1), reason))
+            }
+        }
     }
 
     /// A column by name, if it is there.

@@ -4,9 +4,11 @@ pub mod bezier;
 pub mod domain;
 pub mod impact;
 pub mod phase;
+mod progress;
 pub mod stick_figure;
 
 pub use bezier::{BEZIER_COEFFICIENTS, BEZIER_DEGREE, basis};
 pub use domain::{CYCLE, ContactRow, Domain, DomainKind};
 pub use impact::{Impact, impact, kinetic_energy};
 pub use phase::phase_gradient;
+pub use progress::{Progress, progress};

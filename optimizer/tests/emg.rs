@@ -2,8 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod golden_gaits;
+
 use gait_optimizer::ModelError;
-use gait_optimizer::emg::{CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope, emg_rmse};
+use gait_optimizer::emg::{CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope, emg_rmse, model_activity};
+use golden_gaits::golden_gait;
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -88,7 +91,9 @@ fn emg_rmse_is_what_the_hand_computes() {
     let mut gait = [flat("BF", 0.55), flat("TA", 0.5)];
     gait[1].mean[..51].fill(0.7);
     let by_hand = (51.0 / 101.0_f64).sqrt() * 0.2 + 0.3;
-    assert!((emg_rmse(&gait, &normal).unwrap() - by_hand).abs() < 1e-12);
+    assert!((emg_rmse(&gait, &normal).unwrap().total - by_hand).abs() < 1e-12);
+    let parts = emg_rmse(&gait, &normal).unwrap().parts;
+    assert!((parts[0] - (51.0 / 101.0_f64).sqrt() * 0.2).abs() < 1e-12 && (parts[1] - 0.3).abs() < 1e-12);
     assert!(matches!(emg_rmse(&gait[..1], &normal), Err(ModelError::Unknown { value, .. }) if value == "TA"));
 
     let walked = flat("TA", 0.6).normalised_by(&normal[0]).unwrap();
@@ -104,7 +109,7 @@ fn tables_are_read_strictly() {
             writeln!(text, "{},0.{k},1", f64::from(k) / 1000.0).unwrap();
         }
         change(&mut text);
-        EmgRecording::from_csv("emg.csv", &text)
+        EmgRecording::from_csv("emg.csv", &text, None)
     };
     let whole = table(&|_| {}).unwrap();
     assert!((whole.rate_hz - 1000.0).abs() < 1e-6);
@@ -118,4 +123,66 @@ fn tables_are_read_strictly() {
         let refusal = table(&|text| *text = text.replace(from, to)).unwrap_err().to_string();
         assert!(refusal.contains(expected), "{refusal}");
     }
+}
+
+#[test]
+fn a_table_without_time_needs_its_rate_and_strikes_are_read_off_a_switch() {
+    let mut text = "EMG 1,switch\n".to_owned();
+    for k in 0..2500 {
+        // Down from 0.3 s, 1.4 s, 2.5 s on, for 0.6 s each.
+        let down = k >= 300 && (k - 300) % 1100 < 600;
+        writeln!(text, "0.5,{}", u8::from(down)).unwrap();
+    }
+    let recording = EmgRecording::from_csv("emg.csv", &text, Some(1000.0)).unwrap();
+    assert!((recording.rate_hz - 1000.0).abs() < 1e-9 && (recording.end_s() - 2.499).abs() < 1e-9);
+    let strikes = recording.strikes_of_column("emg.csv", "switch", 0.5).unwrap();
+    assert_eq!(strikes.len(), 2, "{strikes:?}");
+    for (strike, expected) in strikes.iter().zip([0.2995, 1.3995]) {
+        assert!((strike - expected).abs() < 1e-9, "{strike}");
+    }
+    let chosen = recording.select("emg.csv", [("TA_L", "EMG 1")]).unwrap();
+    assert_eq!(chosen.channels, [("TA_L".to_owned(), vec![0.5; 2500])]);
+    let refusals = [
+        EmgRecording::from_csv("emg.csv", &text, None).unwrap_err().to_string(),
+        EmgRecording::from_csv("emg.csv", &text, Some(1.0)).unwrap_err().to_string(),
+        recording.select("emg.csv", [("TA_L", "TA")]).unwrap_err().to_string(),
+        recording.strikes_of_column("emg.csv", "EMG 1", 0.9).unwrap_err().to_string(),
+        recording.check_strikes("emg.csv", &[0.3, 9.0]).unwrap_err().to_string(),
+    ];
+    for (refusal, expected) in refusals.iter().zip([
+        "expected \"time_s\"",
+        "rate_hz = 1 is outside the allowed range [100, 20000]",
+        "column \"TA\" is missing; there are EMG 1, switch",
+        "rises 0 times above 0.9",
+        "heel strike (s) = 9",
+    ]) {
+        assert!(refusal.contains(expected), "{refusal}");
+    }
+}
+
+#[test]
+fn columns_of_an_opensim_file_are_channels() {
+    let mut text = "emg\nversion=1\nnRows=40\nnColumns=2\nendheader\ntime TA\n".to_owned();
+    for k in 0..40 {
+        writeln!(text, "{}\t0.{k}", f64::from(k) / 1000.0).unwrap();
+    }
+    let recording = EmgRecording::from_opensim("emg.sto", &text).unwrap();
+    assert_eq!(recording.channels[0].0, "TA");
+    let half = EmgRecording::from_opensim("emg.sto", &text.replace("nRows=40", "nRows=41")).unwrap_err().to_string();
+    assert!(half.contains("emg.sto, line 3: nRows=41, but there are 40: the file is not whole"), "{half}");
+}
+
+#[test]
+fn the_model_is_held_against_a_channel_where_it_has_the_muscle() {
+    let (_, gait) = golden_gait(1, true);
+    let sole = |channel: &str| model_activity(&gait, &flat(channel, 0.5));
+    assert!(sole("RF_L").is_none() && sole("SOL_L").is_none(), "the model has no rectus femoris");
+    let biceps = sole("BF_R").unwrap();
+    assert_eq!((biceps.muscle.as_str(), biceps.activation.len(), biceps.correlation), ("HAM_R", CYCLE_POINTS, None));
+    let first = gait.domains[0].muscles.as_ref().unwrap().activation[0][7];
+    assert!((biceps.activation[0] - first).abs() < 1e-12);
+    let mut same = flat("BF_R", 0.0);
+    same.mean.clone_from(&biceps.activation);
+    let against_itself = model_activity(&gait, &same).unwrap();
+    assert!(against_itself.rms_difference < 1e-12 && (against_itself.correlation.unwrap() - 1.0).abs() < 1e-12);
 }

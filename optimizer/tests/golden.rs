@@ -7,6 +7,7 @@ mod golden_gaits;
 use gait_optimizer::gait_problem::gait_of;
 use gait_optimizer::metrics::{activation_alternations, gait_rmse};
 use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
+use gait_optimizer::walking::{CYCLE, progress};
 use gait_optimizer::{
     CancelToken, ColdGuess, GaitProblem, GaitSettings, SolveOptions, SolveStatus, Subject, solve_from_guesses,
 };
@@ -79,6 +80,28 @@ fn gait_rmse_of_the_golden_gaits() {
         for (ours, theirs) in rmse.parts.iter().zip(numbers(&golden.data["gait_rmse_parts"])) {
             assert!((ours - theirs).abs() < 1e-9, "{ours} {theirs}");
         }
+    }
+}
+
+/// In every domain the phase goes from 0 to 1, and the hip goes at the velocity that the virtual constraints hold.
+#[test]
+fn phase_and_hip_velocity_of_the_golden_gaits() {
+    for (subject, muscles) in [(1, false), (2, true)] {
+        let (_, gait) = golden_gait(subject, muscles);
+        let made = progress(&gait).unwrap();
+        let mut made = &made[..];
+        for (domain, trajectory) in CYCLE.iter().zip(&gait.domains) {
+            let points;
+            (points, made) = made.split_at(trajectory.q.len());
+            let (first, last) = (points[0].phase, points[points.len() - 1].phase);
+            assert!(first.abs() < 1e-5 && (last - 1.0).abs() < 1e-5, "{}: {first} {last}", trajectory.name);
+            let Some(index) = domain.hip_velocity_index() else { continue };
+            for point in points {
+                let off = point.hip_velocity_m_s - gait.hip_velocity_m_s[index];
+                assert!(off.abs() < 1e-5, "{}: {off} m/s", trajectory.name);
+            }
+        }
+        assert!(made.is_empty());
     }
 }
 

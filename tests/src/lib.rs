@@ -9,4 +9,5 @@ pub mod broker;
 pub mod cli;
 pub mod client;
 pub mod large;
+pub mod measured;
 pub mod service;

@@ -95,7 +95,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
         for (method, operation) in item.as_object().unwrap() {
             let needed = &operation["security"][0]["token"];
             let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown");
+            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{file}", "a.svg");
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, "application/json", "{}").await;
                 let what = format!("{method} {path} as {who:?}: {} {}", answer.status, answer.text);
@@ -121,7 +121,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 39] = [
+const PAGES: [(&str, Option<Right>); 56] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -130,6 +130,7 @@ const PAGES: [(&str, Option<Right>); 39] = [
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
     ("get /studies/{id}/belief", Some(Right::Read)),
+    ("get /studies/{id}/figures", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),
     ("post /studies/{id}/compare", Some(Right::Answer)),
@@ -138,6 +139,11 @@ const PAGES: [(&str, Option<Right>); 39] = [
     ("get /subjects/{id}", Some(Right::Read)),
     ("post /subjects/{id}/consent", Some(Right::Run)),
     ("post /subjects/{id}/withdraw", Some(Right::Run)),
+    ("get /subjects/{id}/muscles", Some(Right::Read)),
+    ("post /subjects/{id}/muscles", Some(Right::Run)),
+    ("get /devices", Some(Right::Read)),
+    ("get /devices/{id}", Some(Right::Read)),
+    ("post /devices/{id}", Some(Right::Run)),
     ("get /trials/{id}", Some(Right::Read)),
     ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),
@@ -149,6 +155,17 @@ const PAGES: [(&str, Option<Right>); 39] = [
     ("get /rate/pair/{token}", Some(Right::Rate)),
     ("post /rate/pair/{token}", Some(Right::Rate)),
     ("post /rate/pair/{token}/take-back", Some(Right::Rate)),
+    ("get /studies/{id}/lab", Some(Right::Read)),
+    ("post /studies/{id}/lab", Some(Right::Run)),
+    ("get /lab-sessions/{id}", Some(Right::Read)),
+    ("post /lab-sessions/{id}/close", Some(Right::Run)),
+    ("post /lab-sessions/{id}/unblind", Some(Right::Administer)),
+    ("post /lab-sessions/{id}/electromyograms", Some(Right::Run)),
+    ("post /lab-sessions/{id}/motions", Some(Right::Run)),
+    ("post /lab-sessions/{id}/process", Some(Right::Run)),
+    ("get /lab", Some(Right::Rate)),
+    ("get /lab/{id}", Some(Right::Rate)),
+    ("post /lab/{id}", Some(Right::Rate)),
     ("get /people", Some(Right::Administer)),
     ("post /people", Some(Right::Administer)),
     ("get /audit", Some(Right::Administer)),
@@ -178,7 +195,7 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
             let (_, needed) = PAGES.iter().find(|(known, _)| *known == entry).unwrap_or_else(|| panic!("{entry}"));
             let Some(needed) = needed else { continue };
             let method: Method = method.to_uppercase().parse().unwrap();
-            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown");
+            let address = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{file}", "a.svg");
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, FORM, "").await;
                 let what = format!("{entry} as {who:?}: {}", answer.status);

@@ -13,6 +13,7 @@ use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::trials::Trial;
 use gaitwright::store::{StudyId, feedback};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -79,6 +80,8 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let of_subject = format!("{api}/subjects/{}", text(&subject["id"]));
     let form = json!({"form": "version 3 of 2026-05-01"});
     scene.one(done, "post /subjects/{id}/consents", &format!("{of_subject}/consents"), form).await;
+    let stronger = json!({"sol": {"max_force_n": 4200.0}});
+    scene.one(done, "post /subjects/{id}/muscles", &format!("{of_subject}/muscles"), stronger).await;
     let why = json!({"reason": "no time"});
     scene.one(done, "post /subjects/{id}/withdraw", &format!("{of_subject}/withdraw"), why).await;
     let study = json!({"subject_id": service.subject().await, "start": false});
@@ -142,6 +145,19 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let recording = std::iter::once(header).chain((0..440).map(row)).collect::<Vec<_>>().join("\n");
     let reference = json!({"name": "R", "form": "csv", "recording": recording, "height_m": 1.7, "body_mass_kg": 66});
     scene.one(done, "post /reference-gaits", &format!("{api}/reference-gaits"), reference).await;
+
+    let plan = format!("{api}/studies/{finished}/lab-sessions");
+    let pair = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let session = scene.one(done, "post /studies/{id}/lab-sessions", &plan, pair).await;
+    let (session, lab) = (format!("{api}/lab-sessions/{}", text(&session["id"])), text(&session["id"]).to_owned());
+    scene.one(done, "post /lab/{id}/walks", &format!("{api}/lab/{lab}/walks"), json!({"walk": 1})).await;
+    let emg = json!({"walk": 1, "recording": electromyogram(1.0), "reading": {"heel_strike_column": "heel"}});
+    scene.one(done, "post /lab-sessions/{id}/electromyograms", &format!("{session}/electromyograms"), emg).await;
+    scene.one(done, "post /lab-sessions/{id}/emg-results", &format!("{session}/emg-results"), json!({})).await;
+    let motion = json!({"walk": 1, "recording": motion()});
+    scene.one(done, "post /lab-sessions/{id}/motions", &format!("{session}/motions"), motion).await;
+    scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
+    scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
 
     // Examines a real gait only; tests/certificates.rs counts its row.
     done.insert("post /trials/{id}/certificate".to_owned());

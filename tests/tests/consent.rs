@@ -37,6 +37,10 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
     let empty = service.post(&format!("{of_subject}/withdraw"), &json!({"reason": " "})).await;
     assert_eq!(empty.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let converged = service.trials(finished).await;
+    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
+    let session = service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
+    let session = session["id"].as_str().unwrap().to_owned();
     let before = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap().len();
     let withdraw = json!({"reason": "moved away"});
     let withdrawn = service.post(&format!("{of_subject}/withdraw"), &withdraw).await;
@@ -65,6 +69,12 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/studies/{human}/blind/next"), json!({})),
         (format!("/api/v1/blind/{token}/answer"), json!({"answer": "first"})),
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
+        (format!("{of_subject}/muscles"), json!({})),
+        (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
+        (format!("/api/v1/lab/{session}/walks"), json!({"walk": 1})),
+        (format!("/api/v1/lab-sessions/{session}/close"), json!({})),
+        (format!("/api/v1/lab-sessions/{session}/emg-results"), json!({})),
+        (format!("/api/v1/lab-sessions/{session}/unblind"), json!({"reason": "r"})),
         (
             format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),
             json!({"outcome": "converged", "gait_rmse_rad": 0.2}),
@@ -88,6 +98,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         ("/trials/{id}", trials[0].id.to_string()),
         ("/preferences/{id}", heard_id.to_string()),
         ("/blind/{token}", token.clone()),
+        ("/lab/{id}", session.clone()),
+        ("/lab-sessions/{id}", session.clone()),
     ];
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut closed = 0;
@@ -95,7 +107,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         let Some((of, id)) = named.iter().find(|(of, _)| path.starts_with(&format!("/api/v1{of}"))) else { continue };
         let name = of.rsplit('/').next().unwrap();
         for kind in item["get"]["responses"]["200"]["content"].as_object().unwrap().keys() {
-            let answer = service.fetch_as(&path.replace(name, id), kind).await;
+            let answer = service.fetch_as(&path.replace(name, id).replace("{file}", "a.svg"), kind).await;
             let open = path == "/api/v1/studies/{id}";
             let expected = if open { StatusCode::OK } else { StatusCode::CONFLICT };
             assert_eq!(answer.status, expected, "{path} as {kind}: {}", answer.text);
@@ -116,6 +128,10 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         format!("/studies/{finished}/compare"),
         format!("/trials/{}", trials[0].id),
         format!("/rate/pair/{token}"),
+        format!("/studies/{finished}/lab"),
+        format!("/studies/{finished}/figures"),
+        format!("/lab-sessions/{session}"),
+        format!("/lab/{session}"),
     ] {
         let refused = service.fetch(&path).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}");

@@ -148,6 +148,8 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
         ("trial_budget", "-1", "allowed: 1 to 10000"),
         ("parallel_trials", "1.5", "allowed: 1 to 64"),
         ("seed", "-1", "allowed: 0 to 9007199254740991"),
+        ("basin_within_percent", "101", "basin_within_percent: \"101\" is not accepted; allowed: 0 to 100, or nothing"),
+        ("basin_within_percent", "all", "allowed: 0 to 100, or nothing"),
         ("subject", "paper-1", "a subject of the list"),
         ("pseudonym", "S09", "A new subject"),
         ("height_m", "1.8", "A new subject"),
@@ -157,6 +159,13 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
     is_page(&send(("colour", "red")).await, StatusCode::BAD_REQUEST, "colour");
     assert_eq!(service.fetch("/api/v1/studies").await.json()["studies"], json!([]), "nothing was started");
     assert_eq!(send(("muscles", "on")).await.status, StatusCode::SEE_OTHER);
+    let lowest = json!("lowest_objective");
+    let nearest = json!({"nearest_to_reference": {"within_percent": 5.0}});
+    assert_eq!(send(("basin_within_percent", "5")).await.status, StatusCode::SEE_OTHER);
+    let made = service.fetch("/api/v1/studies").await.json();
+    for (study, expected) in made["studies"].as_array().unwrap().iter().zip([nearest, lowest]) {
+        assert_eq!(study["solve_options"]["basin_choice"], expected, "{study}");
+    }
     service.stop().await;
 }
 

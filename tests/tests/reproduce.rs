@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gaitwright::store::studies::StudyState;
+use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
+use gaitwright_tests::service::Service;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
@@ -20,6 +23,30 @@ fn nonsense_is_refused_before_anything_is_solved() {
         assert!(text.contains(expected), "{text}");
     }
     assert!(cli::files(folder.path()).is_empty());
+}
+
+#[tokio::test]
+async fn trials_that_failed_are_told_and_end_with_a_code_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let solver = Analytic { panics: vec![2], ..Analytic::default() };
+    let service = Service::start(&out.join("studies.db"), solver, 1).await;
+    for muscles in [false, true] {
+        let study = service.study(|new| (new.trial_budget, new.muscles) = (3, muscles)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+    }
+    service.stop().await;
+    let arguments = ["reproduce", "--subject", "1", "--trials", "3", "--seeds", "1", "--folder", "out"];
+    let output = cli::run(BINARY, folder.path(), &arguments);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    for variant in ["without", "with"] {
+        let told =
+            format!("gaitwright: subject 1, {variant} muscles, seed 1: 1 of 3 trials failed; the last, trial 2: ");
+        assert!(text.contains(&told), "{text}");
+    }
+    assert!(out.join("report.html").exists());
 }
 
 #[test]

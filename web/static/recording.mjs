@@ -1,8 +1,7 @@
 // Lets a recording be chosen as a file: its text goes into the field that works without scripts, too.
 
-const field = document.querySelector("[data-recording]");
-const text = field?.querySelector("textarea");
-if (text) {
+for (const field of document.querySelectorAll("[data-recording]")) {
+  const text = field.querySelector("textarea");
   const label = document.createElement("label");
   label.textContent = "File";
   const input = document.createElement("input");
@@ -18,6 +17,6 @@ if (text) {
     if (!file) return;
     text.value = await file.text();
     const name = document.querySelector("#name");
-    if (!name.value) name.value = file.name.replace(/\.[^.]*$/, "");
+    if (name && !name.value) name.value = file.name.replace(/\.[^.]*$/, "");
   });
 }

@@ -78,13 +78,22 @@ impl CycleActivity {
     }
 }
 
+/// EMG RMSE of a gait and its parts, in shares of the peak of normal walking.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EmgRmse {
+    /// Sum of the parts.
+    pub total: f64,
+    /// RMS difference of each channel of normal walking, in its order.
+    pub parts: Vec<f64>,
+}
+
 /// EMG RMSE of a gait against normal walking: `sum_i sqrt(mean((s_i - n_i)^2))` over the channels of normal walking.
 /// (The paper prints the square only on the outside; without one inside, the mean may be negative.)
 ///
 /// # Errors
 /// [`ModelError::Unknown`] for a channel that the gait lacks.
-pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<f64, ModelError> {
-    normal_walking
+pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<EmgRmse, ModelError> {
+    let parts: Vec<f64> = normal_walking
         .iter()
         .map(|normal| {
             let same = gait.iter().find(|activity| activity.channel == normal.channel);
@@ -96,5 +105,6 @@ pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Res
             let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
             Ok((squares / normal.mean.len() as f64).sqrt())
         })
-        .sum()
+        .collect::<Result<_, ModelError>>()?;
+    Ok(EmgRmse { total: parts.iter().sum(), parts })
 }

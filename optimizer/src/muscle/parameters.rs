@@ -35,6 +35,90 @@ pub struct MuscleOverride {
     pub ankle_lever_m: Option<f64>,
 }
 
+/// A number of a kind of muscle: its name with its unit, what it means, and its allowed range.
+#[derive(Debug, Clone, Copy)]
+pub struct MuscleField {
+    /// As in a document: `max_force_n`.
+    pub name: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Smallest allowed value.
+    pub minimum: f64,
+    /// Largest allowed value.
+    pub maximum: f64,
+    /// What a person has of one's own.
+    pub given: fn(&MuscleOverride) -> Option<f64>,
+    /// What a muscle has; none: it does not span that joint.
+    pub value: fn(&Muscle) -> Option<f64>,
+}
+
+impl MuscleOverride {
+    /// Every number, in order.
+    pub const FIELDS: [MuscleField; 7] = [
+        MuscleField {
+            name: "max_force_n",
+            meaning: "maximum isometric force, N",
+            minimum: 50.0,
+            maximum: 20_000.0,
+            given: |given| given.max_force_n,
+            value: |muscle| Some(muscle.max_force_n),
+        },
+        MuscleField {
+            name: "max_speed",
+            meaning: "maximum shortening speed, optimal lengths per second",
+            minimum: 2.0,
+            maximum: 30.0,
+            given: |given| given.max_speed,
+            value: |muscle| Some(muscle.max_speed),
+        },
+        MuscleField {
+            name: "optimal_length_m",
+            meaning: "optimal fibre length, m",
+            minimum: 0.01,
+            maximum: 0.3,
+            given: |given| given.optimal_length_m,
+            value: |muscle| Some(muscle.optimal_length_m),
+        },
+        MuscleField {
+            name: "slack_length_m",
+            meaning: "tendon slack length, m",
+            minimum: 0.02,
+            maximum: 0.8,
+            given: |given| given.slack_length_m,
+            value: |muscle| Some(muscle.slack_length_m),
+        },
+        MuscleField {
+            name: "hip_lever_m",
+            meaning: "largest lever arm at the hip, m",
+            minimum: 0.005,
+            maximum: 0.2,
+            given: |given| given.hip_lever_m,
+            value: |muscle| lever(muscle, Joint::Hip),
+        },
+        MuscleField {
+            name: "knee_lever_m",
+            meaning: "largest lever arm at the knee, m",
+            minimum: 0.005,
+            maximum: 0.2,
+            given: |given| given.knee_lever_m,
+            value: |muscle| lever(muscle, Joint::Knee),
+        },
+        MuscleField {
+            name: "ankle_lever_m",
+            meaning: "largest lever arm at the ankle, m",
+            minimum: 0.005,
+            maximum: 0.2,
+            given: |given| given.ankle_lever_m,
+            value: |muscle| lever(muscle, Joint::Ankle),
+        },
+    ];
+}
+
+/// The largest lever arm of a muscle at a joint, m; none: it does not span it.
+fn lever(muscle: &Muscle, joint: Joint) -> Option<f64> {
+    muscle.attachments.iter().flatten().find(|attachment| attachment.joint() == joint).map(|found| found.lever_m)
+}
+
 /// How the muscles of a person differ from the published table; both legs alike.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -64,7 +148,8 @@ impl MuscleParameters {
         *self == Self::default()
     }
 
-    fn overrides(&self) -> [(&'static str, &MuscleOverride); 7] {
+    /// Kinds of muscles and what is known better of them.
+    pub fn overrides(&self) -> [(&'static str, &MuscleOverride); 7] {
         [
             ("ham", &self.ham),
             ("glu", &self.glu),
@@ -82,17 +167,9 @@ impl MuscleParameters {
     /// [`ModelError`] naming the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         for (kind, given) in self.overrides() {
-            for (field, value, minimum, maximum) in [
-                ("max_force_n", given.max_force_n, 50.0, 20_000.0),
-                ("max_speed", given.max_speed, 2.0, 30.0),
-                ("optimal_length_m", given.optimal_length_m, 0.01, 0.3),
-                ("slack_length_m", given.slack_length_m, 0.02, 0.8),
-                ("hip_lever_m", given.hip_lever_m, 0.005, 0.2),
-                ("knee_lever_m", given.knee_lever_m, 0.005, 0.2),
-                ("ankle_lever_m", given.ankle_lever_m, 0.005, 0.2),
-            ] {
-                if let Some(value) = value {
-                    ModelError::check_range(&format!("muscles.{kind}.{field}"), value, minimum, maximum)?;
+            for MuscleField { name, minimum, maximum, given: value, .. } in &MuscleOverride::FIELDS {
+                if let Some(value) = value(given) {
+                    ModelError::check_range(&format!("muscles.{kind}.{name}"), value, *minimum, *maximum)?;
                 }
             }
             for (joint, lever) in given.levers() {
@@ -109,6 +186,11 @@ impl MuscleParameters {
             }
         }
         Ok(())
+    }
+
+    /// A muscle of a person of this kind (`ham`); none: there is no such kind.
+    pub fn muscle_of_kind(&self, subject: &Subject, kind: &str) -> Option<Muscle> {
+        self.muscles(subject).into_iter().find(|muscle| is_of(muscle, kind))
     }
 
     /// The ten muscles of a person.

@@ -1,20 +1,12 @@
 //! A recording of joint angles over several strides, in the walker's convention, with what was done to get there.
 
+use crate::opensim::{AngleUnit, StorageFile};
 use crate::subject::ModelError;
-use crate::table::{Separator, Table, malformed};
+use crate::table::{Clock, Separator, Table};
 use std::f64::consts::PI;
 
 /// Largest angle of a recording, rad: a wrong unit exceeds it.
 const LARGEST_ANGLE_RAD: f64 = PI;
-
-/// Unit of the angles of an OpenSim file whose header does not say it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AngleUnit {
-    /// Degrees.
-    Degrees,
-    /// Radians.
-    Radians,
-}
 
 /// Joint angles over time: torso, hip_L, knee_L, ankle_L, hip_R, rad, of the seven-link walker.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,43 +37,11 @@ impl Recording {
         unit: Option<AngleUnit>,
         force_column: Option<&str>,
     ) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = text.lines().collect();
-        let end = lines
-            .iter()
-            .position(|line| line.trim().eq_ignore_ascii_case("endheader"))
-            .ok_or_else(|| malformed(what, lines.len().max(1), None, "there is no line \"endheader\"".to_owned()))?;
-        let setting = |name: &str| {
-            lines[..end].iter().enumerate().find_map(|(index, line)| {
-                let (key, value) = line.split_once('=')?;
-                key.trim().eq_ignore_ascii_case(name).then(|| (index + 1, value.trim().to_owned()))
-            })
-        };
-        let unit = match (setting("inDegrees"), unit) {
-            (Some((_, word)), _) if word.eq_ignore_ascii_case("yes") => AngleUnit::Degrees,
-            (Some((_, word)), _) if word.eq_ignore_ascii_case("no") => AngleUnit::Radians,
-            (Some((line, word)), _) => {
-                return Err(malformed(what, line, None, format!("inDegrees={word}: expected yes or no")));
-            }
-            (None, Some(unit)) => unit,
-            (None, None) => {
-                return Err(malformed(what, end + 1, None, "the header has no inDegrees=yes or no".to_owned()));
-            }
-        };
-        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, "time")?;
-        for (name, found) in [("nRows", table.len()), ("nColumns", table.width())] {
-            if let Some((line, value)) = setting(name)
-                && value.parse::<usize>() != Ok(found)
-            {
-                let reason = format!("{name}={value}, but there are {found}: the file is not whole");
-                return Err(malformed(what, line, None, reason));
-            }
-        }
-        let scale = match unit {
-            AngleUnit::Degrees => PI / 180.0,
-            AngleUnit::Radians => 1.0,
-        };
+        let file = StorageFile::read(what, text)?;
+        let unit = file.angle_unit(what, unit)?;
+        let table = file.table;
         let mut steps = vec![format!("{what}: OpenSim motion file, {} rows, angles in {unit:?}", table.len())];
-        Self::from_opensim_columns(what, &table, scale, force_column, &mut steps)
+        Self::from_opensim_columns(what, &table, unit.in_radians(), force_column, &mut steps)
     }
 
     /// A table exported from the data set of Camargo et al. 2021 (J Biomech 119:110320): the `data` table of a trial's
@@ -92,10 +52,10 @@ impl Recording {
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_camargo_csv(what: &str, text: &str) -> Result<Self, ModelError> {
         let lines: Vec<&str> = text.lines().collect();
-        let table = Table::read(what, &lines, 1, Separator::Comma, "Header")?;
+        let table = Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))?;
         let mut steps =
             vec![format!("{what}: Camargo 2021 inverse kinematics, {} rows, angles in degrees", table.len())];
-        Self::from_opensim_columns(what, &table, PI / 180.0, None, &mut steps)
+        Self::from_opensim_columns(what, &table, AngleUnit::Degrees.in_radians(), None, &mut steps)
     }
 
     /// Our own table: `time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad`, optionally `knee_R_rad` and
@@ -107,7 +67,7 @@ impl Recording {
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
         let lines: Vec<&str> = text.lines().collect();
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
-        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, "time_s")?;
+        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
         let mut steps: Vec<String> =
             lines[..comments].iter().map(|line| line.trim_start_matches('#').trim().to_owned()).collect();
         steps.push(format!("{what}: table in the walker's convention, {} rows", table.len()));

@@ -49,6 +49,37 @@ impl Walker {
     }
 }
 
+/// When a foot comes to the ground: where a signal that tells contact rises above a threshold, having been below it for
+/// a swing. Linear between samples.
+pub(crate) fn contacts(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<f64> {
+    let mut unloaded_since: Option<f64> = None;
+    let mut strikes = Vec::new();
+    for (k, (&time, &value)) in time_s.iter().zip(signal).enumerate() {
+        if value < threshold {
+            unloaded_since.get_or_insert(time);
+        } else if let Some(since) = unloaded_since.take()
+            && k > 0
+            && time - since >= SHORTEST_SWING_S
+        {
+            let (before, earlier) = (signal[k - 1], time_s[k - 1]);
+            strikes.push(earlier + (time - earlier) * (threshold - before) / (value - before));
+        }
+    }
+    strikes
+}
+
+/// Heel strikes that were told: in order, within the recording, at least two.
+pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<(), ModelError> {
+    for &time in times {
+        ModelError::check_range("heel strike (s)", time, first, last)?;
+    }
+    if times.windows(2).any(|pair| pair[1] <= pair[0]) {
+        let reason = "the heel strikes are not in order".to_owned();
+        return Err(ModelError::Malformed { what: what.to_owned(), reason });
+    }
+    Ok(())
+}
+
 impl Recording {
     /// Times of right heel strikes, s.
     ///
@@ -58,18 +89,16 @@ impl Recording {
         let malformed = |reason: String| ModelError::Malformed { what: self.what.clone(), reason };
         let found = match how {
             HeelStrikes::Given(times) => {
-                let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
-                for &time in times {
-                    ModelError::check_range("heel strike (s)", time, first, last)?;
-                }
-                if times.windows(2).any(|pair| pair[1] <= pair[0]) {
-                    return Err(malformed("the heel strikes are not in order".to_owned()));
-                }
+                given(&self.what, times, self.time_s[0], self.time_s[self.time_s.len() - 1])?;
                 times.clone()
             }
             HeelStrikes::Force => {
                 let force = self.right_force_n.as_ref();
-                self.by_force(force.ok_or_else(|| malformed("no force under the right foot was recorded".to_owned()))?)
+                contacts(
+                    &self.time_s,
+                    force.ok_or_else(|| malformed("no force under the right foot was recorded".to_owned()))?,
+                    CONTACT_FORCE_N,
+                )
             }
             HeelStrikes::Kinematics => {
                 let knee = self.knee_r_rad.as_ref();
@@ -80,23 +109,6 @@ impl Recording {
             return Err(malformed(format!("{} right heel strikes, two make a stride", found.len())));
         }
         Ok(found)
-    }
-
-    fn by_force(&self, force: &[f64]) -> Vec<f64> {
-        let mut unloaded_since: Option<f64> = None;
-        let mut strikes = Vec::new();
-        for (k, (&time, &value)) in self.time_s.iter().zip(force).enumerate() {
-            if value < CONTACT_FORCE_N {
-                unloaded_since.get_or_insert(time);
-            } else if let Some(since) = unloaded_since.take()
-                && k > 0
-                && time - since >= SHORTEST_SWING_S
-            {
-                let (before, earlier) = (force[k - 1], self.time_s[k - 1]);
-                strikes.push(earlier + (time - earlier) * (CONTACT_FORCE_N - before) / (value - before));
-            }
-        }
-        strikes
     }
 
     fn by_kinematics(&self, knee: &[f64]) -> Vec<f64> {

@@ -76,7 +76,7 @@ impl Tune {
             tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
             return Ok(Ended::Interrupted);
         }
-        match ran.failure() {
+        match unattended::failure(&ran.standing) {
             None => Ok(Ended::Done),
             Some(failure) => {
                 tell(&format!("gaitwright: {failure}"));

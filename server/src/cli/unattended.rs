@@ -35,18 +35,15 @@ pub(super) struct Run {
     pub(super) interrupted: bool,
 }
 
-impl Run {
-    /// What went wrong for reasons of the program or the machine. That an action has no gait is a result.
-    pub(super) fn failure(&self) -> Option<String> {
-        let Standing { study, trials, .. } = &self.standing;
-        let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
-        if study.state != StudyState::Finished {
-            return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
-        }
-        let last = trials.iter().rev().find(failed)?;
-        let count = trials.iter().filter(failed).count();
-        Some(format!("{count} of {} trials failed; the last, trial {}: {}", trials.len(), last.number, last.message))
+/// What went wrong in a study for reasons of the program or the machine. That an action has no gait is a result.
+pub(super) fn failure(Standing { study, trials, .. }: &Standing) -> Option<String> {
+    let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
+    if study.state != StudyState::Finished {
+        return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
     }
+    let last = trials.iter().rev().find(failed)?;
+    let count = trials.iter().filter(failed).count();
+    Some(format!("{count} of {} trials failed; the last, trial {}: {}", trials.len(), last.number, last.message))
 }
 
 /// The unfinished study of the same kind in the database, or a new one.

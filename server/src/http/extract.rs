@@ -3,7 +3,7 @@
 use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::document;
 use crate::error::Error;
-use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::extract::{FromRequest, FromRequestParts, Query, RawPathParams, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
@@ -33,7 +33,7 @@ pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
     }
 }
 
-/// The identifier in the path.
+/// The identifier in the path: `{id}`.
 #[derive(Debug)]
 pub(crate) struct Id<T>(pub(crate) T);
 
@@ -46,8 +46,9 @@ where
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Error> {
-        let Path(text) =
-            Path::<String>::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+        let named =
+            RawPathParams::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+        let text = named.iter().find(|(name, _)| *name == "id").map_or("", |(_, text)| text).to_owned();
         text.parse().map(Self).map_err(|_| Error::NotFound { what: "an identifier like".to_owned(), id: text })
     }
 }

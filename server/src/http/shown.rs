@@ -3,7 +3,9 @@
 use super::AppState;
 use super::extract::Id;
 use crate::error::Error;
-use crate::store::{Connection, FeedbackId, StoreResult, StudyId, TrialId, consents, feedback, trials};
+use crate::store::{
+    Connection, FeedbackId, LabSessionId, StoreResult, StudyId, TrialId, consents, feedback, lab_sessions, trials,
+};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use std::fmt::Display;
@@ -35,6 +37,12 @@ impl OfStudy for TrialId {
 impl OfStudy for FeedbackId {
     async fn study(self, db: &mut Connection) -> StoreResult<StudyId> {
         Ok(feedback::get(db, self).await?.study_id)
+    }
+}
+
+impl OfStudy for LabSessionId {
+    async fn study(self, db: &mut Connection) -> StoreResult<StudyId> {
+        Ok(lab_sessions::get(db, self).await?.study_id)
     }
 }
 

@@ -109,8 +109,18 @@ impl Chart {
         self
     }
 
+    /// Width and height of the drawing.
+    pub(super) const SIZE: (f64, f64) = (WIDTH, HEIGHT);
+
     /// The chart as an SVG element.
     pub fn svg(&self) -> String {
+        let name = escape(&format!("{}: {} over {}", self.title, self.y_label, self.x_label));
+        let body = self.body();
+        format!("<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name}\">{body}</svg>")
+    }
+
+    /// The elements of the drawing.
+    pub(super) fn body(&self) -> String {
         let all = || self.series.iter().flat_map(|series| series.points.iter());
         let mut x = Axis::over(all().map(|p| p.0), 8, true);
         if self.whole_x {
@@ -141,11 +151,6 @@ impl Chart {
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
         let px = |value: f64| LEFT + x.place(value) * (right - LEFT);
         let py = |value: f64| bottom - y.place(value) * (bottom - TOP);
-        write!(
-            svg,
-            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">",
-            escape(&format!("{}: {} over {}", self.title, self.y_label, self.x_label))
-        )?;
         for &tick in &y.ticks {
             let at = py(tick);
             write!(svg, "<path class=\"grid\" d=\"M{LEFT} {at:.1}H{right}\"/>")?;
@@ -187,8 +192,7 @@ impl Chart {
             HEIGHT - 8.0,
             escape(&self.x_label)
         )?;
-        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.y_label))?;
-        write!(svg, "</svg>")
+        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.y_label))
     }
 }
 

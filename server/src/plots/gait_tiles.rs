@@ -11,8 +11,18 @@ const GROUND: f64 = 164.0;
 /// Units of the drawing per metre.
 const SCALE: f64 = 86.0;
 
+/// Width and height of the drawing.
+pub(super) const SIZE: (f64, f64) = (WIDTH * TILES as f64, HEIGHT);
+
 /// Figures at even times as one SVG element; each stands on its hip, with its percent of the cycle below.
 pub fn gait_tiles(figures: &[StickFigure]) -> String {
+    let (width, body) = (SIZE.0, body(figures));
+    let name = format!("The stride as {TILES} stick figures");
+    format!("<svg class=\"tiles\" viewBox=\"0 0 {width} {HEIGHT}\" role=\"img\" aria-label=\"{name}\">{body}</svg>")
+}
+
+/// The elements of the drawing.
+pub(super) fn body(figures: &[StickFigure]) -> String {
     let mut svg = String::with_capacity(16 * 1024);
     // Writing to a String cannot fail.
     let _ = draw(&mut svg, figures);
@@ -21,11 +31,6 @@ pub fn gait_tiles(figures: &[StickFigure]) -> String {
 
 fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
     let end = figures.last().map_or(0.0, |figure| figure.time_s);
-    write!(
-        svg,
-        "<svg class=\"tiles\" viewBox=\"0 0 {} {HEIGHT}\" role=\"img\" aria-label=\"The stride as {TILES} stick figures\">",
-        WIDTH * TILES as f64
-    )?;
     for tile in 0..TILES {
         let share = tile as f64 / (TILES - 1) as f64;
         let Some(figure) = figures.iter().find(|figure| figure.time_s >= share * end - 1e-9) else { continue };
@@ -48,5 +53,5 @@ fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
         line("trunk", &[figure.hip, figure.shoulder])?;
         write!(svg, "<text x=\"{middle:.1}\" y=\"{}\">{:.0} %</text>", HEIGHT - 6.0, 100.0 * share)?;
     }
-    write!(svg, "</svg>")
+    Ok(())
 }

@@ -1,15 +1,19 @@
 //! Plots as SVG, drawn on the server: no script is needed to see them, and nothing comes from elsewhere.
 //!
-//! Colours, strokes and fonts are classes of the style sheet, so that one drawing serves light and dark.
+//! Colours, strokes and fonts are classes of the style sheet, so that one drawing serves light and dark. What leaves a
+//! page ([`Figure`]) takes its rules along.
 
 mod axis;
 mod chart;
+mod figure;
 mod gait_tiles;
 mod heat_map;
 mod sparkline;
+mod standalone;
 mod tree;
 
 pub use chart::{Band, Chart, Series, Stroke};
+pub use figure::{Drawing, Figure, PngError};
 pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};
 pub use sparkline::sparkline;

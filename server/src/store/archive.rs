@@ -15,7 +15,7 @@ const FORMAT: &str = "gaitwright study 1";
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 14] = [
+const TABLES: [(&str, &str); 18] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -30,6 +30,10 @@ const TABLES: [(&str, &str); 14] = [
     ("presentation_answers", "presentation_id in (select id from presentations where study_id = ?)"),
     ("presentation_retractions", "presentation_id in (select id from presentations where study_id = ?)"),
     ("unblindings", "study_id = ? order by seq"),
+    ("lab_sessions", "study_id = ? order by number"),
+    ("lab_acts", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_recordings", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("emg_results", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
 ];
 
 type Rows = Vec<Map<String, Value>>;

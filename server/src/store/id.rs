@@ -76,3 +76,6 @@ identifier!(JobId, "job");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(PresentationId, "presentation");
+identifier!(LabSessionId, "lab session");
+identifier!(LabRecordingId, "recording of a lab session");
+identifier!(EmgResultId, "result of electromyograms");

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 10] = [
+const FILES: [(i64, &str, &str); 13] = [
     (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
     (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
@@ -18,6 +18,9 @@ const FILES: [(i64, &str, &str); 10] = [
     (8, "certificates", include_str!("../../../migrations/0008_certificates.sql")),
     (9, "comparisons", include_str!("../../../migrations/0009_comparisons.sql")),
     (30, "rater_undo", include_str!("../../../migrations/0030_rater_undo.sql")),
+    (36, "lab_sessions", include_str!("../../../migrations/0036_lab_sessions.sql")),
+    (37, "lab_recordings", include_str!("../../../migrations/0037_lab_recordings.sql")),
+    (38, "subject_muscles", include_str!("../../../migrations/0038_subject_muscles.sql")),
 ];
 
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {

@@ -19,6 +19,8 @@ mod id;
 pub mod idempotency;
 pub mod jobs;
 mod json;
+pub mod lab_recordings;
+pub mod lab_sessions;
 pub mod listing;
 mod migrations;
 pub mod presentations;
@@ -37,7 +39,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, FeedbackId, JobId, PresentationId, ReferenceGaitId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, StudyId,
+    SubjectId, TokenId, TrialId, UserId,
 };
 pub use time::{Instant, now};
 pub use writing::Writer;

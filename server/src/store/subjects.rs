@@ -1,7 +1,9 @@
 //! Subjects: people, by pseudonym only.
 
-use super::{Connection, Instant, StoreError, StoreResult, SubjectId, now};
+use super::audit::Actor;
+use super::{Connection, Instant, StoreError, StoreResult, SubjectId, json, now};
 use gait_optimizer::Subject as Body;
+use gait_optimizer::muscle::MuscleParameters;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -100,6 +102,38 @@ pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) ->
         .fetch_all(db)
         .await?;
     rows.iter().map(from_row).collect()
+}
+
+/// How the muscles of a subject differ from the published table; the table, where nothing is written down.
+///
+/// # Errors
+/// What the database reports.
+pub async fn muscles(db: &mut Connection, id: SubjectId) -> StoreResult<MuscleParameters> {
+    let row = sqlx::query("select definition from subject_muscles where subject_id = ? order by seq desc limit 1")
+        .bind(id)
+        .fetch_optional(db)
+        .await?;
+    Ok(row.as_ref().map(|row| json::column(row, "definition")).transpose()?.unwrap_or_default())
+}
+
+/// Writes down how the muscles of a subject differ.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn set_muscles(
+    db: &mut Connection,
+    actor: &Actor,
+    id: SubjectId,
+    muscles: &MuscleParameters,
+) -> StoreResult<()> {
+    sqlx::query("insert into subject_muscles (subject_id, definition, actor, created_at) values (?, ?, ?, ?)")
+        .bind(id)
+        .bind(json::to_text("muscle parameters", muscles)?)
+        .bind(actor.as_str())
+        .bind(now())
+        .execute(db)
+        .await?;
+    Ok(())
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<Subject> {

@@ -5,6 +5,7 @@
 //! record does not have, so that a process that ends at any instant is continued by the next one.
 
 pub mod answer;
+mod balance;
 pub mod belief;
 pub mod blind;
 pub mod catalogue;
@@ -17,6 +18,7 @@ pub mod device;
 pub mod director;
 pub mod examination;
 pub mod history;
+pub mod lab;
 pub mod lifecycle;
 mod next_step;
 pub mod person;

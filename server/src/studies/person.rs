@@ -1,11 +1,12 @@
-//! Adding a subject: one way in for the form and the REST interface.
+//! Adding a subject, and what is known of the muscles: one way in for the forms and the REST interface.
 
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::subjects::{self, PSEUDONYM_UNIQUE, Subject};
-use crate::store::{OnConstraint, Writer};
+use crate::store::{OnConstraint, SubjectId, Writer};
 use gait_optimizer::Subject as Body;
+use gait_optimizer::muscle::MuscleParameters;
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -44,6 +45,23 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result
     let detail = json!({ "pseudonym": pseudonym, "height_m": body.height_m, "body_mass_kg": body.body_mass_kg });
     audit::append(writer, actor, "subject.add", &format!("subject {}", subject.id), &detail).await?;
     Ok(subject)
+}
+
+/// Writes down how the muscles of a subject differ from the published table: studies made from now on take it up.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], a conflict when the subject withdrew.
+pub async fn set_muscles(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: SubjectId,
+    muscles: &MuscleParameters,
+) -> Result<(), Error> {
+    subjects::get(writer, id).await?;
+    muscles.validate()?;
+    subjects::set_muscles(writer, actor, id, muscles).await?;
+    audit::append(writer, actor, "subject.muscles", &format!("subject {id}"), &json!({ "muscles": muscles })).await?;
+    Ok(())
 }
 
 /// Characters that look like themselves. Controls, joiners, direction overrides and letters without a shape make two

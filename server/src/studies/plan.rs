@@ -32,7 +32,7 @@ pub struct NewStudy {
     /// With muscles (C1-C12) or without (C1-C4).
     #[serde(default = "yes")]
     pub muscles: bool,
-    /// Settings of the gait problem.
+    /// Settings of the gait problem; where they say nothing of muscles, those written down of the subject are taken.
     #[serde(default)]
     #[schema(value_type = Object)]
     pub gait_settings: Box<GaitSettings>,
@@ -175,7 +175,9 @@ pub(super) async fn create_from(
     forked_from: Option<StudyId>,
 ) -> Result<Study, Error> {
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
-    let plan = checked(writer, new).await?;
+    // A fork has the very set-up of its parent.
+    let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
+    let plan = check(writer, new).await?;
     let study = studies::insert(writer, &plan, state, forked_from).await?;
     let payload = json!({ "state": study.state, "reason": "created" });
     events::append(writer, study.id, "study_changed", &payload).await?;
@@ -190,6 +192,19 @@ pub(super) async fn create_from(
 /// # Errors
 /// As [`create`]; nothing is written.
 pub async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
+    let new = with_own_muscles(writer, new).await?;
+    check(writer, new).await
+}
+
+/// A study that says nothing of muscles takes those that are written down of its subject.
+async fn with_own_muscles(writer: &mut Writer, mut new: NewStudy) -> Result<NewStudy, Error> {
+    if new.gait_settings.muscles.is_published() {
+        new.gait_settings.muscles = subjects::muscles(writer, new.subject_id).await?;
+    }
+    Ok(new)
+}
+
+async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
     let subject = subjects::get(writer, new.subject_id).await?;
     let device_id = match new.device_id {
         Some(id) => devices::get(writer, id).await?.id,

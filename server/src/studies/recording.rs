@@ -40,6 +40,15 @@ pub enum Unit {
     Radians,
 }
 
+impl From<Unit> for AngleUnit {
+    fn from(unit: Unit) -> Self {
+        match unit {
+            Unit::Degrees => Self::Degrees,
+            Unit::Radians => Self::Radians,
+        }
+    }
+}
+
 /// How right heel strikes are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -91,10 +100,7 @@ impl NewReferenceGait {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
         let recording = match self.form {
             Form::Opensim => {
-                let unit = self.unit.map(|unit| match unit {
-                    Unit::Degrees => AngleUnit::Degrees,
-                    Unit::Radians => AngleUnit::Radians,
-                });
+                let unit = self.unit.map(AngleUnit::from);
                 Recording::from_opensim(what, &self.recording, unit, self.force_column.as_deref())?
             }
             Form::Camargo => Recording::from_camargo_csv(what, &self.recording)?,

@@ -9,6 +9,8 @@ pub enum Purpose {
     Proposal,
     /// Order and sides of the presentation with this number.
     Presentation,
+    /// Order of the gaits in the lab sessions of this block of four.
+    LabSession,
     /// Draws behind what is shown of the learner's belief.
     Belief,
 }
@@ -18,6 +20,7 @@ pub fn derive(study_seed: u64, purpose: Purpose, counter: u64) -> u64 {
     let name = match purpose {
         Purpose::Proposal => "proposal",
         Purpose::Presentation => "presentation",
+        Purpose::LabSession => "lab session",
         Purpose::Belief => "belief",
     };
     let mut hash = Sha256::new();

@@ -5,6 +5,8 @@ use crate::site::Site;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::{electromyogram, motion};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Every page with something on it: name and address.
@@ -19,10 +21,32 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let (gait, no_gait) = (of(TrialState::Converged).unwrap(), of(TrialState::NotConverged).unwrap());
     let taken = site.service.post_text(&format!("/rate/{other}"), "application/x-www-form-urlencoded", "").await;
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
+    let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id, "notes": "treadmill, 1.1 m/s"});
+    let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
+    let session = session["id"].as_str().unwrap();
+    for walk in 1..=2 {
+        let walked = json!({"walk": walk, "note": "slow at first"});
+        site.service.post(&format!("/api/v1/lab/{session}/walks"), &walked).await;
+        let emg = electromyogram(f64::from(walk));
+        let emg = json!({"walk": walk, "recording": emg, "reading": {"heel_strike_column": "heel"}});
+        site.service.post(&format!("/api/v1/lab-sessions/{session}/electromyograms"), &emg).await;
+    }
+    let joints = json!({"walk": 2, "recording": motion()});
+    site.service.post(&format!("/api/v1/lab-sessions/{session}/motions"), &joints).await;
+    site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
     vec![
+        ("figures", format!("/studies/{study}/figures?other={other}")),
+        ("lab-sessions", format!("/studies/{study}/lab")),
+        ("lab-session", format!("/lab-sessions/{session}")),
+        ("lab", "/lab".to_owned()),
+        ("lab-walk", format!("/lab/{session}")),
         ("home", "/".to_owned()),
         ("subjects", "/subjects".to_owned()),
         ("subject", format!("/subjects/{}", site.service.subject().await)),
+        ("muscles", format!("/subjects/{}/muscles", site.service.subject().await)),
+        ("devices", "/devices".to_owned()),
+        ("device", format!("/devices/{}", site.service.get(study).await.plan.device_id)),
         ("references", "/references".to_owned()),
         ("reference", format!("/references/{}", site.service.reference().await)),
         ("new-study", "/studies/new".to_owned()),

@@ -78,7 +78,7 @@ impl Reproduce {
         let store = Store::open(&self.folder.join("studies.db")).await?;
         let outcomes = Box::pin(self.studies(&store)).await;
         store.close().await;
-        let Some(outcomes) = outcomes? else {
+        let Some((outcomes, failures)) = outcomes? else {
             tell("interrupted; the same command goes on from there");
             return Ok(Ended::Interrupted);
         };
@@ -96,17 +96,22 @@ impl Reproduce {
         }
         data(&comparison::conclusion(&comparison::verdicts(&outcomes)))?;
         tell(&format!("report: {}", self.folder.join("report.html").display()));
-        Ok(Ended::Done)
+        for failure in &failures {
+            tell(&format!("gaitwright: {failure}"));
+        }
+        Ok(if failures.is_empty() { Ended::Done } else { Ended::Failed })
     }
 
-    /// Every study in order; none when somebody stopped it.
-    async fn studies(&self, store: &Store) -> Result<Option<Vec<Outcome>>, Error> {
-        let mut outcomes = Vec::new();
+    /// Every study in order, and in which of them trials failed for reasons of the program or the machine; none when
+    /// somebody stopped it.
+    async fn studies(&self, store: &Store) -> Result<Option<(Vec<Outcome>, Vec<String>)>, Error> {
+        let (mut outcomes, mut failures) = (Vec::new(), Vec::new());
         for seed in self.seed..self.seed + self.seeds {
             for &subject in self.subject.numbers() {
                 for muscles in [false, true] {
                     let words = if muscles { "with" } else { "without" };
-                    tell(&format!("subject {subject}, {words} muscles, seed {seed}"));
+                    let title = format!("subject {subject}, {words} muscles, seed {seed}");
+                    tell(&title);
                     let (study, finished) = Box::pin(self.study(store, subject, muscles, seed)).await?;
                     let standing = if finished {
                         Standing::read(&mut *store.read().await?, study).await?
@@ -115,19 +120,18 @@ impl Reproduce {
                         if ran.interrupted {
                             return Ok(None);
                         }
-                        if let Some(failure) = ran.failure() {
-                            tell(&format!("gaitwright: {failure}"));
-                        }
                         if ran.standing.study.state != StudyState::Finished {
-                            return Err(Error::conflict("a study did not come to its end; nothing is compared"));
+                            let why = unattended::failure(&ran.standing).unwrap_or_default();
+                            return Err(Error::Internal(format!("{title}: {why}; nothing is compared")));
                         }
                         ran.standing
                     };
+                    failures.extend(unattended::failure(&standing).map(|failure| format!("{title}: {failure}")));
                     outcomes.push(outcome(store, subject, muscles, seed, &standing).await?);
                 }
             }
         }
-        Ok(Some(outcomes))
+        Ok(Some((outcomes, failures)))
     }
 
     /// The study of the folder, and whether it is finished.

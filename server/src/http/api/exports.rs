@@ -22,7 +22,7 @@ pub(super) struct Sampling {
     rate_hz: f64,
 }
 
-fn two_hundred() -> f64 {
+pub(super) fn two_hundred() -> f64 {
     200.0
 }
 
@@ -61,15 +61,23 @@ pub(super) async fn controller(
     Id(id): Id<TrialId>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
-    let (trial, gait) = leaving(&app, id).await?;
+    controller_file(&app, id, sampling.rate_hz, &format!("controller-{}.json", id.short())).await
+}
+
+/// The controller file of a converged gait under a name of its own.
+///
+/// # Errors
+/// A conflict when the trial did not converge, [`Error::Invalid`] for a rate out of range.
+pub(super) async fn controller_file(app: &AppState, id: TrialId, rate_hz: f64, name: &str) -> Result<Response, Error> {
+    let (trial, gait) = leaving(app, id).await?;
     // The last iterate of a solve without a solution must not reach a device.
     if trial.state != TrialState::Converged {
         let (number, state) = (trial.number, trial.state.as_str());
         return Err(Error::conflict(format!("trial {number} is {state}: a device only gets a gait that converged")));
     }
-    let controller = ControllerFile::new(&gait, sampling.rate_hz)?;
+    let controller = ControllerFile::new(&gait, rate_hz)?;
     let text = serde_json::to_string_pretty(&controller).map_err(|e| Error::Internal(e.to_string()))?;
-    Ok(file("application/json", &format!("controller-{}.json", id.short()), text))
+    Ok(file("application/json", name, text))
 }
 
 /// A trial and its gait, where its subject lets it be given out.

@@ -9,9 +9,12 @@ mod comparison;
 mod devices;
 mod events;
 mod exports;
+mod figures;
 mod gaits;
 pub mod health;
 mod history;
+mod lab_recordings;
+mod lab_sessions;
 mod motion;
 mod preferences;
 mod recommendation;
@@ -41,6 +44,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(subjects::get))
         .routes(routes!(subjects::consents, subjects::consent))
         .routes(routes!(subjects::withdraw))
+        .routes(routes!(subjects::muscles, subjects::set_muscles))
         .routes(routes!(reference_gaits::of_subject))
         .routes(routes!(devices::list, devices::create))
         .routes(routes!(devices::get))
@@ -76,6 +80,10 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(exports::controller))
         .routes(routes!(motion::get))
         .routes(routes!(certificates::get, certificates::create))
+        // figures
+        .routes(routes!(figures::of_study))
+        .routes(routes!(figures::of_trial))
+        .routes(routes!(figures::of_session))
         // scripts of the lab
         .routes(routes!(scripts::ask))
         .routes(routes!(scripts::tell))
@@ -86,6 +94,19 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(blind::answer))
         .routes(routes!(blind::raters))
         .routes(routes!(blind::unblind))
+        // in the lab
+        .routes(routes!(lab_sessions::of_study, lab_sessions::create))
+        .routes(routes!(lab_sessions::get))
+        .routes(routes!(lab_sessions::controller))
+        .routes(routes!(lab_sessions::close))
+        .routes(routes!(lab_sessions::unblind))
+        .routes(routes!(lab_recordings::list))
+        .routes(routes!(lab_recordings::electromyogram).layer(recordings()))
+        .routes(routes!(lab_recordings::motion).layer(recordings()))
+        .routes(routes!(lab_recordings::result, lab_recordings::process))
+        .routes(routes!(lab_recordings::limit_cycles))
+        .routes(routes!(lab_sessions::in_the_lab))
+        .routes(routes!(lab_sessions::walk))
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))

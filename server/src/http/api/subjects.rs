@@ -16,6 +16,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
+use gait_optimizer::muscle::MuscleParameters;
 
 /// `GET`: newest first, by pages; the `Link` header has the address of the next one.
 #[utoipa::path(
@@ -143,4 +144,46 @@ pub(super) async fn withdraw(
         app.director.cancel_solve(trial).await;
     }
     Ok(answer)
+}
+
+/// `GET {id}/muscles`: how the subject's muscles differ from the published table.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/muscles",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "As in `gait_settings.muscles` of a study", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn muscles(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+) -> Result<Json<MuscleParameters>, Error> {
+    let mut reader = app.read().await?;
+    subjects::get(&mut reader, id).await?;
+    Ok(Json(subjects::muscles(&mut reader, id).await?))
+}
+
+/// `POST {id}/muscles`: writes it down; studies made from now on take it up.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/muscles",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body(content = Object, description = "As in `gait_settings.muscles` of a study; empty: the published table"),
+    responses((status = 201, description = "Written down", body = Object)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn set_muscles(
+    State(app): State<AppState>,
+    Id(id): Id<SubjectId>,
+    OnceWith(once, muscles): OnceWith<Run, MuscleParameters>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    person::set_muscles(&mut writer, &once.actor, id, &muscles).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &muscles).await
 }

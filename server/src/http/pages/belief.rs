@@ -220,7 +220,7 @@ fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) ->
     };
     let draw = |title: &str, cells, range, note| {
         let map = HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range };
-        Drawn { title: title.to_owned(), note, svg: map.svg(), legend: Vec::new() }
+        Drawn { title: title.to_owned(), note, svg: map.svg(), legend: Vec::new(), files: Vec::new() }
     };
     let charts = vec![
         draw("Utility", utility, range, "Mean and standard deviation. Framed: the best action tried."),

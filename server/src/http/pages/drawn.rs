@@ -1,18 +1,38 @@
 //! Charts as pages show them.
 
-use crate::plots::Chart;
+use crate::plots::{Chart, Drawing, Figure, gait_tiles};
 
 /// A chart ready for the page.
+#[derive(Debug)]
 pub(super) struct Drawn {
     pub(super) title: String,
     pub(super) note: &'static str,
     pub(super) svg: String,
     pub(super) legend: Vec<(String, String)>,
+    /// Where it is as a file: form and address.
+    pub(super) files: Vec<(&'static str, String)>,
 }
 
 impl Drawn {
     pub(super) fn new(chart: &Chart, note: &'static str) -> Self {
         let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-        Self { title: chart.title.clone(), note, svg: chart.svg(), legend }
+        Self { title: chart.title.clone(), note, svg: chart.svg(), legend, files: Vec::new() }
+    }
+
+    /// A figure with its files, which are in a folder, with a query.
+    pub(super) fn of(figure: &Figure, folder: &str, query: &str) -> Self {
+        let address = |ending: &str| format!("{folder}/{}.{ending}{query}", figure.name);
+        let files = vec![("SVG", address("svg")), ("PNG", address("png")), ("CSV", address("csv"))];
+        let drawn = match &figure.drawing {
+            Drawing::Chart(chart) => Self::new(chart, ""),
+            Drawing::Tiles(title, stick_figures) => Self {
+                title: title.clone(),
+                note: "",
+                svg: gait_tiles(stick_figures),
+                legend: Vec::new(),
+                files: Vec::new(),
+            },
+        };
+        Self { files, ..drawn }
     }
 }

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::gait_tiles;
+use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
 use crate::store::{StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
@@ -36,10 +36,10 @@ struct GaitPage {
     has_gait: bool,
     may_run: bool,
     certificate: Option<certificate::InWords>,
-    groups: Vec<gait_charts::Group>,
+    groups: Vec<Group>,
     solve: Option<Drawn>,
     /// The stride as a row of pictures.
-    tiles: Option<String>,
+    tiles: Option<Drawn>,
     /// How near the gait comes to each bound.
     bounds: Vec<BoundUse>,
     /// Why there is no gait.
@@ -71,7 +71,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
     let action = trial.action;
-    let drawn = tokio::task::spawn_blocking(move || draw(gait.as_ref(), &reference, &iterations, &action))
+    let drawn = tokio::task::spawn_blocking(move || draw(id, gait.as_ref(), &reference, &iterations, &action))
         .await
         .map_err(|e| Error::Internal(e.to_string()))??;
     page(&GaitPage {
@@ -98,25 +98,43 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
     })
 }
 
+/// Charts that belong together.
+struct Group {
+    id: &'static str,
+    heading: &'static str,
+    hint: &'static str,
+    charts: Vec<Drawn>,
+}
+
 /// What is computed from a gait: CPU work.
 struct Everything {
-    groups: Vec<gait_charts::Group>,
+    groups: Vec<Group>,
     solve: Option<Drawn>,
-    tiles: Option<String>,
+    tiles: Option<Drawn>,
     bounds: Vec<BoundUse>,
 }
 
 fn draw(
+    id: TrialId,
     gait: Option<&Gait>,
     reference: &ReferenceGait,
     iterations: &[IterationRecord],
     action: &TunedBounds,
 ) -> Result<Everything, Error> {
-    let figures = gait.map(stick_figures).transpose()?;
+    let files = format!("/api/v1/trials/{id}/figures");
+    let drawn = |figure: &Figure| Drawn::of(figure, &files, "");
+    let groups = gait.map(|gait| gait_charts::of_gait(gait, reference)).transpose()?.unwrap_or_default();
+    let group = |group: gait_charts::Group| Group {
+        id: group.id,
+        heading: group.heading,
+        hint: group.hint,
+        charts: group.figures.iter().map(drawn).collect(),
+    };
+    let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
     Ok(Everything {
-        groups: gait.map(|gait| gait_charts::of_gait(gait, reference)).unwrap_or_default(),
+        groups: groups.into_iter().map(group).collect(),
         solve: gait_charts::of_iterations(iterations),
-        tiles: figures.as_deref().map(gait_tiles),
+        tiles: tiles.as_ref().map(drawn),
         bounds: bound_use::of(action, gait),
     })
 }

@@ -1,9 +1,12 @@
 //! The charts of a gait.
 
 use super::drawn::Drawn;
+use crate::error::Error;
 use crate::http::gait_series::{MUSCLES, Point, points};
-use crate::plots::{Chart, Stroke};
+use crate::plots::{Chart, Figure, Stroke};
 use gait_optimizer::solve::Phase;
+use gait_optimizer::walking::stick_figure::StickFigure;
+use gait_optimizer::walking::{Progress, progress};
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
 
 /// The phases of the stride, in their order, for either leg.
@@ -30,12 +33,19 @@ const MUSCLE_GROUPS: [(&str, &[usize]); 3] =
 const COORDINATES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
-/// Charts that belong together.
+/// Figures that belong together.
 pub(super) struct Group {
     pub(super) id: &'static str,
     pub(super) heading: &'static str,
     pub(super) hint: &'static str,
-    pub(super) charts: Vec<Drawn>,
+    pub(super) figures: Vec<Figure>,
+}
+
+impl Group {
+    fn new(id: &'static str, heading: &'static str, hint: &'static str, charts: Vec<Chart>) -> Self {
+        let figures = charts.into_iter().map(|chart| Figure::chart(id, chart)).collect();
+        Self { id, heading, hint, figures }
+    }
 }
 
 /// The points of a gait on the axis of the gait cycle.
@@ -54,11 +64,11 @@ impl<'a> Cycle<'a> {
     }
 
     /// A line over the cycle, with a gap between domains: forces, torques and accelerations may jump there.
-    fn over(&self, f: impl Fn(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
+    fn over(&self, f: impl FnMut(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
         self.line(|point| 100.0 * point.time_s / self.end, f)
     }
 
-    fn line(&self, x: impl Fn(&Point<'_>) -> f64, y: impl Fn(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
+    fn line(&self, x: impl Fn(&Point<'_>) -> f64, mut y: impl FnMut(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
         let mut line: Vec<(f64, f64)> = Vec::with_capacity(self.points.len() + 8);
         for (i, point) in self.points.iter().enumerate() {
             if i > 0 && self.points[i - 1].domain != point.domain {
@@ -69,21 +79,48 @@ impl<'a> Cycle<'a> {
         line
     }
 
-    fn draw(&self, mut chart: Chart) -> Drawn {
+    fn marked(&self, mut chart: Chart) -> Chart {
         chart.marks.clone_from(&self.marks);
-        Drawn::new(&chart, "")
+        chart
     }
 }
 
+/// The stride as a row of pictures.
+pub(super) fn tiles(figures: Vec<StickFigure>) -> Figure {
+    Figure::tiles("The stride", figures)
+}
+
 /// Everything that is drawn of a gait.
-pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Vec<Group> {
+///
+/// # Errors
+/// When its subject or device is invalid.
+pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Error> {
     let cycle = Cycle::of(gait);
     let mut groups = vec![angles(&cycle, reference), forces(&cycle), torques(&cycle, gait)];
     if gait.muscles {
         groups.push(muscles(&cycle));
     }
+    groups.push(progress_of(&cycle, gait)?);
     groups.push(portraits(&cycle));
-    groups
+    Ok(groups)
+}
+
+/// Phase and hip velocity, which the virtual constraints of most domains hold.
+fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, Error> {
+    let made = progress(gait)?;
+    let over = |value: fn(&Progress) -> f64| {
+        let mut values = made.iter();
+        cycle.over(|_| values.next().map_or(f64::NAN, value))
+    };
+    let velocity = Chart::new("Hip velocity", CYCLE, "velocity, m/s")
+        .with("of the linearised hip position", 0, Stroke::Solid, over(|point| point.hip_velocity_m_s))
+        .with("of the hip", 1, Stroke::Dashed, cycle.over(|point| point.qd[0]));
+    let phase =
+        Chart::new("Phase", CYCLE, "phase of the domain").with("phase", 0, Stroke::Solid, over(|point| point.phase));
+    let charts = vec![cycle.marked(velocity), cycle.marked(phase)];
+    let hint = "The phase is the hip's linearised place over the stance toe, from the planned start of a domain to its planned \
+                end; it takes the place of time. In all domains but SS1 its velocity is held constant.";
+    Ok(Group::new("phase", "Hip velocity and phase", hint, charts))
 }
 
 fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
@@ -93,15 +130,15 @@ fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
             let chart = Chart::new(title, CYCLE, "angle, °")
                 .with("reference", 7, Stroke::Dashed, measured.collect())
                 .with("this gait", 0, Stroke::Solid, cycle.over(|p| p.q[q].to_degrees()));
-            cycle.draw(chart)
+            cycle.marked(chart)
         };
     let prosthesis = Chart::new("Prosthesis", CYCLE, "angle, °")
         .with("right knee", 0, Stroke::Solid, cycle.over(|p| p.q[7].to_degrees()))
         .with("right ankle", 1, Stroke::Dashed, cycle.over(|p| p.q[8].to_degrees()));
-    let mut charts: Vec<Drawn> = ANGLES.iter().map(draw).collect();
-    charts.push(cycle.draw(prosthesis));
+    let mut charts: Vec<Chart> = ANGLES.iter().map(draw).collect();
+    charts.push(cycle.marked(prosthesis));
     let hint = "Flexion, dorsiflexion and forward lean are positive. The prosthetic joints have no reference.";
-    Group { id: "angles", heading: "Joint angles", hint, charts }
+    Group::new("angles", "Joint angles", hint, charts)
 }
 
 fn forces(cycle: &Cycle<'_>) -> Group {
@@ -114,10 +151,10 @@ fn forces(cycle: &Cycle<'_>) -> Group {
                 Stroke::Dashed,
                 cycle.over(|p| p.forces[4 + axis] + p.forces[6 + axis]),
             );
-        cycle.draw(chart)
+        cycle.marked(chart)
     };
     let charts = [("Ground force, vertical", 1), ("Ground force, forward", 0)].map(draw).into();
-    Group { id: "forces", heading: "Ground reaction forces", hint: "Heel and toe together.", charts }
+    Group::new("forces", "Ground reaction forces", "Heel and toe together.", charts)
 }
 
 fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
@@ -132,11 +169,11 @@ fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
             Stroke::Solid,
             cycle.over(|p| p.u[joint]),
         );
-        cycle.draw(chart)
+        cycle.marked(chart)
     };
     let charts = JOINTS.iter().enumerate().map(draw).collect();
     let hint = "The right knee and ankle are driven by the prosthesis, the other joints by the person.";
-    Group { id: "torques", heading: "Joint torques", hint, charts }
+    Group::new("torques", "Joint torques", hint, charts)
 }
 
 fn muscles(cycle: &Cycle<'_>) -> Group {
@@ -150,12 +187,12 @@ fn muscles(cycle: &Cycle<'_>) -> Group {
                 let line = cycle.over(|p| state(p).map_or(f64::NAN, |values| values[muscle]));
                 chart = chart.with(MUSCLES[muscle], place, stroke, line);
             }
-            charts.push(cycle.draw(chart));
+            charts.push(cycle.marked(chart));
         }
     }
     let hint = "HAM hamstrings, GLU glutei, HFL hip flexors, GAS gastrocnemius, VAS vasti, SOL soleus, TA tibialis \
                 anterior; L left, R right.";
-    Group { id: "muscles", heading: "Muscles", hint, charts }
+    Group::new("muscles", "Muscles", hint, charts)
 }
 
 fn portraits(cycle: &Cycle<'_>) -> Group {
@@ -163,11 +200,11 @@ fn portraits(cycle: &Cycle<'_>) -> Group {
         let q = place + 2;
         let line = cycle.line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees());
         let colour = usize::from(q >= 6);
-        Drawn::new(&Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, line), "")
+        Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, line)
     };
     let charts = COORDINATES.iter().enumerate().map(draw).collect();
     let hint = "Angle and its velocity over the stride: a closed curve repeats itself; a gap is an impact.";
-    Group { id: "portraits", heading: "Phase portraits", hint, charts }
+    Group::new("portraits", "Phase portraits", hint, charts)
 }
 
 /// Where each domain begins, in percent of the cycle.
@@ -181,6 +218,43 @@ fn domain_starts(points: &[Point<'_>], end: f64) -> Vec<(f64, String)> {
         }
     }
     starts
+}
+
+/// The human joint angles of gaits over a reference with its deviation: name and gait.
+pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
+    let draw = |&(title, q, column): &(&str, usize, usize)| {
+        let mean = |row: usize| reference.angles_rad[row][column].to_degrees();
+        let rows = 0..reference.angles_rad.len();
+        let mut chart = Chart::new(title, CYCLE, "angle, °");
+        if let Some(deviation) = &reference.standard_deviation_rad {
+            let band = rows.clone().map(|row| {
+                let deviation = deviation[row][column].to_degrees();
+                (row as f64, mean(row) - deviation, mean(row) + deviation)
+            });
+            chart = chart.with_band("one standard deviation", 7, band.collect());
+        }
+        chart = chart.with("reference", 7, Stroke::Dashed, rows.map(|row| (row as f64, mean(row))).collect());
+        for (place, (name, gait)) in gaits.iter().enumerate() {
+            let stroke = if place == 0 { Stroke::Solid } else { Stroke::Dashed };
+            chart = chart.with(name, place, stroke, Cycle::of(gait).over(|p| p.q[q].to_degrees()));
+        }
+        chart
+    };
+    ANGLES.iter().map(draw).collect()
+}
+
+/// The orbit of each joint, of gaits one over the other: name and gait.
+pub(super) fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
+    let draw = |(place, title): (usize, &&str)| {
+        let mut chart = Chart::new(title, "angle, °", "velocity, °/s");
+        for (colour, (name, gait)) in gaits.iter().enumerate() {
+            let q = place + 2;
+            let line = Cycle::of(gait).line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees());
+            chart = chart.with(name, colour, if colour == 0 { Stroke::Solid } else { Stroke::Dashed }, line);
+        }
+        chart
+    };
+    if gaits.is_empty() { Vec::new() } else { COORDINATES.iter().enumerate().map(draw).collect() }
 }
 
 /// The human joint angles of two gaits, one over the other.

@@ -5,13 +5,20 @@ mod belief;
 mod bound_use;
 mod certificate;
 mod compare;
+mod devices;
 mod drawn;
 pub mod error;
+pub(super) mod figures;
 mod format;
 mod gait;
 mod gait_charts;
 mod glossary;
 mod home;
+mod lab;
+mod lab_charts;
+mod lab_recordings;
+mod lab_walk;
+mod muscles;
 mod new_study;
 mod people;
 mod rate;
@@ -38,6 +45,7 @@ pub fn routes() -> Router<AppState> {
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
         .route("/studies/{id}/belief", get(belief::get))
+        .route("/studies/{id}/figures", get(figures::get))
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
@@ -45,6 +53,9 @@ pub fn routes() -> Router<AppState> {
         .route("/subjects/{id}", get(subject::get))
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
+        .route("/subjects/{id}/muscles", get(muscles::get).post(muscles::post))
+        .route("/devices", get(devices::list))
+        .route("/devices/{id}", get(devices::get).post(devices::post))
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
@@ -54,6 +65,15 @@ pub fn routes() -> Router<AppState> {
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
         .route("/rate/pair/{token}/take-back", post(rate::take_back))
+        .route("/studies/{id}/lab", get(lab::list).post(lab::plan))
+        .route("/lab-sessions/{id}", get(lab::get))
+        .route("/lab-sessions/{id}/close", post(lab::close))
+        .route("/lab-sessions/{id}/unblind", post(lab::unblind))
+        .route("/lab-sessions/{id}/electromyograms", post(lab_recordings::electromyogram).layer(recordings()))
+        .route("/lab-sessions/{id}/motions", post(lab_recordings::motion).layer(recordings()))
+        .route("/lab-sessions/{id}/process", post(lab_recordings::process))
+        .route("/lab", get(lab_walk::list))
+        .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/people", get(people::get).post(people::post))
         .route("/audit", get(audit::get))
         .route("/system", get(system::get))

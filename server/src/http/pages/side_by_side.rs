@@ -76,14 +76,14 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(choice
 }
 
 /// A study as read.
-struct Side {
-    standing: Standing,
+pub(super) struct Side {
+    pub(super) standing: Standing,
     subject: String,
     counts: TrialCounts,
 }
 
 impl Side {
-    async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
+    pub(super) async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
         let study = studies::get(db, id).await?;
         consents::may_be_shown(db, id).await?;
         let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
@@ -96,7 +96,7 @@ impl Side {
         Ok(Self { standing, subject, counts })
     }
 
-    fn figures(&self) -> Result<Figures, Error> {
+    pub(super) fn figures(&self) -> Result<Figures, Error> {
         figures(&self.standing, self.counts.total as usize >= MANY).map_err(Error::Learner)
     }
 
@@ -130,17 +130,13 @@ impl Side {
 
 fn compare(a: Side, b: Side) -> Result<Compared, Error> {
     let (of_a, of_b) = (a.figures()?, b.figures()?);
-    let line = |figures: &Figures| -> Vec<(f64, f64)> {
-        let point = |m: &crate::studies::history::Milestone| Some((f64::from(m.iteration), m.gait_rmse_rad?));
-        figures.history.iter().filter_map(point).collect()
-    };
     let mut chart = Chart::new(
         "Gait RMSE of the best action by iteration",
         "iteration (in order of the results)",
         "Gait RMSE, rad",
     )
-    .with(&a.standing.study.plan.name, 0, Stroke::Steps, line(&of_a))
-    .with(&b.standing.study.plan.name, 1, Stroke::DashedSteps, line(&of_b));
+    .with(&a.standing.study.plan.name, 0, Stroke::Steps, of_a.course())
+    .with(&b.standing.study.plan.name, 1, Stroke::DashedSteps, of_b.course());
     chart.whole_x = true;
     let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
     Ok(Compared {

@@ -2,6 +2,7 @@
 
 use crate::store::presentations::{Kind, Presentation, Said};
 use crate::store::{PresentationId, TrialId};
+use crate::studies::balance::comes_first;
 use crate::studies::seed::{Purpose, derive};
 use sha2::{Digest, Sha256};
 
@@ -9,16 +10,6 @@ use sha2::{Digest, Sha256};
 const REPEAT_ONE_IN: u64 = 10;
 /// One in so many shows the same gait twice.
 const NULL_ONE_IN: u64 = 20;
-
-/// The orders of a block of four: twice the newer gait first, twice second.
-const BLOCKS: [[bool; 4]; 6] = [
-    [true, true, false, false],
-    [true, false, true, false],
-    [true, false, false, true],
-    [false, true, true, false],
-    [false, true, false, true],
-    [false, false, true, true],
-];
 
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,8 +52,7 @@ pub fn draw(
     }
     // Only pairs of the study count for the balance: it is their order that must not matter.
     let asked = before.iter().filter(|shown| shown.kind == Kind::New).count();
-    let block = derive(seed, Purpose::Presentation, 2 * (asked as u64 / 4) + 1) % BLOCKS.len() as u64;
-    let newer_first = BLOCKS[usize::try_from(block).unwrap_or(0)][asked % 4];
+    let newer_first = comes_first(derive(seed, Purpose::Presentation, 2 * (asked as u64 / 4) + 1), asked);
     let (first, second) = if newer_first { (newer, older) } else { (older, newer) };
     Drawn { kind: Kind::New, first, second, repeats: None }
 }

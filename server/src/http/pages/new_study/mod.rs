@@ -22,6 +22,7 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_learner::{LearnerSettings, Method};
+use gait_optimizer::{BasinChoice, SolveOptions};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -51,6 +52,8 @@ pub(super) struct Fields {
     unchanged_limit: String,
     parallel_trials: String,
     seed: String,
+    #[serde(default)]
+    basin_within_percent: String,
     /// The search space: what the editor knows, and nothing else.
     #[serde(flatten)]
     space: BTreeMap<String, String>,
@@ -78,6 +81,7 @@ impl Default for Fields {
             unchanged_limit: String::new(),
             parallel_trials: text("1"),
             seed: text("1"),
+            basin_within_percent: String::new(),
             space: BTreeMap::new(),
         }
     }
@@ -279,6 +283,7 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
         base_bounds,
         feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
             .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human, mixed"))?,
+        solve_options: SolveOptions { basin_choice: basin_choice(fields)?, ..SolveOptions::default() },
         learner: learner(&fields.learner)
             .ok_or_else(|| Error::invalid("learner", fields.learner.as_str(), &learners))?,
         trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
@@ -288,6 +293,18 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
         ..NewStudy::of(subject)
     };
     plan::create(writer, &caller.actor, new).await
+}
+
+/// Nothing: the lowest objective counts alone.
+fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
+    let field = "basin_within_percent";
+    let allowed = "0 to 100, or nothing";
+    let Some(within_percent) = optional(field, &fields.basin_within_percent, allowed)? else {
+        return Ok(BasinChoice::LowestObjective);
+    };
+    let chosen = BasinChoice::NearestToReference { within_percent };
+    chosen.validate().map_err(|_| Error::invalid(field, fields.basin_within_percent.as_str(), allowed))?;
+    Ok(chosen)
 }
 
 /// A person who is described but not chosen would be left out without a word.

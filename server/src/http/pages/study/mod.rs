@@ -211,6 +211,14 @@ pub(super) struct Figures {
     question: bool,
 }
 
+impl Figures {
+    /// Gait RMSE of the best action by iteration.
+    pub(super) fn course(&self) -> Vec<(f64, f64)> {
+        let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
+        self.history.iter().filter_map(point).collect()
+    }
+}
+
 async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;

@@ -6,9 +6,9 @@ use std::f64::consts::PI;
 
 /// `b0 + b1 z^-1 + b2 z^-2` over `1 + a1 z^-1 + a2 z^-2`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Section {
-    pub(super) b: [f64; 3],
-    pub(super) a: [f64; 2],
+pub(crate) struct Section {
+    pub(crate) b: [f64; 3],
+    pub(crate) a: [f64; 2],
 }
 
 /// Twice the sampling rate of the bilinear transformation, in units in which half the sampling rate is 1.
@@ -35,14 +35,14 @@ fn section(pole: Complex<f64>, b: [f64; 3], z: Complex<f64>) -> Section {
 }
 
 /// Low-pass of an even order; `edge` is a share of half the sampling rate.
-pub(super) fn low_pass(order: usize, edge: f64) -> Vec<Section> {
+pub(crate) fn low_pass(order: usize, edge: f64) -> Vec<Section> {
     let warped = prewarped(edge);
     // No loss at rest.
     prototype(order).map(|pole| section(pole * warped, [1.0, 2.0, 1.0], Complex::from(1.0))).collect()
 }
 
 /// Band-pass of an even order per edge; edges are shares of half the sampling rate.
-pub(super) fn band_pass(order: usize, low: f64, high: f64) -> Vec<Section> {
+pub(crate) fn band_pass(order: usize, low: f64, high: f64) -> Vec<Section> {
     let (low, high) = (prewarped(low), prewarped(high));
     let (width, centre) = (high - low, (low * high).sqrt());
     // No loss at the centre of the band.

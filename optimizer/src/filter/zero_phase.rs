@@ -4,12 +4,12 @@
 use super::butterworth::Section;
 
 /// How far a signal is extended at both ends: three times the number of coefficients of the whole filter.
-pub(super) fn extension(sections: &[Section]) -> usize {
+pub(crate) fn extension(sections: &[Section]) -> usize {
     3 * (2 * sections.len() + 1)
 }
 
 /// The filtered signal; it must be longer than the extension.
-pub(super) fn filter(sections: &[Section], signal: &[f64]) -> Vec<f64> {
+pub(crate) fn filter(sections: &[Section], signal: &[f64]) -> Vec<f64> {
     let extension = extension(sections);
     let last = signal.len() - 1;
     let before = (1..=extension).rev().map(|k| 2.0 * signal[0] - signal[k]);

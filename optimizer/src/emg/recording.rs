@@ -1,0 +1,149 @@
+//! Raw signals as recorded.
+
+use super::{EmgSettings, Envelope};
+use crate::filter::{self, band_pass, low_pass};
+use crate::opensim::StorageFile;
+use crate::reference::{contacts, given};
+use crate::subject::ModelError;
+use crate::table::{Clock, Separator, Table, malformed};
+
+/// Sampling rates that are accepted where a file has no time, Hz.
+const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
+
+/// Raw signals of several channels over the same time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EmgRecording {
+    /// Time of the first sample, s.
+    pub start_s: f64,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Name and samples of each channel.
+    pub channels: Vec<(String, Vec<f64>)>,
+}
+
+impl EmgRecording {
+    /// A table with one column per channel, evenly sampled. Its first column is `time_s`, unless `rate_hz` says how many
+    /// rows a second has. Lines that begin with `#` before the names are left out.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column, [`ModelError::OutOfRange`] for a rate out of range.
+    pub fn from_csv(what: &str, text: &str, rate_hz: Option<f64>) -> Result<Self, ModelError> {
+        let clock = match rate_hz {
+            Some(rate_hz) => Clock::Rate(checked_rate(rate_hz)?),
+            None => Clock::Column("time_s"),
+        };
+        let lines: Vec<&str> = text.lines().collect();
+        let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
+        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, clock)?;
+        Self::from_table(what, &table, comments + 1)
+    }
+
+    /// Columns of an OpenSim motion or storage file (.mot, .sto), evenly sampled.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_opensim(what: &str, text: &str) -> Result<Self, ModelError> {
+        let file = StorageFile::read(what, text)?;
+        Self::from_table(what, &file.table, file.first_line())
+    }
+
+    fn from_table(what: &str, table: &Table, first_line: usize) -> Result<Self, ModelError> {
+        let rate_hz = table.even_rate_hz(first_line)?;
+        let channels: Vec<(String, Vec<f64>)> =
+            table.names().iter().filter_map(|name| Some((name.clone(), table.find(name)?))).collect();
+        if channels.is_empty() {
+            return Err(malformed(what, first_line, None, "there is no channel beside the time".to_owned()));
+        }
+        Ok(Self { start_s: table.times()[0], rate_hz, channels })
+    }
+
+    /// Time of the last sample, s.
+    pub fn end_s(&self) -> f64 {
+        self.start_s + (self.samples() - 1) as f64 / self.rate_hz
+    }
+
+    fn samples(&self) -> usize {
+        self.channels.first().map_or(1, |(_, samples)| samples.len())
+    }
+
+    fn column(&self, what: &str, name: &str) -> Result<&[f64], ModelError> {
+        let known = || self.channels.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+        let found = self.channels.iter().find(|(known, _)| known == name);
+        found.map(|(_, samples)| &samples[..]).ok_or_else(|| ModelError::Malformed {
+            what: what.to_owned(),
+            reason: format!("column {name:?} is missing; there are {}", known()),
+        })
+    }
+
+    /// The channels under the names that are wanted, each from its column.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] for a column that is missing.
+    pub fn select<'a>(
+        &self,
+        what: &str,
+        wanted: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, ModelError> {
+        let channels = wanted
+            .into_iter()
+            .map(|(channel, column)| Ok((channel.to_owned(), self.column(what, column)?.to_vec())))
+            .collect::<Result<_, ModelError>>()?;
+        Ok(Self { channels, ..self.clone_without_channels() })
+    }
+
+    fn clone_without_channels(&self) -> Self {
+        Self { start_s: self.start_s, rate_hz: self.rate_hz, channels: Vec::new() }
+    }
+
+    /// Heel strikes, s: where the column of a foot switch or of a vertical force rises above the threshold.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] for a column that is missing or tells of fewer than two.
+    pub fn strikes_of_column(&self, what: &str, column: &str, threshold: f64) -> Result<Vec<f64>, ModelError> {
+        let signal = self.column(what, column)?;
+        let times: Vec<f64> = (0..signal.len()).map(|k| self.start_s + k as f64 / self.rate_hz).collect();
+        let strikes = contacts(&times, signal, threshold);
+        if strikes.len() < 2 {
+            let reason =
+                format!("column {column:?} rises {} times above {threshold}, two make a stride", strikes.len());
+            return Err(ModelError::Malformed { what: what.to_owned(), reason });
+        }
+        Ok(strikes)
+    }
+
+    /// Checks heel strikes that were told, s.
+    ///
+    /// # Errors
+    /// [`ModelError`] when they are not in order or not within the recording.
+    pub fn check_strikes(&self, what: &str, heel_strikes_s: &[f64]) -> Result<(), ModelError> {
+        given(what, heel_strikes_s, self.start_s, self.end_s())
+    }
+
+    /// The envelope of every channel.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming a setting out of range, or when the recording is too short to be filtered.
+    pub fn envelopes(&self, settings: &EmgSettings) -> Result<Vec<Envelope>, ModelError> {
+        settings.validate(self.rate_hz)?;
+        let share = |hz: f64| hz / (0.5 * self.rate_hz);
+        let band = band_pass(settings.order, share(settings.band_low_hz), share(settings.band_high_hz));
+        let smooth = low_pass(settings.order, share(settings.envelope_hz));
+        let fewest = filter::extension(&band) + 1;
+        self.channels
+            .iter()
+            .map(|(channel, samples)| {
+                if samples.len() < fewest {
+                    let reason = format!("{} samples, the filters need {fewest}", samples.len());
+                    return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
+                }
+                let rectified: Vec<f64> = filter::filter(&band, samples).into_iter().map(f64::abs).collect();
+                let values = filter::filter(&smooth, &rectified);
+                Ok(Envelope { channel: channel.clone(), start_s: self.start_s, rate_hz: self.rate_hz, values })
+            })
+            .collect()
+    }
+}
+
+fn checked_rate(rate_hz: f64) -> Result<f64, ModelError> {
+    ModelError::check_range("rate_hz", rate_hz, RATE_RANGE_HZ.0, RATE_RANGE_HZ.1)
+}

@@ -1,0 +1,79 @@
+//! OpenSim's motion and storage files (.mot, .sto): a header that ends with `endheader`, then a table over time.
+
+use crate::subject::ModelError;
+use crate::table::{Clock, Separator, Table, malformed};
+
+/// Unit of the angles of an OpenSim file whose header does not say it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AngleUnit {
+    /// Degrees.
+    Degrees,
+    /// Radians.
+    Radians,
+}
+
+impl AngleUnit {
+    /// Radians per unit.
+    pub(crate) fn in_radians(self) -> f64 {
+        match self {
+            Self::Degrees => std::f64::consts::PI / 180.0,
+            Self::Radians => 1.0,
+        }
+    }
+}
+
+/// A file as read: whole, or not at all.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StorageFile {
+    pub(crate) table: Table,
+    /// What the header says of the unit of angles.
+    unit: Option<AngleUnit>,
+    /// Line of the column names.
+    first_line: usize,
+}
+
+impl StorageFile {
+    /// Reads the header and the table; `what` names the file.
+    pub(crate) fn read(what: &str, text: &str) -> Result<Self, ModelError> {
+        let lines: Vec<&str> = text.lines().collect();
+        let end = lines
+            .iter()
+            .position(|line| line.trim().eq_ignore_ascii_case("endheader"))
+            .ok_or_else(|| malformed(what, lines.len().max(1), None, "there is no line \"endheader\"".to_owned()))?;
+        let setting = |name: &str| {
+            lines[..end].iter().enumerate().find_map(|(index, line)| {
+                let (key, value) = line.split_once('=')?;
+                key.trim().eq_ignore_ascii_case(name).then(|| (index + 1, value.trim().to_owned()))
+            })
+        };
+        let unit = match setting("inDegrees") {
+            Some((_, word)) if word.eq_ignore_ascii_case("yes") => Some(AngleUnit::Degrees),
+            Some((_, word)) if word.eq_ignore_ascii_case("no") => Some(AngleUnit::Radians),
+            Some((line, word)) => {
+                return Err(malformed(what, line, None, format!("inDegrees={word}: expected yes or no")));
+            }
+            None => None,
+        };
+        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, Clock::Column("time"))?;
+        for (name, found) in [("nRows", table.len()), ("nColumns", table.width())] {
+            if let Some((line, value)) = setting(name)
+                && value.parse::<usize>() != Ok(found)
+            {
+                let reason = format!("{name}={value}, but there are {found}: the file is not whole");
+                return Err(malformed(what, line, None, reason));
+            }
+        }
+        Ok(Self { table, unit, first_line: end + 2 })
+    }
+
+    /// The unit of angles: what the header says, else `unit`.
+    pub(crate) fn angle_unit(&self, what: &str, unit: Option<AngleUnit>) -> Result<AngleUnit, ModelError> {
+        let silent = || malformed(what, self.first_line - 1, None, "the header has no inDegrees=yes or no".to_owned());
+        self.unit.or(unit).ok_or_else(silent)
+    }
+
+    /// Line of the column names.
+    pub(crate) fn first_line(&self) -> usize {
+        self.first_line
+    }
+}

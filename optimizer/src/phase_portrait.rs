@@ -1,0 +1,160 @@
+//! Phase portraits of measured walking: joint angles over some seconds, each against its velocity.
+//!
+//! Velocities are central differences of the angles after a zero-phase Butterworth low-pass of order 4 (of one pass);
+//! the portrait shows the filtered angle. Rows that are not evenly spaced are put on an even grid first, linearly. The first and last samples have no neighbour on one side and are left out.
+
+use crate::filter::{extension, filter, low_pass};
+use crate::opensim::{AngleUnit, StorageFile};
+use crate::subject::ModelError;
+use crate::table::{Clock, Separator, Table, malformed};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Order of one pass of the low-pass.
+const ORDER: usize = 4;
+/// Largest angle of a recording, rad: a wrong unit exceeds it.
+const LARGEST_ANGLE_RAD: f64 = PI;
+
+/// Longest time between two rows, s: what lies in a longer one is not known.
+const LONGEST_GAP_S: f64 = 0.05;
+
+/// The joints of the walker, as columns of our own table. Forward lean, flexion and dorsiflexion are positive, hips are
+/// measured from the trunk.
+pub const JOINTS: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+/// The columns of OpenSim's gait models that make a joint, each with its sign; hips and trunk are put together from two.
+const OPENSIM: [(&str, &[(&str, f64)]); 7] = [
+    ("torso", &[("pelvis_tilt", -1.0), ("lumbar_extension", -1.0)]),
+    ("hip_L", &[("hip_flexion_l", 1.0), ("lumbar_extension", -1.0)]),
+    ("knee_L", &[("knee_angle_l", -1.0)]),
+    ("ankle_L", &[("ankle_angle_l", 1.0)]),
+    ("hip_R", &[("hip_flexion_r", 1.0), ("lumbar_extension", -1.0)]),
+    ("knee_R", &[("knee_angle_r", -1.0)]),
+    ("ankle_R", &[("ankle_angle_r", 1.0)]),
+];
+
+/// Joint angles over time, evenly sampled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointRecording {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Name and angles of each joint that was recorded, rad.
+    pub joints: Vec<(&'static str, Vec<f64>)>,
+}
+
+/// A joint's angle and velocity, sample after sample.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PhasePortrait {
+    /// Name of the joint.
+    pub joint: String,
+    /// Angle, rad.
+    pub angle_rad: Vec<f64>,
+    /// Velocity, rad/s.
+    pub velocity_rad_s: Vec<f64>,
+}
+
+impl JointRecording {
+    /// Our own table: `time_s` and any of `torso_rad`, `hip_L_rad`, ..., `ankle_R_rad`.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
+        let lines: Vec<&str> = text.lines().collect();
+        let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
+        let first_line = comments + 1;
+        let table = Table::read(what, &lines[comments..], first_line, Separator::Comma, Clock::Column("time_s"))?;
+        let joints = JOINTS.into_iter().filter_map(|joint| Some((joint, table.find(&format!("{joint}_rad"))?)));
+        Self::whole(what, &table, first_line, joints.collect())
+    }
+
+    /// An OpenSim motion or storage file of a gait model, with the joints whose columns it has.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_opensim(what: &str, text: &str, unit: Option<AngleUnit>) -> Result<Self, ModelError> {
+        let file = StorageFile::read(what, text)?;
+        let scale = file.angle_unit(what, unit)?.in_radians();
+        let joint = |(joint, columns): (&'static str, &[(&str, f64)])| {
+            let mut angles = vec![0.0; file.table.len()];
+            for (column, sign) in columns {
+                let values = match file.table.find(column) {
+                    Some(values) => values,
+                    // A model without a lumbar joint has pelvis and trunk in one.
+                    None if *column == "lumbar_extension" => continue,
+                    None => return None,
+                };
+                for (angle, value) in angles.iter_mut().zip(values) {
+                    *angle += sign * scale * value;
+                }
+            }
+            Some((joint, angles))
+        };
+        Self::whole(what, &file.table, file.first_line(), OPENSIM.into_iter().filter_map(joint).collect())
+    }
+
+    fn whole(
+        what: &str,
+        table: &Table,
+        first_line: usize,
+        joints: Vec<(&'static str, Vec<f64>)>,
+    ) -> Result<Self, ModelError> {
+        if joints.is_empty() {
+            let reason = format!("no column is a joint's; there are {}", table.names().join(", "));
+            return Err(malformed(what, first_line, None, reason));
+        }
+        for (joint, angles) in &joints {
+            if let Some(row) = angles.iter().position(|angle| angle.abs() > LARGEST_ANGLE_RAD) {
+                let reason = format!("{joint} is {:.1} rad: is the unit right?", angles[row]);
+                return Err(malformed(what, first_line + 1 + row, None, reason));
+            }
+        }
+        let times = table.times();
+        if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S) {
+            let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
+            return Err(malformed(what, first_line + 2 + row, Some(1), reason));
+        }
+        let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
+        let joints = joints.into_iter().map(|(joint, angles)| (joint, evenly(&times, &angles))).collect();
+        Ok(Self { rate_hz, joints })
+    }
+
+    /// The phase portrait of every joint; `cutoff_hz` is the edge of the low-pass.
+    ///
+    /// # Errors
+    /// [`ModelError`] for an edge out of range, or when the recording is too short to be filtered.
+    pub fn portraits(&self, cutoff_hz: f64) -> Result<Vec<PhasePortrait>, ModelError> {
+        ModelError::check_range("cutoff_hz", cutoff_hz, 0.5, 0.45 * self.rate_hz)?;
+        let smooth = low_pass(ORDER, cutoff_hz / (0.5 * self.rate_hz));
+        let fewest = extension(&smooth) + 1;
+        let portrait = |(joint, angles): &(&'static str, Vec<f64>)| {
+            if angles.len() < fewest {
+                let reason = format!("{} samples, the filter needs {fewest}", angles.len());
+                return Err(ModelError::Malformed { what: format!("joint {joint}"), reason });
+            }
+            let filtered = filter(&smooth, angles);
+            Ok(PhasePortrait {
+                joint: (*joint).to_owned(),
+                velocity_rad_s: filtered.windows(3).map(|near| 0.5 * (near[2] - near[0]) * self.rate_hz).collect(),
+                angle_rad: filtered[1..filtered.len() - 1].to_vec(),
+            })
+        };
+        self.joints.iter().map(portrait).collect()
+    }
+}
+
+/// A signal at as many evenly spaced times, linear between its samples.
+fn evenly(times: &[f64], signal: &[f64]) -> Vec<f64> {
+    let last = times.len() - 1;
+    let step = (times[last] - times[0]) / last as f64;
+    let mut after = 1;
+    (0..times.len())
+        .map(|k| {
+            let time = times[0] + step * k as f64;
+            while after < last && times[after] < time {
+                after += 1;
+            }
+            let (before, behind) = (times[after - 1], times[after]);
+            let share = ((time - before) / (behind - before)).clamp(0.0, 1.0);
+            signal[after - 1] + share * (signal[after] - signal[after - 1])
+        })
+        .collect()
+}

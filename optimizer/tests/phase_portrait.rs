@@ -1,0 +1,82 @@
+//! Phase portraits: velocities of a known motion, columns and signs of the two forms, files that are refused.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use gait_optimizer::phase_portrait::JointRecording;
+use gait_optimizer::reference::AngleUnit;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// 10 s at 100 Hz of a knee that swings by 0.5 rad with 0.9 Hz.
+fn csv() -> String {
+    let mut text = "# site A\ntime_s,knee_R_rad\n".to_owned();
+    for k in 0..1000 {
+        let time = f64::from(k) / 100.0;
+        writeln!(text, "{time},{}", 0.5 * (TAU * 0.9 * time).sin()).unwrap();
+    }
+    text
+}
+
+#[test]
+fn the_velocity_is_that_of_the_motion() {
+    let portraits = JointRecording::from_csv("walk.csv", &csv()).unwrap().portraits(6.0).unwrap();
+    let [knee] = &portraits[..] else { panic!("{portraits:?}") };
+    assert_eq!((knee.joint.as_str(), knee.angle_rad.len(), knee.velocity_rad_s.len()), ("knee_R", 998, 998));
+    // Away from the ends, where the filter knows nothing beyond them: samples 1, 2, ... of the recording.
+    for k in 100..900 {
+        let time = (k + 1) as f64 / 100.0;
+        let (angle, velocity) = (0.5 * (TAU * 0.9 * time).sin(), 0.5 * TAU * 0.9 * (TAU * 0.9 * time).cos());
+        assert!((knee.angle_rad[k] - angle).abs() < 1e-4, "{k}");
+        assert!((knee.velocity_rad_s[k] - velocity).abs() < 2e-3, "{k}: {} {velocity}", knee.velocity_rad_s[k]);
+    }
+}
+
+#[test]
+fn rows_that_are_not_evenly_spaced_are_put_on_an_even_grid() {
+    // A last row that ends the stride, as in the program's own motion files, and one in between.
+    let text = csv() + "9.993,0.5\n";
+    let text = text.replace("\n0.5,", "\n0.494,0.1\n0.5,");
+    let recording = JointRecording::from_csv("walk.csv", &text).unwrap();
+    assert_eq!(recording.joints[0].1.len(), 1002);
+    assert!((recording.rate_hz - 1001.0 / 9.993).abs() < 1e-9);
+    let knee = &recording.joints[0].1;
+    let time = 700.0 / recording.rate_hz;
+    // Linear between samples 10 ms apart: off by at most h^2/8 of the second derivative.
+    assert!((knee[700] - 0.5 * (TAU * 0.9 * time).sin()).abs() < 0.5 * (TAU * 0.9 * 0.01).powi(2) / 8.0 + 1e-12);
+    assert!((knee[1001] - 0.5).abs() < 1e-12);
+}
+
+fn opensim(unit: &str) -> String {
+    let mut text = format!("walk\nversion=1\nnRows=60\nnColumns=6\n{unit}endheader\n");
+    text.push_str("time pelvis_tilt lumbar_extension hip_flexion_r knee_angle_r ankle_angle_r\n");
+    for k in 0..60 {
+        writeln!(text, "{} -3 -2 20 -10 {k}", f64::from(k) / 100.0).unwrap();
+    }
+    text
+}
+
+#[test]
+fn opensim_columns_get_the_walkers_signs_and_joints_that_are_missing_are_left_out() {
+    let recording = JointRecording::from_opensim("walk.mot", &opensim("inDegrees=yes\n"), None).unwrap();
+    let first: Vec<(&str, f64)> =
+        recording.joints.iter().map(|(name, angles)| (*name, angles[1].to_degrees().round())).collect();
+    assert_eq!(first, [("torso", 5.0), ("hip_R", 22.0), ("knee_R", 10.0), ("ankle_R", 1.0)]);
+    let silent = JointRecording::from_opensim("walk.mot", &opensim(""), None).unwrap_err().to_string();
+    assert!(silent.contains("inDegrees=yes or no"), "{silent}");
+    assert!(JointRecording::from_opensim("walk.mot", &opensim(""), Some(AngleUnit::Degrees)).is_ok());
+}
+
+#[test]
+fn what_is_not_whole_is_refused_with_its_place() {
+    let refusal = |text: &str| JointRecording::from_csv("walk.csv", text).unwrap_err().to_string();
+    assert!(refusal(&csv().replace("\n0.5,", "\n0.5,x")).contains("walk.csv, line 53, column 2"));
+    assert!(refusal(&csv().replace("\n0.5,", "\n0.5,9")).contains("walk.csv, line 53"), "an angle of more than pi");
+    assert!(refusal(&csv().replace("knee_R_rad", "knee")).contains("no column is a joint's; there are knee"));
+    let gap: Vec<String> = csv().lines().filter(|line| !line.starts_with("0.5")).map(str::to_owned).collect();
+    assert!(
+        refusal(&gap.join("\n")).contains("walk.csv, line 53, column 1: 0.110 s without a row"),
+        "0.49 s, then 0.6 s"
+    );
+    let recording = JointRecording::from_csv("walk.csv", &csv()).unwrap();
+    assert!(recording.portraits(60.0).unwrap_err().to_string().starts_with("cutoff_hz = 60 is outside"));
+}

@@ -1,0 +1,118 @@
+//! Figures as files: SVG that stands alone, PNG, and the numbers behind them as CSV.
+
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Params;
+use crate::http::may::May;
+use crate::http::pages::figures;
+use crate::http::shown::Shown;
+use crate::plots::Figure;
+use crate::store::{LabSessionId, StudyId, TrialId};
+use axum::extract::{Path, State};
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+
+/// A second study.
+#[derive(Debug, Deserialize)]
+pub(super) struct Beside {
+    other: Option<StudyId>,
+}
+
+/// `GET /studies/{id}/figures/{file}`: those of the page *Figures* of a study.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/figures/{file}",
+    tag = "figures",
+    params(
+        ("id" = StudyId, Path, description = "The study"),
+        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
+        ("other" = Option<StudyId>, Query, description = "A study that is drawn beside it")
+    ),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+    Path((_, file)): Path<(String, String)>,
+    Params(Beside { other }): Params<Beside>,
+) -> Result<Response, Error> {
+    answer(figures::of_study(&app, id, other).await?.into_figures(), file).await
+}
+
+/// `GET /trials/{id}/figures/{file}`: those of the page of a gait.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/figures/{file}",
+    tag = "figures",
+    params(
+        ("id" = TrialId, Path, description = "The trial"),
+        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
+    ),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_trial(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+    Path((_, file)): Path<(String, String)>,
+) -> Result<Response, Error> {
+    answer(figures::of_trial(&app, id).await?, file).await
+}
+
+/// `GET /lab-sessions/{id}/figures/{file}`: muscle activity and limit cycles of a lab session.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}/figures/{file}",
+    tag = "figures",
+    params(
+        ("id" = LabSessionId, Path, description = "The session"),
+        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
+    ),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_session(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabSessionId>,
+    Path((_, file)): Path<(String, String)>,
+) -> Result<Response, Error> {
+    answer(figures::of_session(&app, id).await?, file).await
+}
+
+/// One of the figures in the form that the name of the file says.
+async fn answer(figures: Vec<Figure>, file: String) -> Result<Response, Error> {
+    let missing = || Error::NotFound { what: "the figure".to_owned(), id: file.clone() };
+    let (name, form) = file.rsplit_once('.').ok_or_else(missing)?;
+    let figure = figures.into_iter().find(|figure| figure.name == name).ok_or_else(missing)?;
+    let (kind, form) = match form {
+        "svg" => ("image/svg+xml", Form::Svg),
+        "png" => ("image/png", Form::Png),
+        "csv" => ("text/csv; charset=utf-8", Form::Csv),
+        _ => return Err(missing()),
+    };
+    let drawn = tokio::task::spawn_blocking(move || match form {
+        Form::Svg => Ok(figure.svg().into_bytes()),
+        Form::Csv => Ok(figure.csv().into_bytes()),
+        Form::Png => figure.png(),
+    });
+    let bytes = drawn.await.map_err(|e| Error::Internal(e.to_string()))?.map_err(|e| Error::Internal(e.to_string()))?;
+    let headers = [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{file}\"")),
+    ];
+    Ok((headers, bytes).into_response())
+}
+
+/// Forms of files.
+#[derive(Debug, Clone, Copy)]
+enum Form {
+    Svg,
+    Png,
+    Csv,
+}

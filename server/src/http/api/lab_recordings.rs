@@ -1,0 +1,163 @@
+//! What is measured in the walks of a lab session.
+
+use crate::access::{Read, Run};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::{Once, OnceWith};
+use crate::http::shown::Shown;
+use crate::store::LabSessionId;
+use crate::store::lab_recordings::{self, LabRecording};
+use crate::studies::lab::{self, Checked, EmgView, LimitCycles, NewEmg, NewMotion};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gait_optimizer::emg::EmgSettings;
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+/// `GET /lab-sessions/{id}/recordings`: every file that was brought, oldest first; the newest of a walk counts.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}/recordings",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "All of them", body = Vec<LabRecording>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn list(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabSessionId>,
+) -> Result<Json<Vec<LabRecording>>, Error> {
+    Ok(Json(lab_recordings::of_session(&mut *app.read().await?, id).await?))
+}
+
+/// `POST /lab-sessions/{id}/electromyograms`: the electromyograms of a walk. A file that is not whole, or holds no
+/// stride, is refused, and nothing of it is kept.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/electromyograms",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = NewEmg,
+    responses((status = 201, description = "Kept", body = LabRecording)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn electromyogram(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, new): OnceWith<Run, NewEmg>,
+) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let checked = new.checked().await?;
+    keep(&app, id, &once, &checked).await
+}
+
+/// `POST /lab-sessions/{id}/motions`: the joint angles of a walk, for its limit cycles.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/motions",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = NewMotion,
+    responses((status = 201, description = "Kept", body = LabRecording)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn motion(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, new): OnceWith<Run, NewMotion>,
+) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let checked = new.checked().await?;
+    keep(&app, id, &once, &checked).await
+}
+
+async fn keep(app: &AppState, id: LabSessionId, once: &Once<Run>, checked: &Checked) -> Result<Response, Error> {
+    let mut writer = match once.begin(app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let kept = lab::keep(&mut writer, &once.actor, id, checked).await?;
+    once.finish(app, writer, StatusCode::CREATED, None, &kept).await
+}
+
+/// How electromyograms are filtered.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Processing {
+    /// band_low_hz, band_high_hz, envelope_hz, order: what is left out has its default.
+    #[schema(value_type = Object)]
+    settings: EmgSettings,
+}
+
+/// `POST /lab-sessions/{id}/emg-results`: filters, cuts and normalises the newest electromyograms; with other settings as
+/// often as wanted.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/emg-results",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = Processing,
+    responses((status = 201, description = "What was made of them", body = EmgView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn process(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, processing): OnceWith<Run, Processing>,
+) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let result = lab::compute(&mut *app.read().await?, id, processing.settings).await?;
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    lab::keep_result(&mut writer, &once.actor, id, &result).await?;
+    let view = lab::emg(&mut writer, id).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &view).await
+}
+
+/// `GET /lab-sessions/{id}/emg-results`: what was made of the electromyograms last, and the model's muscles beside it where
+/// the order was told.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}/emg-results",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "The newest result; null: nothing was processed yet", body = Option<EmgView>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn result(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabSessionId>,
+) -> Result<Json<Option<EmgView>>, Error> {
+    Ok(Json(lab::emg(&mut *app.read().await?, id).await?))
+}
+
+/// `GET /lab-sessions/{id}/limit-cycles`: angle and velocity of every joint that was recorded.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}/limit-cycles",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "The newest motion of each walk", body = Vec<LimitCycles>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn limit_cycles(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabSessionId>,
+) -> Result<Json<Vec<LimitCycles>>, Error> {
+    Ok(Json(lab::limit_cycles(&mut *app.read().await?, id).await?))
+}

@@ -1,0 +1,219 @@
+//! Lab sessions: planned here, walked in the lab, closed, unblinded.
+
+use super::exports;
+use crate::access::{Administer, Rate, Read, Run};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Id, Params};
+use crate::http::may::May;
+use crate::http::once::OnceWith;
+use crate::http::shown::Shown;
+use crate::store::{LabSessionId, StudyId, lab_sessions, studies};
+use crate::studies::lab::{self, InTheLab, NewSession, RecordedWalk, SessionView};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+/// `GET /studies/{id}/lab-sessions`: in their order.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/lab-sessions",
+    tag = "lab",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "Every session, without what is blinded", body = Vec<SessionView>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+) -> Result<Json<Vec<SessionView>>, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    Ok(Json(lab_sessions::of_study(&mut reader, id).await?.iter().map(SessionView::from).collect()))
+}
+
+/// `POST /studies/{id}/lab-sessions`: plans one: a walk without the device, then one with each gait, in an order that is
+/// drawn now and kept.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/lab-sessions",
+    tag = "lab",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = NewSession,
+    responses((status = 201, description = "Planned", body = SessionView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    OnceWith(once, new): OnceWith<Run, NewSession>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = lab::plan(&mut writer, &once.actor, id, &new).await?;
+    let location = format!("/api/v1/lab-sessions/{}", session.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &SessionView::from(&session)).await
+}
+
+/// `GET /lab-sessions/{id}`.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "The session, without what is blinded", body = SessionView)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabSessionId>,
+) -> Result<Json<SessionView>, Error> {
+    Ok(Json(SessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
+}
+
+/// Which walk.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfWalk {
+    walk: u8,
+    #[serde(default = "exports::two_hundred")]
+    rate_hz: f64,
+}
+
+/// `GET /lab-sessions/{id}/controller.json`: what the device's controller needs for a walk. It names no trial; whoever
+/// holds it against the controller files of the two gaits learns the order.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}/controller.json",
+    tag = "lab",
+    params(
+        ("id" = LabSessionId, Path, description = "The session"),
+        ("walk" = u8, Query, description = "2 or 3: walk 1 is without the device"),
+        ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")
+    ),
+    responses((status = 200, description = "Controller file", body = Object)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn controller(
+    _: May<Run>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabSessionId>,
+    Params(of): Params<OfWalk>,
+) -> Result<Response, Error> {
+    let session = lab_sessions::get(&mut *app.read().await?, id).await?;
+    let trial = lab::gait_of(&session, of.walk)?;
+    let name = format!("controller-walk-{}.json", of.walk);
+    exports::controller_file(&app, trial, of.rate_hz, &name).await
+}
+
+/// A note at the end.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Closing {
+    /// At most 2000 characters; may be left out.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    note: String,
+}
+
+/// `POST /lab-sessions/{id}/close`: nothing is recorded any more.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/close",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = Closing,
+    responses((status = 200, description = "Closed", body = SessionView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn close(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, closing): OnceWith<Run, Closing>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = lab::close(&mut writer, &once.actor, id, &closing.note).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
+}
+
+/// Why blindness ends.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Told {
+    /// 1 to 2000 characters.
+    #[schema(min_length = 1, max_length = 2000)]
+    reason: String,
+}
+
+/// `POST /lab-sessions/{id}/unblind`: which walk is with which gait, from now on for everybody who may read. An act: it
+/// is in the audit trail, and what is walked from now on is marked.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/unblind",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = Told,
+    responses((status = 200, description = "The session with the conditions of its walks", body = SessionView)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn unblind(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, told): OnceWith<Administer, Told>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = lab::unblind(&mut writer, &once.actor, id, &told.reason).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
+}
+
+/// `GET /lab/{id}`: the session as the person who walks and the rater see it.
+#[utoipa::path(
+    get,
+    path = "/lab/{id}",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "Which walk is next, and nothing that could tell a gait", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn in_the_lab(
+    _: May<Rate>,
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+) -> Result<Json<InTheLab>, Error> {
+    Ok(Json(lab::in_the_lab(&mut *app.read().await?, id).await?))
+}
+
+/// `POST /lab/{id}/walks`: the next walk was recorded.
+#[utoipa::path(
+    post,
+    path = "/lab/{id}/walks",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = RecordedWalk,
+    responses((status = 201, description = "Recorded; which walk is next", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn walk(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, walked): OnceWith<Rate, RecordedWalk>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let next = lab::record_walk(&mut writer, &once.actor, id, &walked).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &next).await
+}

@@ -1,0 +1,261 @@
+//! The figures of a study, of a gait, of a lab session: for their pages and as files.
+
+use super::drawn::Drawn;
+use super::error::{Page, page};
+use super::side_by_side::Side;
+use super::{gait_charts, lab_charts};
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Params;
+use crate::http::may::May;
+use crate::http::shown::Shown;
+use crate::plots::{Chart, Figure, Stroke};
+use crate::store::studies::Study;
+use crate::store::{
+    Connection, LabSessionId, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials,
+};
+use crate::studies::lab::{self, LimitCycles, SessionView};
+use askama::Template;
+use axum::extract::State;
+use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::{Gait, ReferenceGait};
+use serde::Deserialize;
+
+/// So many of the newest studies are offered for the second place.
+const OFFERED: u32 = 200;
+
+/// Figures that belong together.
+#[derive(Debug)]
+pub(crate) struct Section {
+    id: &'static str,
+    heading: &'static str,
+    hint: &'static str,
+    figures: Vec<Figure>,
+}
+
+/// The figures of a study, or of two.
+#[derive(Debug)]
+pub(crate) struct StudyFigures {
+    study: Study,
+    /// The best trial of the study, with its number.
+    best: Option<(TrialId, u32)>,
+    sections: Vec<Section>,
+}
+
+impl StudyFigures {
+    /// All of them.
+    pub(crate) fn into_figures(self) -> Vec<Figure> {
+        self.sections.into_iter().flat_map(|section| section.figures).collect()
+    }
+}
+
+/// A study with its best gait.
+struct Best {
+    side: Side,
+    trial: Option<(TrialId, u32)>,
+    gait: Option<Gait>,
+    course: Vec<(f64, f64)>,
+}
+
+impl Best {
+    async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
+        let side = Side::read(db, id).await?;
+        let (side, figures) = tokio::task::spawn_blocking(move || {
+            let figures = side.figures();
+            (side, figures)
+        })
+        .await
+        .map_err(|e| Error::Internal(e.to_string()))?;
+        let figures = figures?;
+        let trial = match figures.best {
+            Some(id) => Some((id, trials::get(db, id).await?.number)),
+            None => None,
+        };
+        let gait = match trial {
+            Some((id, _)) => gait_of(db, id).await?,
+            None => None,
+        };
+        Ok(Self { course: figures.course(), side, trial, gait })
+    }
+
+    fn name(&self) -> &str {
+        &self.side.standing.study.plan.name
+    }
+}
+
+/// The gait of a trial; none: there is none, or its trajectory was dropped.
+async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Option<Gait>, Error> {
+    match gaits::get(db, id).await {
+        Ok(gait) => Ok(Some(gait)),
+        Err(StoreError::Missing { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The paper's figures of a study, with another one beside it where that is asked for.
+///
+/// # Errors
+/// A conflict when the subject of one of them withdrew, [`Error::NotFound`], or what the database reports.
+pub(crate) async fn of_study(app: &AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
+    let mut reader = app.read().await?;
+    let mut shown = vec![Best::read(&mut reader, id).await?];
+    if let Some(other) = other.filter(|other| *other != id) {
+        shown.push(Best::read(&mut reader, other).await?);
+    }
+    let reference = shown[0].side.standing.study.plan.reference_gait_id;
+    let reference = reference_gaits::get(&mut reader, reference).await?.definition;
+    drop(reader);
+    let (shown, sections) = tokio::task::spawn_blocking(move || {
+        let sections = sections(&shown, &reference);
+        (shown, sections)
+    })
+    .await
+    .map_err(|e| Error::Internal(e.to_string()))?;
+    let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
+    Ok(StudyFigures { best: first.trial, study: first.side.standing.study, sections: sections? })
+}
+
+fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
+    let strokes = [Stroke::Steps, Stroke::DashedSteps];
+    let mut course =
+        Chart::new("Gait RMSE of the best action", "iteration (in order of the results)", "Gait RMSE, rad");
+    course.whole_x = true;
+    for (place, best) in shown.iter().enumerate() {
+        course = course.with(best.name(), place, strokes[place % 2], best.course.clone());
+    }
+    let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
+    let mut tiles = Vec::new();
+    for (name, gait) in &gaits {
+        tiles.push(Figure::tiles(&format!("Gait of {name}"), stick_figures(gait)?));
+    }
+    let charts = |group: &str, charts: Vec<Chart>| charts.into_iter().map(|c| Figure::chart(group, c)).collect();
+    Ok(vec![
+        Section {
+            id: "course",
+            heading: "Gait RMSE of the best action by iteration",
+            hint: "Figure 3b of the paper, with a study with muscles and one without.",
+            figures: charts("course", vec![course]),
+        },
+        Section {
+            id: "angles",
+            heading: "Joint angles of the best gait",
+            hint: "Figure 3c: over the reference gait, with its standard deviation where it was recorded over several strides.",
+            figures: charts("angles", gait_charts::beside_reference(&gaits, reference)),
+        },
+        Section { id: "tiles", heading: "Gait tiles", hint: "Figure 4: the stride of the best gait.", figures: tiles },
+        Section {
+            id: "orbits",
+            heading: "Limit cycles of the best gait",
+            hint: "Figure 5: angle and velocity over the stride. What was measured lies over it in the lab sessions.",
+            figures: charts("orbits", gait_charts::orbits(&gaits)),
+        },
+    ])
+}
+
+/// Every figure of the page of a gait; none: there is no gait.
+///
+/// # Errors
+/// [`Error::NotFound`], or what the database reports.
+pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
+    let mut reader = app.read().await?;
+    let study = trials::get(&mut reader, id).await?.study_id;
+    let reference = studies::get(&mut reader, study).await?.plan.reference_gait_id;
+    let reference = reference_gaits::get(&mut reader, reference).await?.definition;
+    let Some(gait) = gait_of(&mut reader, id).await? else { return Ok(Vec::new()) };
+    drop(reader);
+    tokio::task::spawn_blocking(move || {
+        let mut figures = vec![gait_charts::tiles(stick_figures(&gait)?)];
+        for group in gait_charts::of_gait(&gait, &reference)? {
+            figures.extend(group.figures);
+        }
+        Ok(figures)
+    })
+    .await
+    .map_err(|e| Error::Internal(e.to_string()))?
+}
+
+/// Every figure of a lab session.
+///
+/// # Errors
+/// [`Error::NotFound`], or what the database reports.
+pub(crate) async fn of_session(app: &AppState, id: LabSessionId) -> Result<Vec<Figure>, Error> {
+    let mut reader = app.read().await?;
+    let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
+    let mut figures = match lab::emg(&mut reader, id).await? {
+        Some(emg) => lab_charts::electromyograms(&session, &emg),
+        None => Vec::new(),
+    };
+    figures.extend(lab_charts::limit_cycles(&session, &measured_cycles(&mut reader, id).await?));
+    Ok(figures)
+}
+
+/// The limit cycles of each walk, with its gait where that may be known.
+pub(super) async fn measured_cycles(
+    db: &mut Connection,
+    id: LabSessionId,
+) -> Result<Vec<(LimitCycles, Option<Gait>)>, Error> {
+    let mut found = Vec::new();
+    for cycles in lab::limit_cycles(db, id).await? {
+        let gait = lab::known_gait(db, id, cycles.walk).await?;
+        found.push((cycles, gait));
+    }
+    Ok(found)
+}
+
+#[derive(Template)]
+#[template(path = "study_figures.html")]
+struct FiguresPage {
+    study: Study,
+    best: Option<(TrialId, u32)>,
+    other: Option<StudyId>,
+    offered: Vec<Study>,
+    sessions: Vec<(LabSessionId, u32)>,
+    sections: Vec<(Section, Vec<Drawn>)>,
+}
+
+impl FiguresPage {
+    fn is(chosen: Option<&StudyId>, study: &Study) -> bool {
+        chosen == Some(&study.id)
+    }
+}
+
+/// Which study beside it.
+#[derive(Debug, Deserialize)]
+pub(super) struct Beside {
+    /// Nothing is chosen: the form sends an empty one.
+    other: Option<String>,
+}
+
+/// `GET /studies/{id}/figures`.
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+    Params(beside): Params<Beside>,
+) -> Page {
+    let other = match beside.other.as_deref() {
+        None | Some("") => None,
+        Some(text) => Some(text.parse::<StudyId>().map_err(|_| Error::invalid("other", text, "a study of the list"))?),
+    };
+    let StudyFigures { study, best, sections } = of_study(&app, id, other).await?;
+    let mut reader = app.read().await?;
+    let mut offered = studies::page(&mut reader, None, OFFERED).await?;
+    offered.retain(|offered| offered.id != id);
+    let sessions = lab_sessions::of_study(&mut reader, id).await?;
+    drop(reader);
+    let query = other.map_or_else(String::new, |other| format!("?other={other}"));
+    let files = format!("/api/v1/studies/{id}/figures");
+    let drawn = |section: Section| {
+        let drawn = section.figures.iter().map(|figure| Drawn::of(figure, &files, &query)).collect();
+        (section, drawn)
+    };
+    page(&FiguresPage {
+        study,
+        best,
+        other,
+        offered,
+        sessions: sessions.iter().map(|session| (session.id, session.number)).collect(),
+        sections: sections.into_iter().map(drawn).collect(),
+    })
+}

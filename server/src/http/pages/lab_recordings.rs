@@ -1,0 +1,158 @@
+//! The forms of a lab session's page that bring what was measured, and that process it.
+
+use super::error::PageError;
+use super::lab;
+use crate::access::Run;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::{Form, Id};
+use crate::http::may::May;
+use crate::store::{LabSessionId, commit};
+use crate::studies::lab::{self as session, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion};
+use crate::studies::recording::Unit;
+use axum::extract::State;
+use axum::response::Response;
+use gait_optimizer::emg::EmgSettings;
+use serde::Deserialize;
+use std::str::FromStr;
+
+/// Electromyograms, as typed.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct EmgFields {
+    walk: u8,
+    form: FileForm,
+    recording: String,
+    rate_hz: String,
+    channels: String,
+    heel_strikes_s: String,
+    heel_strike_column: String,
+    heel_strike_threshold: String,
+}
+
+impl EmgFields {
+    fn read(self) -> Result<NewEmg, Error> {
+        let reading = EmgReading {
+            form: self.form,
+            rate_hz: optional("rate_hz", &self.rate_hz)?,
+            channels: pairs(&self.channels)?,
+            heel_strikes_s: list("heel_strikes_s", &self.heel_strikes_s)?,
+            heel_strike_column: Some(self.heel_strike_column.trim().to_owned()).filter(|name| !name.is_empty()),
+            ..EmgReading::default()
+        };
+        let threshold = optional("heel_strike_threshold", &self.heel_strike_threshold)?;
+        let heel_strike_threshold = threshold.unwrap_or(reading.heel_strike_threshold);
+        Ok(NewEmg {
+            walk: self.walk,
+            recording: self.recording,
+            reading: EmgReading { heel_strike_threshold, ..reading },
+        })
+    }
+}
+
+/// `TA_L=EMG 3, BF_L=EMG 5`.
+fn pairs(text: &str) -> Result<std::collections::BTreeMap<String, String>, Error> {
+    let pair = |part: &str| {
+        let refused = || Error::invalid("channels", part, "CHANNEL=COLUMN, with commas between them");
+        let (channel, column) = part.split_once('=').ok_or_else(refused)?;
+        Ok((channel.trim().to_owned(), column.trim().to_owned()))
+    };
+    text.split(',').filter(|part| !part.trim().is_empty()).map(pair).collect()
+}
+
+fn list(field: &str, text: &str) -> Result<Vec<f64>, Error> {
+    text.split(',').filter(|part| !part.trim().is_empty()).map(|part| number(field, part)).collect()
+}
+
+fn number<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
+    text.trim().parse().map_err(|_| Error::invalid(field, text, "a number"))
+}
+
+fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {
+    if text.trim().is_empty() { Ok(None) } else { number(field, text).map(Some) }
+}
+
+/// Joint angles, as typed.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct MotionFields {
+    walk: u8,
+    form: FileForm,
+    recording: String,
+    unit: String,
+    cutoff_hz: String,
+}
+
+impl MotionFields {
+    fn read(self) -> Result<NewMotion, Error> {
+        let unit = match self.unit.as_str() {
+            "" => None,
+            "degrees" => Some(Unit::Degrees),
+            "radians" => Some(Unit::Radians),
+            other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
+        };
+        let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(MotionReading::default().cutoff_hz);
+        let reading = MotionReading { form: self.form, unit, cutoff_hz };
+        Ok(NewMotion { walk: self.walk, recording: self.recording, reading })
+    }
+}
+
+/// `POST /lab-sessions/{id}/electromyograms`.
+pub(super) async fn electromyogram(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    Form(fields): Form<EmgFields>,
+) -> Result<Response, PageError> {
+    let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
+    lab::answer(&app, id, &may.caller, kept.await).await
+}
+
+/// `POST /lab-sessions/{id}/motions`.
+pub(super) async fn motion(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    Form(fields): Form<MotionFields>,
+) -> Result<Response, PageError> {
+    let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
+    lab::answer(&app, id, &may.caller, kept.await).await
+}
+
+async fn keep(app: &AppState, may: &May<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {
+    let mut writer = app.write().await?;
+    session::keep(&mut writer, &may.caller.actor, id, &checked).await?;
+    Ok(commit(writer).await?)
+}
+
+/// Settings of the filters, as typed.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Settings {
+    band_low_hz: String,
+    band_high_hz: String,
+    envelope_hz: String,
+    order: String,
+}
+
+/// `POST /lab-sessions/{id}/process`.
+pub(super) async fn process(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    Form(typed): Form<Settings>,
+) -> Result<Response, PageError> {
+    let processed = async {
+        let settings = EmgSettings {
+            band_low_hz: number("band_low_hz", &typed.band_low_hz)?,
+            band_high_hz: number("band_high_hz", &typed.band_high_hz)?,
+            envelope_hz: number("envelope_hz", &typed.envelope_hz)?,
+            order: number("order", &typed.order)?,
+        };
+        let result = session::compute(&mut *app.read().await?, id, settings).await?;
+        let mut writer = app.write().await?;
+        session::keep_result(&mut writer, &may.caller.actor, id, &result).await?;
+        Ok(commit(writer).await?)
+    };
+    lab::answer(&app, id, &may.caller, processed.await).await
+}

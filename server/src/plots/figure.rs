@@ -1,0 +1,200 @@
+//! A drawing that leaves the page: as SVG that needs nothing beside it, as PNG, as the numbers behind it.
+
+use super::chart::Chart;
+use super::gait_tiles;
+use super::standalone::{self, Inside};
+use gait_optimizer::walking::stick_figure::StickFigure;
+use resvg::usvg::fontdb::Source;
+use std::fmt::Write;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Pixels of a PNG per unit of the drawing: 1280 across a chart.
+const SCALE: f32 = 2.0;
+
+/// A drawing with the name of its file.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Name of the file without its ending: small letters, digits and hyphens.
+    pub name: String,
+    /// What is drawn.
+    pub drawing: Drawing,
+}
+
+/// What can be drawn.
+#[derive(Debug, Clone)]
+pub enum Drawing {
+    /// Lines over an axis.
+    Chart(Chart),
+    /// A stride as a row of stick figures, under a title.
+    Tiles(String, Vec<StickFigure>),
+}
+
+/// Why there is no PNG.
+#[derive(Debug, Error)]
+pub enum PngError {
+    /// The SVG cannot be read.
+    #[error("drawing a figure: {0}")]
+    Svg(#[from] resvg::usvg::Error),
+    /// There are no pixels to draw on, or they cannot be written.
+    #[error("drawing a figure: {0}")]
+    Pixels(String),
+}
+
+impl Figure {
+    /// A chart; `group` tells charts of the same title apart.
+    pub fn chart(group: &str, chart: Chart) -> Self {
+        Self { name: file_name(group, &chart.title), drawing: Drawing::Chart(chart) }
+    }
+
+    /// The stride as a row of pictures.
+    pub fn tiles(title: &str, figures: Vec<StickFigure>) -> Self {
+        Self { name: file_name("", title), drawing: Drawing::Tiles(title.to_owned(), figures) }
+    }
+
+    /// What it shows.
+    pub fn title(&self) -> &str {
+        match &self.drawing {
+            Drawing::Chart(chart) => &chart.title,
+            Drawing::Tiles(title, _) => title,
+        }
+    }
+
+    /// As SVG with its own style, on white.
+    pub fn svg(&self) -> String {
+        match &self.drawing {
+            Drawing::Chart(chart) => {
+                let legend: Vec<(String, &str)> = chart.legend();
+                standalone::svg(
+                    self.title(),
+                    &Inside { class: "chart", size: Chart::SIZE, body: chart.body() },
+                    &legend,
+                )
+            }
+            Drawing::Tiles(title, figures) => {
+                let inside = Inside { class: "tiles", size: gait_tiles::SIZE, body: gait_tiles::body(figures) };
+                standalone::svg(title, &inside, &[])
+            }
+        }
+    }
+
+    /// As PNG. Text is set in DejaVu Sans, which the program carries: no font of the machine is used.
+    ///
+    /// # Errors
+    /// [`PngError`], for a fault of the program.
+    pub fn png(&self) -> Result<Vec<u8>, PngError> {
+        let mut options = resvg::usvg::Options { font_family: "DejaVu Sans".to_owned(), ..Default::default() };
+        options.fontdb_mut().load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
+        let tree = resvg::usvg::Tree::from_str(&self.svg(), &options)?;
+        let size = tree.size().to_int_size().scale_by(SCALE);
+        let size = size.ok_or_else(|| PngError::Pixels("it has no size".to_owned()))?;
+        let pixels = resvg::tiny_skia::Pixmap::new(size.width(), size.height());
+        let mut pixels = pixels.ok_or_else(|| PngError::Pixels("it is too large".to_owned()))?;
+        let transform = resvg::tiny_skia::Transform::from_scale(SCALE, SCALE);
+        resvg::render(&tree, transform, &mut pixels.as_mut());
+        pixels.encode_png().map_err(|e| PngError::Pixels(e.to_string()))
+    }
+
+    /// The numbers behind it: a row for each point of each line.
+    pub fn csv(&self) -> String {
+        let mut text = String::new();
+        // Writing to a String cannot fail.
+        let _ = match &self.drawing {
+            Drawing::Chart(chart) => chart_csv(&mut text, chart),
+            Drawing::Tiles(_, figures) => tiles_csv(&mut text, figures),
+        };
+        text
+    }
+}
+
+fn chart_csv(text: &mut String, chart: &Chart) -> std::fmt::Result {
+    writeln!(text, "line,{},{}", cell(&chart.x_label), cell(&chart.y_label))?;
+    for series in &chart.series {
+        let points = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+        for (x, y) in points {
+            writeln!(text, "{},{x},{y}", cell(&series.label))?;
+        }
+    }
+    for band in &chart.bands {
+        let label = cell(&band.label);
+        for (x, low, high) in &band.points {
+            writeln!(text, "{label},{x},{low}\n{label},{x},{high}")?;
+        }
+    }
+    Ok(())
+}
+
+fn tiles_csv(text: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
+    writeln!(text, "time_s,point,forward_m,up_m")?;
+    for figure in figures {
+        let mut points = vec![("hip", figure.hip), ("shoulder", figure.shoulder)];
+        for (leg, names) in [
+            (&figure.left, ["left knee", "left ankle", "left heel", "left toe"]),
+            (&figure.right, ["right knee", "right ankle", "right heel", "right toe"]),
+        ] {
+            points.extend(names.into_iter().zip([leg.knee, leg.ankle, leg.heel, leg.toe]));
+        }
+        for (name, [x, z]) in points {
+            writeln!(text, "{},{name},{x},{z}", figure.time_s)?;
+        }
+    }
+    Ok(())
+}
+
+/// A cell of a table: in quotes where it has a comma or a quote.
+fn cell(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+/// `angles`, `Right hip (prosthesis side)` as `angles-right-hip-prosthesis-side`.
+fn file_name(group: &str, title: &str) -> String {
+    let words = format!("{group} {title}");
+    let words = words.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plots::Stroke;
+
+    fn figure() -> Figure {
+        let chart = Chart::new("Knee, \"left\" <a>", "cycle, %", "angle, °")
+            .with_band("deviation", 7, vec![(0.0, 0.0, 2.0), (1.0, 1.0, 3.0)])
+            .with("this gait", 0, Stroke::Solid, vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]);
+        Figure::chart("angles", chart)
+    }
+
+    #[test]
+    fn a_figure_stands_alone() {
+        let svg = figure().svg();
+        assert!(svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("fill=\"#ffffff\""));
+        assert!(
+            !svg.contains("var(--") && svg.contains("this gait") && svg.contains("Knee, &quot;left&quot; &lt;a&gt;")
+        );
+        assert_eq!(figure().name, "angles-knee-left-a");
+        let tree = resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).unwrap();
+        assert!(tree.size().width() > 600.0);
+    }
+
+    #[test]
+    fn a_png_has_text_lines_and_a_white_ground() {
+        let png = figure().png().unwrap();
+        let pixels = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
+        let colour = |x, y| pixels.pixel(x, y).map(|p| (p.red(), p.green(), p.blue(), p.alpha()));
+        assert_eq!(colour(1, 1), Some((255, 255, 255, 255)));
+        // The title stands alone above the drawing: what is not white there is text.
+        let dark = (0..pixels.width()).any(|x| (4..40).any(|y| colour(x, y).is_some_and(|(r, ..)| r < 100)));
+        assert!(dark, "no title was drawn");
+        let blue = |p: &resvg::tiny_skia::PremultipliedColorU8| (p.red(), p.green(), p.blue()) == (0x0a, 0x6f, 0x8a);
+        assert!(pixels.pixels().iter().any(blue), "no line in its colour was drawn");
+        assert_eq!(png, figure().png().unwrap());
+    }
+
+    #[test]
+    fn the_numbers_are_those_that_are_drawn() {
+        let expected = "line,\"cycle, %\",\"angle, °\"\nthis gait,0,1\nthis gait,2,3\ndeviation,0,0\ndeviation,0,2\n\
+                        deviation,1,1\ndeviation,1,3\n";
+        assert_eq!(figure().csv(), expected);
+    }
+}

@@ -1,0 +1,204 @@
+//! What was measured in the walks of a lab session, and what was made of it.
+
+use super::audit::Actor;
+use super::{Connection, EmgResultId, Instant, LabRecordingId, LabSessionId, StoreError, StoreResult, json, now};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// What a recording is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordingKind {
+    /// Muscle activity.
+    Electromyogram,
+    /// Joint angles.
+    Motion,
+}
+
+impl RecordingKind {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Electromyogram => "electromyogram",
+            Self::Motion => "motion",
+        }
+    }
+}
+
+impl FromStr for RecordingKind {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Electromyogram, Self::Motion]
+            .into_iter()
+            .find(|kind| kind.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "kind of a recording", reason: text.to_owned() })
+    }
+}
+
+/// A recording, without the file itself.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LabRecording {
+    /// Identifier.
+    pub id: LabRecordingId,
+    /// The session.
+    pub session_id: LabSessionId,
+    /// Of which walk: 1, 2, 3.
+    pub walk: u8,
+    /// What it is of.
+    pub kind: RecordingKind,
+    /// SHA-256 of the file.
+    pub raw_sha256: String,
+    /// Who brought it.
+    pub actor: String,
+    /// When.
+    pub created_at: Instant,
+}
+
+/// A file made ready to be written: compressing takes CPU time and happens outside any transaction.
+#[derive(Debug)]
+pub struct PackedRecording {
+    kind: RecordingKind,
+    reading: String,
+    raw: Vec<u8>,
+    raw_sha256: String,
+}
+
+impl PackedRecording {
+    /// Compresses a file; `reading` says how it is to be read.
+    ///
+    /// # Errors
+    /// When serialising fails.
+    pub fn new<T: Serialize>(kind: RecordingKind, reading: &T, file: &str) -> StoreResult<Self> {
+        Ok(Self {
+            kind,
+            reading: json::to_text("reading of a recording", reading)?,
+            raw: json::compress("recording", file.as_bytes())?,
+            raw_sha256: json::sha256(file.as_bytes()),
+        })
+    }
+}
+
+/// Adds a recording.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn insert(
+    db: &mut Connection,
+    actor: &Actor,
+    session: LabSessionId,
+    walk: u8,
+    packed: &PackedRecording,
+) -> StoreResult<LabRecording> {
+    let added = LabRecording {
+        id: LabRecordingId::fresh(),
+        session_id: session,
+        walk,
+        kind: packed.kind,
+        raw_sha256: packed.raw_sha256.clone(),
+        actor: actor.as_str().to_owned(),
+        created_at: now(),
+    };
+    sqlx::query(
+        "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(added.id)
+    .bind(session)
+    .bind(walk)
+    .bind(packed.kind.as_str())
+    .bind(&packed.reading)
+    .bind(&packed.raw[..])
+    .bind(&packed.raw_sha256)
+    .bind(&added.actor)
+    .bind(added.created_at)
+    .execute(db)
+    .await?;
+    Ok(added)
+}
+
+/// Every recording of a session, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<LabRecording>> {
+    let rows = sqlx::query(
+        "select id, session_id, walk, kind, raw_sha256, actor, created_at from lab_recordings \
+         where session_id = ? order by id",
+    )
+    .bind(session)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The file of a recording, and how it is to be read.
+///
+/// # Errors
+/// [`StoreError::Missing`], or [`StoreError::Damaged`] when its hash is wrong.
+pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) -> StoreResult<(T, String)> {
+    let row = sqlx::query("select reading, raw, raw_sha256 from lab_recordings where id = ?")
+        .bind(id)
+        .fetch_optional(db)
+        .await?
+        .ok_or_else(|| StoreError::Missing { what: "recording", id: id.to_string() })?;
+    let bytes = json::decompress("recording", row.try_get("raw")?)?;
+    if json::sha256(&bytes) != row.try_get::<&str, _>("raw_sha256")? {
+        return Err(StoreError::Damaged {
+            what: "recording",
+            reason: format!("the file of recording {id} has changed"),
+        });
+    }
+    let text =
+        String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "recording", reason: e.to_string() })?;
+    Ok((json::column(&row, "reading")?, text))
+}
+
+/// Adds what was made of a session's electromyograms.
+///
+/// # Errors
+/// When serialising fails, or what the database reports.
+pub async fn insert_result<T: Serialize>(
+    db: &mut Connection,
+    actor: &Actor,
+    session: LabSessionId,
+    document: &T,
+) -> StoreResult<EmgResultId> {
+    let id = EmgResultId::fresh();
+    sqlx::query("insert into emg_results (id, session_id, document, actor, created_at) values (?, ?, ?, ?, ?)")
+        .bind(id)
+        .bind(session)
+        .bind(json::to_text("electromyogram result", document)?)
+        .bind(actor.as_str())
+        .bind(now())
+        .execute(db)
+        .await?;
+    Ok(id)
+}
+
+/// What was made of a session's electromyograms last.
+///
+/// # Errors
+/// What the database reports.
+pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Option<T>> {
+    let row = sqlx::query("select document from emg_results where session_id = ? order by id desc limit 1")
+        .bind(session)
+        .fetch_optional(db)
+        .await?;
+    row.as_ref().map(|row| json::column(row, "document")).transpose()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<LabRecording> {
+    Ok(LabRecording {
+        id: row.try_get("id")?,
+        session_id: row.try_get("session_id")?,
+        walk: row.try_get("walk")?,
+        kind: row.try_get::<&str, _>("kind")?.parse()?,
+        raw_sha256: row.try_get("raw_sha256")?,
+        actor: row.try_get("actor")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

@@ -1,0 +1,205 @@
+//! What was made of the recordings: muscle activity over the cycle, limit cycles; beside the model where the gait of a
+//! walk may be known.
+
+use super::recording::{EmgReading, MotionReading, aside};
+use super::session::{gait_of, still_shown};
+use crate::error::Error;
+use crate::store::audit::{self, Actor};
+use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
+use crate::store::lab_sessions::{self, Act};
+use crate::store::{Connection, LabRecordingId, LabSessionId, StoreError, Writer, gaits};
+use gait_optimizer::Gait;
+use gait_optimizer::emg::{CycleActivity, EmgRecording, EmgRmse, EmgSettings, ModelActivity, emg_rmse, model_activity};
+use gait_optimizer::phase_portrait::PhasePortrait;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Muscle activity of a walk over the gait cycle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WalkActivity {
+    /// 1, 2, 3.
+    pub walk: u8,
+    /// What it was made of.
+    pub recording_id: LabRecordingId,
+    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, in shares of
+    /// the peak of walk 1.
+    #[schema(value_type = Vec<Object>)]
+    pub channels: Vec<CycleActivity>,
+    /// Mean over the cycle of each channel.
+    pub averages: Vec<f64>,
+    /// Distance from walk 1: in all, and of each channel; none for walk 1.
+    #[schema(value_type = Option<Object>)]
+    pub emg_rmse: Option<EmgRmse>,
+}
+
+/// What was made of a session's electromyograms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EmgResult {
+    /// How they were filtered.
+    #[schema(value_type = Object)]
+    pub settings: EmgSettings,
+    /// The walks that were recorded.
+    pub walks: Vec<WalkActivity>,
+}
+
+/// The newest recording of each walk.
+fn newest(recordings: &[LabRecording], kind: RecordingKind) -> Vec<&LabRecording> {
+    let of_walk = |walk| recordings.iter().rfind(|recording| recording.kind == kind && recording.walk == walk);
+    (1..=super::WALKS).filter_map(of_walk).collect()
+}
+
+/// Filters, cuts and normalises the newest electromyograms of a session.
+///
+/// # Errors
+/// [`Error::Invalid`] naming a setting, [`Error::Conflict`] without a recording of walk 1.
+pub async fn compute(db: &mut Connection, id: LabSessionId, settings: EmgSettings) -> Result<EmgResult, Error> {
+    still_shown(db, id).await?;
+    let recordings = lab_recordings::of_session(db, id).await?;
+    let mut files: Vec<(u8, LabRecordingId, EmgReading, String)> = Vec::new();
+    for recording in newest(&recordings, RecordingKind::Electromyogram) {
+        let (reading, text) = lab_recordings::file(db, recording.id).await?;
+        files.push((recording.walk, recording.id, reading, text));
+    }
+    if files.first().is_none_or(|(walk, ..)| *walk != 1) {
+        return Err(Error::conflict("there is no electromyogram of walk 1, which the others are measured by"));
+    }
+    aside(move || {
+        let mut walks: Vec<WalkActivity> = Vec::new();
+        let mut normal: Vec<CycleActivity> = Vec::new();
+        for (walk, recording_id, reading, text) in &files {
+            let (recording, strikes) = reading.read(text)?;
+            let measured = activities(&recording, &strikes, &settings)?;
+            if normal.is_empty() {
+                normal.clone_from(&measured);
+            }
+            let channels = normalised(&measured, &normal)?;
+            let emg_rmse = match walks.first() {
+                Some(first) => Some(emg_rmse(&channels, &first.channels)?),
+                None => None,
+            };
+            let averages = channels.iter().map(CycleActivity::average).collect();
+            walks.push(WalkActivity { walk: *walk, recording_id: *recording_id, channels, averages, emg_rmse });
+        }
+        Ok(EmgResult { settings, walks })
+    })
+    .await
+}
+
+fn activities(recording: &EmgRecording, strikes: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, Error> {
+    let envelopes = recording.envelopes(settings)?;
+    Ok(envelopes.iter().map(|envelope| CycleActivity::cut(envelope, strikes)).collect::<Result<_, _>>()?)
+}
+
+/// The channels of normal walking, in its order, in shares of its peaks.
+fn normalised(measured: &[CycleActivity], normal: &[CycleActivity]) -> Result<Vec<CycleActivity>, Error> {
+    normal
+        .iter()
+        .map(|normal| {
+            let same = measured.iter().find(|activity| activity.channel == normal.channel);
+            let missing =
+                || Error::conflict(format!("channel {} of walk 1 is missing in a later walk", normal.channel));
+            Ok(same.ok_or_else(missing)?.normalised_by(normal)?)
+        })
+        .collect()
+}
+
+/// Keeps what was made of a session's electromyograms.
+///
+/// # Errors
+/// What the database reports.
+pub async fn keep_result(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: LabSessionId,
+    result: &EmgResult,
+) -> Result<(), Error> {
+    let kept = lab_recordings::insert_result(writer, actor, id, result).await?;
+    let used: Vec<LabRecordingId> = result.walks.iter().map(|walk| walk.recording_id).collect();
+    let detail = json!({ "result": kept, "settings": result.settings, "recordings": used });
+    audit::append(writer, actor, "lab_session.process", &format!("lab session {id}"), &detail).await?;
+    Ok(())
+}
+
+/// The model's muscles beside the channels of a walk.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WalkModel {
+    /// 2 or 3.
+    pub walk: u8,
+    /// Each channel whose muscle the model has.
+    #[schema(value_type = Vec<Object>)]
+    pub muscles: Vec<ModelActivity>,
+}
+
+/// What was made of a session's electromyograms, and the model beside it.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct EmgView {
+    /// What was measured.
+    pub result: EmgResult,
+    /// The activations of the gaits that were walked with; empty as long as the order is blinded, and for gaits without
+    /// muscles.
+    pub model: Vec<WalkModel>,
+}
+
+/// The newest result of a session; none: nothing was processed yet.
+///
+/// # Errors
+/// What the database reports.
+pub async fn emg(db: &mut Connection, id: LabSessionId) -> Result<Option<EmgView>, Error> {
+    let Some(result) = lab_recordings::newest_result::<EmgResult>(db, id).await? else { return Ok(None) };
+    let mut model = Vec::new();
+    for walk in &result.walks {
+        if let Some(gait) = known_gait(db, id, walk.walk).await? {
+            let muscles = walk.channels.iter().filter_map(|channel| model_activity(&gait, channel)).collect();
+            model.push(WalkModel { walk: walk.walk, muscles });
+        }
+    }
+    model.retain(|walk| !walk.muscles.is_empty());
+    Ok(Some(EmgView { result, model }))
+}
+
+/// The gait of a walk; none without the device, as long as the order is blinded, and where its trajectory was dropped.
+///
+/// # Errors
+/// What the database reports.
+pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Result<Option<Gait>, Error> {
+    let session = lab_sessions::get(db, id).await?;
+    if walk == 1 || session.done(Act::Unblinded).is_none() {
+        return Ok(None);
+    }
+    match gaits::get(db, gait_of(&session, walk)?).await {
+        Ok(gait) => Ok(Some(gait)),
+        Err(StoreError::Missing { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The limit cycles of a walk.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LimitCycles {
+    /// 1, 2, 3.
+    pub walk: u8,
+    /// What they were made of.
+    pub recording_id: LabRecordingId,
+    /// Edge of the zero-phase low-pass before velocities were taken by central differences, Hz.
+    pub cutoff_hz: f64,
+    /// Angle (rad) and velocity (rad/s) of each joint that was recorded, sample after sample.
+    #[schema(value_type = Vec<Object>)]
+    pub joints: Vec<PhasePortrait>,
+}
+
+/// The limit cycles of the newest motion of each walk.
+///
+/// # Errors
+/// What the database reports.
+pub async fn limit_cycles(db: &mut Connection, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
+    let recordings = lab_recordings::of_session(db, id).await?;
+    let mut found = Vec::new();
+    for recording in newest(&recordings, RecordingKind::Motion) {
+        let (reading, text): (MotionReading, String) = lab_recordings::file(db, recording.id).await?;
+        let cutoff_hz = reading.cutoff_hz;
+        let joints = aside(move || reading.portraits(&text)).await?;
+        found.push(LimitCycles { walk: recording.walk, recording_id: recording.id, cutoff_hz, joints });
+    }
+    Ok(found)
+}

@@ -1,0 +1,18 @@
+//! The paper's experiment: a person walks without the device and with two gaits, blind to which is which.
+//!
+//! Walk 1 is the one without the device, which nobody can be blind to. The order of the two gaits is drawn from the
+//! study's seed in balanced blocks and kept; it is given out by an act of an administrator alone, as in blind
+//! comparisons. What is measured is known by the number of its walk until then.
+
+mod measured;
+mod recording;
+mod session;
+
+pub use measured::{
+    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
+};
+pub use recording::{Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, keep};
+pub use session::{
+    Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
+    gait_of, in_the_lab, plan, record_walk, still_open, unblind,
+};

@@ -1,0 +1,330 @@
+//! The life of a session: planned, walk after walk recorded, closed; and who may see what of it.
+
+use crate::error::Error;
+use crate::printable;
+use crate::store::audit::{self, Actor};
+use crate::store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
+use crate::store::trials::TrialState;
+use crate::store::{
+    Connection, Instant, LabSessionId, StoreError, StudyId, TrialId, Writer, consents, studies, trials,
+};
+use crate::studies::balance::comes_first;
+use crate::studies::seed::{Purpose, derive};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Walks of a session.
+pub const WALKS: u8 = 3;
+/// Longest note, characters.
+const LONGEST_NOTE: usize = 2000;
+
+/// A session to plan.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewSession {
+    /// One of the two gaits: a converged trial of the study.
+    pub gait_one: TrialId,
+    /// The other one.
+    pub gait_two: TrialId,
+    /// Free text, at most 2000 characters.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub notes: String,
+}
+
+/// What a walk is done with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Condition {
+    /// Without the device.
+    Normal,
+    /// With gait one.
+    GaitOne,
+    /// With gait two.
+    GaitTwo,
+}
+
+/// Where a session stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SessionState {
+    /// Nobody has walked yet.
+    Planned,
+    /// At least one walk was recorded.
+    UnderWay,
+    /// Nothing is recorded any more.
+    Closed,
+}
+
+impl SessionState {
+    /// As shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Planned => "planned",
+            Self::UnderWay => "under_way",
+            Self::Closed => "closed",
+        }
+    }
+
+    fn of(session: &LabSession) -> Self {
+        if session.done(Act::Closed).is_some() {
+            Self::Closed
+        } else if session.done(Act::Walk(1)).is_some() {
+            Self::UnderWay
+        } else {
+            Self::Planned
+        }
+    }
+}
+
+/// A walk of a session.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WalkView {
+    /// 1, 2, 3.
+    pub number: u8,
+    /// What it is done with; none as long as that is blinded.
+    pub condition: Option<Condition>,
+    /// That it was recorded.
+    pub recorded: Option<Done>,
+    /// Whether it was recorded after somebody had been told which gait is which.
+    pub after_unblinding: bool,
+}
+
+/// A session, without what is blinded.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SessionView {
+    /// Identifier.
+    pub id: LabSessionId,
+    /// The study.
+    pub study_id: StudyId,
+    /// 1, 2, ... of this study.
+    pub number: u32,
+    /// Where it stands.
+    pub state: SessionState,
+    /// One of the two gaits; not the one that is walked first.
+    pub gait_one: TrialId,
+    /// The other one.
+    pub gait_two: TrialId,
+    /// Free text.
+    pub notes: String,
+    /// Its three walks.
+    pub walks: Vec<WalkView>,
+    /// Who was told the order and why; none: nobody was.
+    pub unblinded: Option<Done>,
+    /// That it was closed.
+    pub closed: Option<Done>,
+    /// Who planned it.
+    pub planned_by: String,
+    /// When.
+    pub created_at: Instant,
+}
+
+impl From<&LabSession> for SessionView {
+    fn from(session: &LabSession) -> Self {
+        let unblinded = session.done(Act::Unblinded).cloned();
+        let walk = |number| {
+            let place = |act| session.acts.iter().position(|(known, _)| *known == act);
+            let recorded = place(Act::Walk(number));
+            WalkView {
+                number,
+                condition: (number == 1 || unblinded.is_some()).then(|| condition(session, number)),
+                recorded: session.done(Act::Walk(number)).cloned(),
+                after_unblinding: place(Act::Unblinded).zip(recorded).is_some_and(|(told, walked)| told < walked),
+            }
+        };
+        Self {
+            id: session.id,
+            study_id: session.study_id,
+            number: session.number,
+            state: SessionState::of(session),
+            gait_one: session.gait_one,
+            gait_two: session.gait_two,
+            notes: session.notes.clone(),
+            walks: (1..=WALKS).map(walk).collect(),
+            closed: session.done(Act::Closed).cloned(),
+            planned_by: session.actor.clone(),
+            created_at: session.created_at,
+            unblinded,
+        }
+    }
+}
+
+fn condition(session: &LabSession, walk: u8) -> Condition {
+    match (walk, session.gait_one_first) {
+        (1, _) => Condition::Normal,
+        (2, true) | (3, false) => Condition::GaitOne,
+        _ => Condition::GaitTwo,
+    }
+}
+
+/// The gait of a walk, whoever may know it.
+///
+/// # Errors
+/// [`Error::Invalid`] for a walk without the device and for one that there is not.
+pub fn gait_of(session: &LabSession, walk: u8) -> Result<TrialId, Error> {
+    match condition(session, checked_walk(walk)?) {
+        Condition::Normal => Err(Error::invalid("walk", walk, "2 or 3: walk 1 is without the device")),
+        Condition::GaitOne => Ok(session.gait_one),
+        Condition::GaitTwo => Ok(session.gait_two),
+    }
+}
+
+/// The number of a walk, if there is such a walk.
+///
+/// # Errors
+/// [`Error::Invalid`].
+pub fn checked_walk(walk: u8) -> Result<u8, Error> {
+    if (1..=WALKS).contains(&walk) { Ok(walk) } else { Err(Error::invalid("walk", walk, "1, 2 or 3")) }
+}
+
+/// Plans a session: draws its order and writes it.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], or what the database reports.
+pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewSession) -> Result<LabSession, Error> {
+    let seed = studies::get(writer, study).await?.plan.seed;
+    printable::note("notes", &new.notes, LONGEST_NOTE)?;
+    for (field, id) in [("gait_one", new.gait_one), ("gait_two", new.gait_two)] {
+        let converged = match trials::get(writer, id).await {
+            Ok(trial) => trial.study_id == study && trial.state == TrialState::Converged,
+            Err(StoreError::Missing { .. }) => false,
+            Err(error) => return Err(error.into()),
+        };
+        if !converged {
+            return Err(Error::invalid(field, id.to_string(), "a converged trial of this study"));
+        }
+    }
+    if new.gait_one == new.gait_two {
+        return Err(Error::invalid("gait_two", new.gait_two.to_string(), "another gait than gait_one"));
+    }
+    let before = lab_sessions::of_study(writer, study).await?.len();
+    let lot = derive(seed, Purpose::LabSession, before as u64 / 4);
+    let row = NewLabSession {
+        study_id: study,
+        number: u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1),
+        gait_one: new.gait_one,
+        gait_two: new.gait_two,
+        gait_one_first: comes_first(lot, before),
+        notes: &new.notes,
+    };
+    let id = lab_sessions::insert(writer, actor, &row).await?;
+    let detail = json!({ "study": study, "number": row.number, "gait_one": row.gait_one, "gait_two": row.gait_two });
+    audit::append(writer, actor, "lab_session.plan", &format!("lab session {id}"), &detail).await?;
+    Ok(lab_sessions::get(writer, id).await?)
+}
+
+/// What a person in the lab sees of a session: nothing that could tell a gait.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct InTheLab {
+    /// What the session is known by.
+    pub session: LabSessionId,
+    /// The walk that is next, 1 to 3; none when all were recorded or the session is closed.
+    pub walk: Option<u8>,
+    /// Of how many.
+    pub walks: u8,
+    /// Whether nothing is recorded any more.
+    pub closed: bool,
+}
+
+/// The session as the person who walks and the rater see it.
+///
+/// # Errors
+/// [`Error::NotFound`], a conflict when the subject withdrew, or what the database reports.
+pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLab, Error> {
+    let session = still_shown(db, id).await?;
+    let closed = session.done(Act::Closed).is_some();
+    let walk = next_walk(&session).filter(|_| !closed);
+    Ok(InTheLab { session: id, walk, walks: WALKS, closed })
+}
+
+fn next_walk(session: &LabSession) -> Option<u8> {
+    (1..=WALKS).find(|walk| session.done(Act::Walk(*walk)).is_none())
+}
+
+/// A walk that was recorded.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RecordedWalk {
+    /// Its number: walks are recorded in their order.
+    #[schema(minimum = 1, maximum = 3)]
+    pub walk: u8,
+    /// Free text, at most 2000 characters.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub note: String,
+}
+
+/// Writes that a walk was recorded.
+///
+/// # Errors
+/// [`Error::Invalid`] for a walk that there is not, [`Error::Conflict`] when it is not the next one.
+pub async fn record_walk(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: LabSessionId,
+    walked: &RecordedWalk,
+) -> Result<InTheLab, Error> {
+    let walk = checked_walk(walked.walk)?;
+    printable::note("note", &walked.note, LONGEST_NOTE)?;
+    let session = still_open(writer, id).await?;
+    match next_walk(&session) {
+        Some(next) if next == walk => {}
+        Some(next) => return Err(Error::conflict(format!("walk {next} is next, not walk {walk}"))),
+        None => return Err(Error::conflict("every walk of this session was recorded")),
+    }
+    lab_sessions::act(writer, actor, id, Act::Walk(walk), &walked.note).await?;
+    let detail = json!({ "walk": walk, "note": walked.note });
+    audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
+    in_the_lab(writer, id).await
+}
+
+/// The session, if its subject did not withdraw.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when the subject withdrew.
+pub(super) async fn still_shown(db: &mut Connection, id: LabSessionId) -> Result<LabSession, Error> {
+    let session = lab_sessions::get(db, id).await?;
+    consents::may_be_shown(db, session.study_id).await?;
+    Ok(session)
+}
+
+/// The session, if something may still be added to it.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when it is closed or the subject withdrew.
+pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSession, Error> {
+    let session = still_shown(writer, id).await?;
+    if session.done(Act::Closed).is_some() {
+        return Err(Error::conflict("the session is closed: nothing is added to it"));
+    }
+    Ok(session)
+}
+
+/// Closes a session: nothing is recorded any more.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when it was closed before.
+pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &str) -> Result<LabSession, Error> {
+    printable::note("note", note, LONGEST_NOTE)?;
+    still_open(writer, id).await?;
+    lab_sessions::act(writer, actor, id, Act::Closed, note).await?;
+    let detail = json!({ "note": note });
+    audit::append(writer, actor, "lab_session.close", &format!("lab session {id}"), &detail).await?;
+    Ok(lab_sessions::get(writer, id).await?)
+}
+
+/// Tells which walk is with which gait, from now on everybody who may read.
+///
+/// # Errors
+/// [`Error::Invalid`] without a reason, [`Error::Conflict`] when that was told before.
+pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
+    let reason = printable::reason("reason", reason, ": why blindness ends")?;
+    still_shown(writer, id).await?;
+    if !lab_sessions::act(writer, actor, id, Act::Unblinded, reason).await? {
+        return Err(Error::conflict("the order of this session was told before"));
+    }
+    let detail = json!({ "reason": reason });
+    audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;
+    Ok(lab_sessions::get(writer, id).await?)
+}

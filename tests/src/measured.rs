@@ -1,0 +1,31 @@
+//! Files as a motion laboratory brings them, made up.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Six seconds of strides of 1.1 s at 1000 Hz: each channel an oscillation whose strength swings over the stride, that of
+/// the left tibialis anterior by a factor, and a switch under the right heel.
+pub fn electromyogram(strength: f64) -> String {
+    let mut text = "time_s,RF_L,TA_L,BF_L,GAS_L,RF_R,BF_R,heel\n".to_owned();
+    for k in 0..6000_u32 {
+        let phase = TAU * f64::from(k) / 1100.0;
+        write!(text, "{}", f64::from(k) / 1000.0).unwrap();
+        for channel in 0..6 {
+            let swing = 1.0 + (phase + f64::from(channel)).cos();
+            let carrier = (TAU * 0.083 * f64::from(k) + f64::from(channel)).sin();
+            write!(text, ",{:.6}", (if channel == 1 { strength } else { 1.0 }) * swing * carrier).unwrap();
+        }
+        writeln!(text, ",{}", u8::from(k % 1100 > 400)).unwrap();
+    }
+    text
+}
+
+/// Ten seconds of the prosthetic joints at 100 Hz.
+pub fn motion() -> String {
+    let mut text = "time_s,knee_R_rad,ankle_R_rad\n".to_owned();
+    for k in 0..1000 {
+        let phase = TAU * f64::from(k) / 110.0;
+        writeln!(text, "{},{:.6},{:.6}", f64::from(k) / 100.0, 0.4 + 0.4 * phase.cos(), 0.2 * phase.sin()).unwrap();
+    }
+    text
+}

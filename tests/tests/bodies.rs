@@ -1,0 +1,110 @@
+//! Devices and muscles of a person, through pages and REST.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gait_optimizer::Device;
+use gaitwright::store::studies::StudyState;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use serde_json::json;
+use std::collections::BTreeMap;
+
+const FORM: &str = "application/x-www-form-urlencoded";
+
+async fn service() -> (tempfile::TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    (folder, service)
+}
+
+/// The form of the built-in device, with changes.
+fn form(changes: &[(&str, &str)]) -> String {
+    let device = Device::ampro3().unwrap();
+    let mut fields: BTreeMap<&str, String> =
+        Device::FIELDS.iter().map(|field| (field.name, (field.value)(&device).to_string())).collect();
+    fields.extend(changes.iter().map(|(name, value)| (*name, (*value).to_owned())));
+    fields.iter().map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join("&")
+}
+
+#[tokio::test]
+async fn a_device_is_made_of_another_one_and_errors_stand_at_their_field() {
+    let (_folder, service) = service().await;
+    let before = service.fetch("/api/v1/devices").await.json();
+    let path = format!("/devices/{}", before[0]["id"].as_str().unwrap());
+    let page = service.fetch(&path).await.text;
+    assert!(page.contains("name=\"shank_mass_kg\"") && page.contains("0.2 to 15") && page.contains("prosthetic shank"));
+    for (field, value, expected) in [
+        ("shank_mass_kg", "99", "shank_mass_kg: &#34;99&#34; is not accepted; allowed: 0.2 to 15"),
+        ("shank_length_m", "long", "allowed: 0.2 to 0.6"),
+        ("name", "", "1 to 80 printable characters"),
+        ("colour", "red", "a field of this form"),
+    ] {
+        let changes = [("name", "light"), (field, value)];
+        let refused = service.post_text(&path, FORM, &form(&changes)).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{field}");
+        assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
+        if field != "colour" {
+            let input = refused.text.split(&format!("name=\"{field}\"")).nth(1).unwrap().split('>').next().unwrap();
+            assert!(input.contains(&format!("value=\"{value}\"")) && input.contains("aria-invalid"), "{input}");
+        }
+    }
+    assert_eq!(service.fetch("/api/v1/devices").await.json(), before, "nothing was added");
+    let made = service.post_text(&path, FORM, &form(&[("name", "light"), ("shank_mass_kg", "2.5")])).await;
+    assert_eq!(made.status, StatusCode::SEE_OTHER, "{}", made.text);
+    let location = made.headers["location"].to_str().unwrap();
+    let added = service.fetch(&format!("/api/v1{location}")).await.json();
+    let (new, old) = (&added["definition"], &before[0]["definition"]);
+    assert_eq!(
+        (&new["shank_mass_kg"], &new["carried_limb"], &new["name"]),
+        (&json!(2.5), &json!(false), &json!("light"))
+    );
+    assert_eq!(
+        (&new["foot_mass_kg"], &new["sources"]["foot_mass_kg"]),
+        (&old["foot_mass_kg"], &old["sources"]["foot_mass_kg"])
+    );
+    assert!(new["sources"]["shank_mass_kg"].is_null() && !old["sources"]["shank_mass_kg"].is_null());
+    assert!(service.fetch("/devices").await.text.contains(">light</a>"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn muscles_of_a_person_are_written_down_and_new_studies_take_them_up() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let before = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(before, &[StudyState::Finished]).await;
+    let (page, api) = (format!("/subjects/{subject}/muscles"), format!("/api/v1/subjects/{subject}/muscles"));
+    for (typed, expected) in [
+        ("sol_max_force_n=1", "muscles.sol.max_force_n = 1 is outside the allowed range [50, 20000]"),
+        ("sol_max_force_n=much", "a number, or nothing"),
+        ("sol_knee_lever_m=0.05", "sol does not span the knee"),
+        ("sol_colour=1", "a field of this form"),
+    ] {
+        let refused = service.post_text(&page, FORM, typed).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{typed}");
+        assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
+    }
+    let refused = service.post_text(&page, FORM, "sol_max_force_n=1").await.text;
+    let input = refused.split("name=\"sol_max_force_n\"").nth(1).unwrap().split('>').next().unwrap();
+    assert!(input.contains("value=\"1\"") && input.contains("aria-invalid"), "{input}");
+    assert_eq!(service.fetch(&api).await.json()["scaled_to_body"], false);
+
+    let sent = service.post_text(&page, FORM, "scaled_to_body=on&sol_max_force_n=4200&ta_max_speed=").await;
+    assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
+    let muscles = service.fetch(&api).await.json();
+    assert_eq!((&muscles["scaled_to_body"], &muscles["sol"]), (&json!(true), &json!({"max_force_n": 4200.0})));
+    let shown = service.fetch(&page).await.text;
+    assert!(shown.contains("value=\"4200\"") && shown.contains(" checked"), "{shown}");
+    let after = service.study(|new| new.trial_budget = 1).await;
+    let of = async |study| service.get(study).await.plan.gait_settings.muscles;
+    assert!(of(before).await.is_published());
+    assert_eq!(of(after).await.sol.max_force_n, Some(4200.0));
+    // A fork has the set-up of its parent, whatever was written down since.
+    let fork = service.post(&format!("/api/v1/studies/{before}/fork"), &json!({})).await.json();
+    assert!(of(fork["id"].as_str().unwrap().parse().unwrap()).await.is_published());
+    assert_eq!(service.post(&api, &json!({})).await.status, StatusCode::CREATED);
+    let published = service.study(|new| new.trial_budget = 1).await;
+    assert!(of(published).await.is_published());
+    service.stop().await;
+}

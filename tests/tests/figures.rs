@@ -1,0 +1,104 @@
+//! Figures as files: every one that a page links is there in each form, stands alone, and holds the numbers.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::trials::TrialState;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::service::Service;
+use http_body_util::BodyExt;
+use serde_json::json;
+use tower::ServiceExt;
+
+/// A file as it comes: kind and bytes.
+async fn file(service: &Service, path: &str) -> (String, Vec<u8>) {
+    let request = Request::get(path).body(Body::empty()).unwrap();
+    let answer = service.router().oneshot(request).await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK, "{path}");
+    let kind = answer.headers()["content-type"].to_str().unwrap().to_owned();
+    let name = answer.headers()["content-disposition"].to_str().unwrap().to_owned();
+    let ending = path.split('?').next().unwrap().rsplit('/').next().unwrap();
+    assert!(name.contains(ending), "{name} {ending}");
+    (kind, answer.into_body().collect().await.unwrap().to_bytes().to_vec())
+}
+
+/// The addresses of files with this ending in a page.
+fn linked(page: &str, ending: &str) -> Vec<String> {
+    let addresses = page.split("href=\"").skip(1).map(|rest| rest.split('"').next().unwrap().replace("&#38;", "&"));
+    addresses.filter(|address| address.contains("/figures/") && address.contains(ending)).collect()
+}
+
+#[tokio::test]
+async fn every_figure_of_a_page_is_there_in_every_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let mut studies = Vec::new();
+    for muscles in [true, false] {
+        let study = service.study(|new| (new.trial_budget, new.muscles) = (6, muscles)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        studies.push(study);
+    }
+    let trials = service.trials(studies[0]).await;
+    let gaits: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    let pair = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id});
+    let session = service.post(&format!("/api/v1/studies/{}/lab-sessions", studies[0]), &pair).await.json();
+    let session = session["id"].as_str().unwrap();
+    service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": 1})).await;
+    let emg = json!({"walk": 1, "recording": electromyogram(1.0), "reading": {"heel_strike_column": "heel"}});
+    let api = format!("/api/v1/lab-sessions/{session}");
+    for (what, body) in
+        [("electromyograms", emg), ("emg-results", json!({})), ("motions", json!({"walk": 1, "recording": motion()}))]
+    {
+        let done = service.post(&format!("{api}/{what}"), &body).await;
+        assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
+    }
+    for (page, least) in [
+        (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 5 + 2 + 7),
+        (format!("/trials/{}", gaits[0].id), 1 + 6 + 2 + 6 + 6 + 2 + 7),
+        (format!("/lab-sessions/{session}"), 6 + 2),
+    ] {
+        let shown = service.fetch(&page).await;
+        assert_eq!(shown.status, StatusCode::OK, "{}", shown.text);
+        let drawings = linked(&shown.text, ".svg");
+        let mut names = drawings.clone();
+        names.sort();
+        names.dedup();
+        assert_eq!((names.len(), drawings.len()), (least, least), "{page}: {drawings:?}");
+        for address in &drawings {
+            let (kind, svg) = file(&service, address).await;
+            let svg = String::from_utf8(svg).unwrap();
+            assert!(kind == "image/svg+xml" && svg.starts_with("<svg xmlns="), "{address}");
+            assert!(!svg.contains("var(--") && !svg.contains("href"), "{address}");
+            let (kind, csv) = file(&service, &address.replace(".svg", ".csv")).await;
+            assert!(kind.starts_with("text/csv") && String::from_utf8_lossy(&csv).lines().count() > 2, "{address}");
+        }
+        assert_eq!(linked(&shown.text, ".png").len(), least);
+        let (kind, png) = file(&service, &drawings[0].replace(".svg", ".png")).await;
+        assert!(kind == "image/png" && png.starts_with(b"\x89PNG") && png.len() > 5_000, "{}", png.len());
+        if let Some(folder) = std::env::var_os("GAITWRIGHT_PICTURES") {
+            for address in &drawings {
+                let (_, png) = file(&service, &address.replace(".svg", ".png")).await;
+                let name = address.split('?').next().unwrap().rsplit('/').next().unwrap().replace(".svg", ".png");
+                std::fs::write(std::path::Path::new(&folder).join(name), png).unwrap();
+            }
+        }
+    }
+    let course = format!("/api/v1/studies/{}/figures/course-gait-rmse-of-the-best-action.csv", studies[0]);
+    let (_, csv) = file(&service, &course).await;
+    let history = service.fetch(&format!("/api/v1/studies/{}/history", studies[0])).await.json();
+    let csv = String::from_utf8(csv).unwrap();
+    for milestone in history.as_array().unwrap().iter().filter(|milestone| !milestone["gait_rmse_rad"].is_null()) {
+        let row = format!(",{},{}\n", milestone["iteration"], milestone["gait_rmse_rad"]);
+        assert!(csv.contains(&row), "{row} {csv}");
+    }
+    for unknown in ["nothing.svg", "course.gif", "course", "..%2Fa.svg"] {
+        let path = format!("/api/v1/studies/{}/figures/{unknown}", studies[0]);
+        assert_eq!(service.fetch(&path).await.status, StatusCode::NOT_FOUND, "{unknown}");
+    }
+    let nonsense = service.fetch(&format!("/studies/{}/figures?other=x", studies[0])).await;
+    assert!(nonsense.status == StatusCode::UNPROCESSABLE_ENTITY && nonsense.text.contains("a study of the list"));
+    service.stop().await;
+}

@@ -1,0 +1,359 @@
+//! Lab sessions: the order is drawn, kept, and told by an act alone; walks are recorded in their order.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gait_optimizer::emg::EmgSettings;
+use gaitwright::cli::study::import;
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::trials::{Trial, TrialState};
+use gaitwright::store::{LabSessionId, Store, StudyId, archive, audit, lab_sessions};
+use gaitwright::studies::lab;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::service::Service;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const FORM: &str = "application/x-www-form-urlencoded";
+
+async fn finished() -> (TempDir, Service, StudyId, Vec<Trial>) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 24).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    (folder, service, study, trials)
+}
+
+fn converged(trials: &[Trial]) -> Vec<&Trial> {
+    trials.iter().filter(|trial| trial.state == TrialState::Converged).collect()
+}
+
+async fn planned(service: &Service, study: StudyId, trials: &[Trial]) -> Value {
+    let gaits = converged(trials);
+    let body = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id, "notes": "treadmill"});
+    let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await;
+    assert_eq!(planned.status, StatusCode::CREATED, "{}", planned.text);
+    planned.json()
+}
+
+fn id(session: &Value) -> &str {
+    session["id"].as_str().unwrap()
+}
+
+#[tokio::test]
+async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let (api, lab) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/api/v1/lab/{}", id(&session)));
+    assert_eq!((&session["state"], &session["number"]), (&json!("planned"), &json!(1)));
+    let conditions = |session: &Value| -> Vec<Value> {
+        session["walks"].as_array().unwrap().iter().map(|walk| walk["condition"].clone()).collect()
+    };
+    assert_eq!(conditions(&session), [json!("normal"), Value::Null, Value::Null]);
+
+    for (walk, status) in [
+        (2, StatusCode::CONFLICT),
+        (0, StatusCode::UNPROCESSABLE_ENTITY),
+        (4, StatusCode::UNPROCESSABLE_ENTITY),
+        (1, StatusCode::CREATED),
+        (1, StatusCode::CONFLICT),
+        (2, StatusCode::CREATED),
+    ] {
+        let walked = service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
+        assert_eq!(walked.status, status, "walk {walk}: {}", walked.text);
+    }
+    assert_eq!(service.fetch(&lab).await.json()["walk"], 3);
+    assert_eq!(service.fetch(&api).await.json()["state"], "under_way");
+
+    let without = service.post(&format!("{api}/unblind"), &json!({"reason": " "})).await;
+    assert_eq!(without.json()["field"], "reason");
+    let told = service.post(&format!("{api}/unblind"), &json!({"reason": "adverse event"})).await;
+    assert_eq!(told.status, StatusCode::OK, "{}", told.text);
+    assert_eq!(service.post(&format!("{api}/unblind"), &json!({"reason": "r"})).await.status, StatusCode::CONFLICT);
+    service.post(&format!("{lab}/walks"), &json!({"walk": 3, "note": "tired"})).await;
+    let told = service.fetch(&api).await.json();
+    let row: LabSessionId = id(&session).parse().unwrap();
+    let stored = lab_sessions::get(&mut service.store.read().await.unwrap(), row).await.unwrap();
+    let drawn = if stored.gait_one_first { ["gait_one", "gait_two"] } else { ["gait_two", "gait_one"] };
+    assert_eq!(conditions(&told), [json!("normal"), json!(drawn[0]), json!(drawn[1])]);
+    let after: Vec<_> = told["walks"].as_array().unwrap().iter().map(|walk| &walk["after_unblinding"]).collect();
+    assert_eq!(after, [&json!(false), &json!(false), &json!(true)]);
+    assert_eq!(told["walks"][2]["recorded"]["note"], "tired");
+
+    assert_eq!(service.post(&format!("{api}/close"), &json!({"note": "done"})).await.json()["state"], "closed");
+    assert_eq!(service.post(&format!("{api}/close"), &json!({})).await.status, StatusCode::CONFLICT);
+    assert!(service.fetch(&lab).await.json()["walk"].is_null());
+    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 6).await.unwrap();
+    let acts: Vec<_> = trail.iter().map(|row| row.action.trim_start_matches("lab_session.")).collect();
+    assert_eq!(acts, ["close", "walk", "unblind", "walk", "walk", "plan"]);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let mut bytes = String::new();
+    for path in ["/lab".to_owned(), format!("/lab/{}", id(&session)), format!("/api/v1/lab/{}", id(&session))] {
+        let answer = service.fetch(&path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
+        bytes.push_str(&answer.text);
+        bytes.extend(answer.headers.values().map(|value| value.to_str().unwrap().to_owned()));
+    }
+    assert!(bytes.contains("Walk 1") && bytes.contains(id(&session)));
+    let words = bytes.to_lowercase();
+    for word in
+        ["trial", "rmse", "gait_", "gait one", "gait two", "treadmill", "seed", "controller", &study.to_string()]
+    {
+        assert!(!words.contains(word), "{word}");
+    }
+    for trial in &trials {
+        assert!(!bytes.contains(&trial.id.to_string()) && !bytes.contains(&trial.id.short()));
+    }
+    // Two sessions that differ in their order alone look alike to whoever may read.
+    let mut seen = Vec::new();
+    for _ in 0..4 {
+        let session = planned(&service, study, &trials).await;
+        let mut reader = service.store.read().await.unwrap();
+        let order = lab_sessions::get(&mut reader, id(&session).parse().unwrap()).await.unwrap().gait_one_first;
+        let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
+        let page = page.replace(id(&session), "ID").replace(&format!("session {}", session["number"]), "session N");
+        seen.push((order, page));
+    }
+    assert!(seen.iter().any(|(order, _)| *order) && seen.iter().any(|(order, _)| !*order), "balanced");
+    assert!(seen.iter().all(|(_, page)| *page == seen[0].1), "{seen:?}");
+    // What a device gets for a walk is what it gets for the gait of that walk. (An analytic gait is none to walk with,
+    // and refused in the same words.)
+    let mut reader = service.store.read().await.unwrap();
+    let row = lab_sessions::get(&mut reader, id(&session).parse().unwrap()).await.unwrap();
+    drop(reader);
+    let drawn = if row.gait_one_first { row.gait_one } else { row.gait_two };
+    let controller = format!("/api/v1/lab-sessions/{}/controller.json", id(&session));
+    let file = service.fetch(&format!("{controller}?walk=2")).await;
+    let of_gait = service.fetch(&format!("/api/v1/trials/{drawn}/controller.json")).await;
+    assert_eq!((file.status, file.text), (of_gait.status, of_gait.text));
+    let none = service.fetch(&format!("{controller}?walk=1")).await;
+    assert!(
+        none.status == StatusCode::UNPROCESSABLE_ENTITY && none.text.contains("without the device"),
+        "{}",
+        none.text
+    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
+    let (_folder, service, study, trials) = finished().await;
+    let gaits = converged(&trials);
+    let other = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(other, &[StudyState::Finished]).await;
+    let foreign = service.trials(other).await[0].id;
+    let no_gait = trials.iter().find(|trial| trial.state != TrialState::Converged).unwrap().id;
+    let path = format!("/api/v1/studies/{study}/lab-sessions");
+    for (two, expected) in [
+        (foreign, "a converged trial of this study"),
+        (no_gait, "a converged trial of this study"),
+        (gaits[0].id, "another gait than gait_one"),
+    ] {
+        let refused = service.post(&path, &json!({"gait_one": gaits[0].id, "gait_two": two})).await;
+        assert_eq!(refused.json()["field"], "gait_two");
+        assert!(refused.text.contains(expected), "{}", refused.text);
+    }
+    let form = format!("/studies/{study}/lab");
+    let refused = service.post_text(&form, FORM, &format!("gait_one={}&gait_two=x&notes=level", gaits[0].id)).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(
+        refused.text.contains("a gait of the list") && refused.text.contains(">level</textarea>"),
+        "{}",
+        refused.text
+    );
+    assert_eq!(service.fetch(&path).await.json(), json!([]));
+
+    let body = format!("gait_one={}&gait_two={}&notes=", gaits[0].id, gaits[1].id);
+    let made = service.post_text(&form, FORM, &body).await;
+    let page = made.headers["location"].to_str().unwrap().to_owned();
+    let shown = service.fetch(&page).await.text;
+    assert!(shown.contains("one of the two gaits: blinded") && shown.contains("without the device"), "{shown}");
+    let lab = page.replace("lab-sessions", "lab");
+    assert_eq!(service.post_text(&lab, FORM, "walk=1&note=").await.status, StatusCode::SEE_OTHER);
+    assert!(service.fetch(&lab).await.text.contains("Walk 2"));
+    assert_eq!(service.post_text(&format!("{page}/close"), FORM, "note=").await.status, StatusCode::SEE_OTHER);
+    let again = service.post_text(&format!("{page}/close"), FORM, "note=").await;
+    assert!(again.status == StatusCode::CONFLICT && again.text.contains("the session is closed"), "{}", again.text);
+    assert_eq!(service.post_text(&format!("{page}/unblind"), FORM, "note=over").await.status, StatusCode::SEE_OTHER);
+    assert!(!service.fetch(&page).await.text.contains("one of the two gaits: blinded"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
+    let (folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    let api = format!("/api/v1/lab-sessions/{}", id(&session));
+    service.post(&format!("{api}/electromyograms"), &with_heel(1, &electromyogram(1.0))).await;
+    let emg = service.post(&format!("{api}/emg-results"), &json!({})).await.json();
+    let file = archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    let before = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    service.stop().await;
+    let other = Store::open(&folder.path().join("b.db")).await.unwrap();
+    import(&other, &archive::open(&file).unwrap()).await.unwrap();
+    assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
+    // From the files in the archive the same curves are made again.
+    let mut reader = other.read().await.unwrap();
+    let anew = lab::compute(&mut reader, before[0].id, EmgSettings::default()).await.unwrap();
+    assert_eq!(serde_json::to_value(&anew).unwrap(), emg["result"]);
+    assert_eq!(lab::emg(&mut reader, before[0].id).await.unwrap().unwrap().result, anew);
+    drop(reader);
+    for change in [
+        "update lab_sessions set gait_one_first = 1 - gait_one_first",
+        "delete from lab_acts",
+        "delete from lab_recordings",
+    ] {
+        let mut writer = other.write().await.unwrap();
+        let refused = sqlx::query(change).execute(&mut *writer).await.unwrap_err().to_string();
+        assert!(refused.contains("append-only"), "{refused}");
+    }
+    other.close().await;
+}
+
+/// What six decimals in the file leave.
+const ROUNDED: f64 = 1e-5;
+
+fn with_heel(walk: u8, recording: &str) -> Value {
+    json!({"walk": walk, "recording": recording, "reading": {"heel_strike_column": "heel"}})
+}
+
+#[tokio::test]
+async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_anew() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let api = format!("/api/v1/lab-sessions/{}", id(&session));
+    let bring = format!("{api}/electromyograms");
+    let early = service.post(&bring, &with_heel(1, &electromyogram(1.0))).await;
+    assert!(
+        early.status == StatusCode::CONFLICT && early.text.contains("walk 1 was not recorded yet"),
+        "{}",
+        early.text
+    );
+    for walk in 1..=3 {
+        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+    }
+    assert!(service.fetch(&format!("{api}/emg-results")).await.json().is_null());
+    assert_eq!(service.post(&format!("{api}/emg-results"), &json!({})).await.status, StatusCode::CONFLICT);
+    for (walk, strength) in [(1, 9.0), (2, 1.5), (1, 1.0)] {
+        let kept = service.post(&bring, &with_heel(walk, &electromyogram(strength))).await;
+        assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
+    }
+    let done = service.post(&format!("{api}/emg-results"), &json!({})).await;
+    assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
+    let walks = done.json()["result"]["walks"].as_array().unwrap().clone();
+    let used: Vec<_> = walks.iter().map(|walk| walk["walk"].clone()).collect();
+    assert_eq!(used, [json!(1), json!(2)], "the newest recording of each walk");
+    let peak = |walk: &Value, channel: usize| {
+        let mean = walk["channels"][channel]["mean"].as_array().unwrap();
+        mean.iter().map(|value| value.as_f64().unwrap()).fold(0.0, f64::max)
+    };
+    assert!((peak(&walks[0], 1) - 1.0).abs() < 1e-12 && (peak(&walks[1], 1) - 1.5).abs() < ROUNDED);
+    assert_eq!(walks[0]["channels"][0]["strides"], 5);
+    // One channel is 1.5 times as strong, the others are the same: 0.5 times the RMS of its normal curve.
+    let normal = walks[0]["channels"][1]["mean"].as_array().unwrap();
+    let squares: f64 = normal.iter().map(|value| value.as_f64().unwrap().powi(2)).sum();
+    let by_hand = 0.5 * (squares / 101.0).sqrt();
+    let total = walks[1]["emg_rmse"]["total"].as_f64().unwrap();
+    assert!((total - by_hand).abs() < ROUNDED && walks[0]["emg_rmse"].is_null(), "{total} {by_hand}");
+    assert!((walks[1]["emg_rmse"]["parts"][1].as_f64().unwrap() - by_hand).abs() < ROUNDED);
+    let average = |walk: usize| walks[walk]["averages"][1].as_f64().unwrap();
+    assert!((average(1) - 1.5 * average(0)).abs() < ROUNDED);
+
+    let other = json!({"settings": {"envelope_hz": 3.0, "order": 2}});
+    let anew = service.post(&format!("{api}/emg-results"), &other).await.json();
+    assert_eq!(
+        anew["result"]["settings"],
+        json!({"band_low_hz": 20.0, "band_high_hz": 450.0, "envelope_hz": 3.0, "order": 2})
+    );
+    assert_ne!(anew["result"]["walks"][0]["averages"], walks[0]["averages"]);
+    assert_eq!(service.fetch(&format!("{api}/emg-results")).await.json(), anew);
+    let refused = service.post(&format!("{api}/emg-results"), &json!({"settings": {"band_high_hz": 500.0}})).await;
+    assert_eq!(
+        (refused.status, &refused.json()["field"]),
+        (StatusCode::UNPROCESSABLE_ENTITY, &json!("emg.band_high_hz"))
+    );
+    let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
+    assert!(page.contains("EMG, left tibialis anterior") && page.contains("low-pass 3 Hz, order 2"), "{page}");
+    assert!(page.contains("mean of 5, 5 strides") && page.contains("EMG RMSE in all"), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let api = format!("/api/v1/lab-sessions/{}", id(&session));
+    service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    let whole = electromyogram(1.0);
+    let half = &whole[..whole.find("\n1.5,").unwrap() + 9];
+    for (body, expected) in [
+        (with_heel(1, half), "recording, line 1502"),
+        (with_heel(1, &whole.replace("\n1.5,", "\n1.5,x")), "recording, line 1502, column 2"),
+        (with_heel(1, &whole.replace("TA_L", "TA")), "column \\\"TA_L\\\" is missing"),
+        (with_heel(4, &whole), "1, 2 or 3"),
+        (json!({"walk": 1, "recording": whole}), "two times or more, or heel_strike_column"),
+        (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 0.2]}}), "none of the 1 strides"),
+        (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel strike (s) = 99"),
+        (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),
+        (json!({"walk": 1, "recording": whole, "reading": {"form": "opensim"}}), "endheader"),
+        (json!({"walk": 1, "recording": whole, "reading": {"form": "c3d"}}), "form"),
+    ] {
+        let refused = service.post(&format!("{api}/electromyograms"), &body).await;
+        assert!(refused.status.is_client_error(), "{expected}: {}", refused.text);
+        assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
+    }
+    for (change, expected) in [
+        (json!({"recording": motion().replace("\n5,", "\n5,x")}), "recording, line 502, column 2"),
+        (json!({"recording": "time_s,knee\n0,1"}), "recording"),
+        (json!({"reading": {"cutoff_hz": 90.0}}), "reading.cutoff_hz"),
+        (json!({"walk": 2}), "walk 2 was not recorded yet"),
+    ] {
+        let mut body = json!({"walk": 1, "recording": motion()});
+        body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
+        let refused = service.post(&format!("{api}/motions"), &body).await;
+        assert!(refused.status.is_client_error() && refused.text.contains(expected), "{expected}: {}", refused.text);
+    }
+    let page = format!("/lab-sessions/{}", id(&session));
+    let form = "walk=1&form=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
+    let refused = service.post_text(&format!("{page}/electromyograms"), FORM, form).await;
+    assert!(refused.text.contains("CHANNEL=COLUMN"), "{}", refused.text);
+    assert_eq!(service.fetch(&format!("{api}/recordings")).await.json(), json!([]), "nothing was kept");
+    service.post(&format!("{api}/close"), &json!({})).await;
+    let closed = service.post(&format!("{api}/electromyograms"), &with_heel(1, &whole)).await;
+    assert!(closed.status == StatusCode::CONFLICT && closed.text.contains("the session is closed"), "{}", closed.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let (api, page) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/lab-sessions/{}", id(&session)));
+    for walk in 1..=2 {
+        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+    }
+    let recording = motion().replace('\n', "%0A").replace(',', "%2C");
+    for walk in 1..=2 {
+        let form = format!("walk={walk}&form=csv&unit=&cutoff_hz=6&recording={recording}");
+        let kept = service.post_text(&format!("{page}/motions"), FORM, &form).await;
+        assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
+    }
+    let cycles = service.fetch(&format!("{api}/limit-cycles")).await.json();
+    let joints: Vec<_> = cycles[1]["joints"].as_array().unwrap().iter().map(|joint| &joint["joint"]).collect();
+    assert_eq!((joints, &cycles[1]["cutoff_hz"]), (vec![&json!("knee_R"), &json!("ankle_R")], &json!(6.0)));
+    let before = service.fetch(&page).await.text;
+    assert!(before.contains("Right knee, walk 2") && !before.contains("orbit of the gait"), "{before}");
+    service.post(&format!("{api}/unblind"), &json!({"reason": "all were walked"})).await;
+    let after = service.fetch(&page).await.text;
+    assert!(after.contains("orbit of the gait") && !after.contains("Right knee, walk 2"), "{after}");
+    service.stop().await;
+}
