@@ -2,17 +2,20 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use gaitwright::cli::study::{import, prune};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::{Store, archive, backup, gaits, studies};
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
+use http_body_util::BodyExt;
 use serde_json::json;
 use sqlx::sqlite::SqliteConnectOptions;
 use std::path::Path;
 use std::process::Command;
+use tower::ServiceExt;
 
 async fn posterior(service: &Service, study: gaitwright::store::StudyId) -> Vec<(u64, u64)> {
     let mut reader = service.store.read().await.unwrap();
@@ -105,6 +108,16 @@ async fn figures_for_prometheus_count_requests_by_route() {
         let value = line.rsplit(' ').next().unwrap();
         assert!(value.parse::<f64>().is_ok(), "{line}");
     }
+    let router = service.router();
+    let send = async |method: &str, path: &str| {
+        let request = Request::builder().method(method).uri(path).body(Body::empty()).unwrap();
+        router.clone().oneshot(request).await.unwrap().into_body().collect().await.unwrap().to_bytes()
+    };
+    for number in 0..3 {
+        send(&format!("INVENTED{number}"), "/health").await;
+    }
+    let text = String::from_utf8(send("GET", "/metrics").await.to_vec()).unwrap();
+    assert!(text.contains("method=\"other\"") && !text.contains("INVENTED"), "{text}");
     assert_eq!(service.fetch("/ready").await.status, StatusCode::OK);
     service.director.stop();
     assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
