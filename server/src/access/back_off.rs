@@ -45,6 +45,13 @@ impl BackOff {
         Ok(())
     }
 
+    /// An attempt has failed: the wait begins now.
+    pub fn failed(&self, name: &str, now: Instant) {
+        if let Some(failures) = self.names().get_mut(&name.to_lowercase()) {
+            failures.until = failures.until.max(now + wait_after(failures.count));
+        }
+    }
+
     /// Forgets the failures of a name that signed in.
     pub fn succeeded(&self, name: &str) {
         self.names().remove(&name.to_lowercase());
@@ -74,7 +81,8 @@ mod tests {
         for _ in 0..4 {
             assert_eq!(back_off.begin("Ada", now), Ok(()));
         }
-        let mut later = now;
+        let mut later = now + Duration::from_secs(1);
+        back_off.failed("ADA", later);
         for seconds in [2, 4, 8, 16, 32] {
             let wait = Duration::from_secs(seconds);
             assert_eq!(back_off.begin("ada", later), Err(wait));

@@ -170,6 +170,19 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// `gaitwright.db.WHAT-20260501T101500`, or with a number where there is one of that second.
+fn free_name(of: &Path, what: &str) -> PathBuf {
+    let stamp: String = now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect();
+    let first = beside(of, &format!(".{what}-{stamp}"));
+    let mut name = first.clone();
+    let mut number = 1_u32;
+    while name.exists() {
+        number += 1;
+        name = beside(&first, &format!("-{number}"));
+    }
+    name
+}
+
 /// SQLite finds its log by the name of the file, and so is our lock found: a file with two names has two of each.
 fn refuse_second_name(path: &Path) -> StoreResult<()> {
     #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! Putting a copy in place of a record. That is done when the record is damaged, or of a newer version: nothing here
 //! opens it.
 
-use super::{StoreError, StoreResult, backup, beside, now, take_ownership};
+use super::{StoreError, StoreResult, backup, beside, free_name, take_ownership};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ pub async fn from_file(from: &Path, to: &Path) -> StoreResult<Option<PathBuf>> {
     }
     // Not a copy of the file: a part of the record may be in the log beside it.
     backup::of_file(from, &part).await?;
-    let kept = to.exists().then(|| free_name(to));
+    let kept = to.exists().then(|| free_name(to, "before"));
     let moved = File::open(&part).and_then(|file| file.sync_all()).and_then(|()| put(&part, to, kept.as_deref()));
     if moved.is_err() {
         let _ = std::fs::remove_file(&part);
@@ -53,17 +53,4 @@ fn put(part: &Path, to: &Path, kept: Option<&Path>) -> std::io::Result<()> {
     std::fs::rename(part, to)?;
     let folder = to.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     File::open(folder)?.sync_all()
-}
-
-/// `gaitwright.db.before-20260501T101500`, or with a number where there is one of that second.
-fn free_name(of: &Path) -> PathBuf {
-    let stamp: String = now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect();
-    let first = beside(of, &format!(".before-{stamp}"));
-    let mut name = first.clone();
-    let mut number = 1_u32;
-    while name.exists() {
-        number += 1;
-        name = beside(&first, &format!("-{number}"));
-    }
-    name
 }

@@ -3,6 +3,7 @@
 
 mod archive;
 mod audit;
+mod backups;
 mod blind;
 mod certificates;
 mod comparison;
@@ -12,6 +13,7 @@ mod exports;
 mod gaits;
 pub mod health;
 mod history;
+mod jobs;
 mod motion;
 mod preferences;
 mod recommendation;
@@ -19,6 +21,7 @@ mod reference_gaits;
 mod scripts;
 mod studies;
 mod subjects;
+mod suggestions;
 mod tokens;
 mod trials;
 mod users;
@@ -89,6 +92,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))
+        .routes(routes!(suggestions::of_study, suggestions::create))
         // access
         .routes(routes!(users::me))
         .routes(routes!(users::list, users::create))
@@ -98,6 +102,9 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(tokens::list, tokens::create))
         .routes(routes!(tokens::revoke))
         // operation
+        .routes(routes!(jobs::list))
+        .routes(routes!(jobs::workers))
+        .routes(routes!(backups::create))
         .routes(routes!(audit::list))
         .routes(routes!(health::get))
 }

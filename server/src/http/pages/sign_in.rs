@@ -69,6 +69,7 @@ pub(super) async fn post(State(app): State<AppState>, Form(form): Form<Credentia
         commit(writer).await?;
         return signed_in(&app, &session, user.role);
     }
+    app.access.back_off.failed(&name, Instant::now());
     sign_in::failed(&mut writer, &name).await?;
     commit(writer).await?;
     let refused = Some("name or password is not right".to_owned());
