@@ -3,9 +3,7 @@
 //! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--grid off]`: the guesses of the
 //! catalogue, or with `--grid on` a grid of routes, timings and knee flexions; one CSV row each.
 
-use gait_optimizer::{
-    CancelToken, ColdGuess, ColdRoute, GaitProblem, GuessTiming, SolveOptions, Subject, solve_from_guesses,
-};
+use gait_optimizer::{CancelToken, ColdGuess, ColdRoute, GaitProblem, SolveOptions, Subject, solve_from_guesses};
 use std::error::Error;
 
 fn argument(name: &str, default: &str) -> String {
@@ -23,11 +21,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let muscles = argument("--muscles", "on") == "on";
     let mut guesses = ColdGuess::CATALOGUE.to_vec();
     if argument("--grid", "off") == "on" {
-        let base = guesses[0];
+        let base = ColdGuess::EARLY_RISE;
         guesses.clear();
         for route in [ColdRoute::Direct, ColdRoute::MuscleTracking] {
             for knee_flexion in [0.5, 1.0] {
-                guesses.push(ColdGuess { route, knee_flexion, timing: GuessTiming::EarlyRise, ..base });
+                guesses.push(ColdGuess { route, knee_flexion, ..base });
             }
         }
     }

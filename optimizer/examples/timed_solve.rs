@@ -1,10 +1,12 @@
 //! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guesses 1] [--mesh 4,4,6,6] [--trace]` (one guess, as the other side has one start; the service tries two;
-//! `--trace` prints a line per iteration on stderr).
+//! [--guess 1] [--mesh 4,4,6,6] [--trace]` (one guess of the catalogue, as the other side has one start; the service tries
+//! two; `--trace` prints a line per iteration on stderr).
 
-use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
+use gait_optimizer::{
+    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve_from_guesses,
+};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -12,7 +14,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut muscles = false;
     let mut trace = false;
     let mut settings = GaitSettings::reference_problem();
-    let mut options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
+    let mut options = SolveOptions::default();
+    let mut guess: usize = 1;
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
@@ -20,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--muscles" => muscles = true,
             "--trace" => trace = true,
             "--subject" => subject = value()?.parse()?,
-            "--guesses" => options.cold_guesses = value()?.parse()?,
+            "--guess" => guess = value()?.parse()?,
             "--mesh" => {
                 let intervals: Vec<usize> = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?;
                 let [ds2, ds3, ss2, ss1] = intervals[..] else { return Err("--mesh needs four numbers".into()) };
@@ -32,9 +35,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let problem = GaitProblem { settings, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
-    let outcome = solve(
+    let Some(guess) = ColdGuess::CATALOGUE.get(guess.wrapping_sub(1)) else {
+        return Err(format!("--guess: 1 to {}", ColdGuess::CATALOGUE.len()).into());
+    };
+    let outcome = solve_from_guesses(
         &problem,
-        None,
+        std::slice::from_ref(guess),
         &options,
         &mut |record| {
             let phase = serde_json::json!(record.phase);

@@ -199,7 +199,7 @@ pub fn explain(
         return Err(SolveError::WarmStartShape(format!("{} variables, expected {}", x.len(), programme.variables())));
     }
     let max_iterations = options.max_iterations.min(MAX_ITERATIONS);
-    let options = SolveOptions { cold_guesses: 1, max_iterations, ..*options };
+    let options = SolveOptions { cold_guesses: 1, retry: false, max_iterations, ..*options };
     let (mut at_limit, mut relaxations) = (Vec::new(), Vec::new());
     for (bound, value) in problem.bounds.to_array().into_iter().enumerate() {
         let domains = problem.domains_at_limit(&programme, x, bound)?;

@@ -19,6 +19,7 @@ pub mod hip_velocity;
 pub mod layout;
 pub mod limits;
 pub mod mechanics;
+pub mod mesh_transfer;
 pub mod muscle_forces;
 pub mod objective;
 pub mod outputs;

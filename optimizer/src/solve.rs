@@ -2,6 +2,7 @@
 
 use crate::nlp::NlpError;
 use crate::subject::ModelError;
+use std::borrow::Cow;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -15,7 +16,7 @@ mod run;
 mod warm_start;
 
 pub use attempts::CONVERGED_VIOLATION;
-use attempts::{Tried, choose, try_guesses, try_warm};
+use attempts::{Tried, choose, try_catalogue, try_guesses, try_warm};
 pub use cold_guesses::{ColdGuess, ColdRoute, GuessTiming};
 pub use options::{BasinChoice, SolveOptions};
 pub use problem::GaitProblem;
@@ -24,7 +25,7 @@ pub use report::{Attempt, Optimality, SolveOutcome, SolveReport, SolveStatus, St
 use report::{Tally, outcome};
 use run::Context;
 pub use warm_start::WarmStart;
-use warm_start::check_shape;
+use warm_start::on_mesh_of;
 
 /// Why a solve could not even be tried.
 #[derive(Debug, Error)]
@@ -42,9 +43,9 @@ pub enum SolveError {
 
 /// Solves one gait problem. Deterministic: same inputs, same bits.
 ///
-/// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]. A warm start
-/// that does not converge falls back to a cold start; when that does not converge either, the outcome is where the
-/// violation is smallest. `observer` is called once per iteration, on the calling thread.
+/// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]; when none
+/// converges, it tries the others of the catalogue until one does ([`SolveOptions::retry`]). A warm start that does not
+/// converge falls back to a cold start; when that does not converge either, the outcome is where the violation is smallest. `observer` is called once per iteration, on the calling thread.
 /// A solve that ends without a gait is an `Ok` outcome with another status than `Converged`.
 ///
 /// # Errors
@@ -58,17 +59,15 @@ pub fn solve(
 ) -> Result<SolveOutcome, SolveError> {
     options.validate()?;
     let programme = problem.programme(problem.muscles)?;
-    if let Some(warm) = warm_start {
-        check_shape(problem, &programme, warm)?;
-    }
+    let warm_point = warm_start.map(|warm| on_mesh_of(problem, &programme, warm)).transpose()?;
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
     let mut tried = Vec::new();
-    if let Some(warm) = warm_start {
-        let warm = try_warm(&context, warm, observer)?;
-        let settled =
-            matches!(warm.choice.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit);
+    if let Some(point) = warm_point {
+        let strategy = if matches!(point, Cow::Borrowed(_)) { "warm start" } else { "warm start from another mesh" };
+        let warm = try_warm(&context, point.into_owned(), strategy, observer)?;
+        let is_final = warm.is_final();
         tried.push(warm);
-        if settled {
+        if is_final {
             return finish(&context, tried, StartedFrom::Warm, StartedFrom::Warm);
         }
     }
@@ -76,7 +75,7 @@ pub fn solve(
         Some(_) => (StartedFrom::Warm, StartedFrom::ColdAfterWarm),
         None => (StartedFrom::Cold, StartedFrom::Cold),
     };
-    tried.extend(try_guesses(&context, &ColdGuess::CATALOGUE[..options.cold_guesses], observer)?);
+    tried.extend(try_catalogue(&context, observer)?);
     finish(&context, tried, first, others)
 }
 
@@ -98,7 +97,7 @@ pub fn solve_from_guesses(
     ModelError::check_range("number of guesses", guesses.len() as f64, 1.0, 1e3)?;
     let programme = problem.programme(problem.muscles)?;
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
-    let tried = try_guesses(&context, guesses, observer)?;
+    let tried = try_guesses(&context, guesses, 0, observer)?;
     finish(&context, tried, StartedFrom::Cold, StartedFrom::Cold)
 }
 

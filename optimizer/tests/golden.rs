@@ -7,6 +7,9 @@ mod golden_gaits;
 use gait_optimizer::gait_problem::gait_of;
 use gait_optimizer::metrics::{activation_alternations, gait_rmse};
 use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
+use gait_optimizer::{
+    CancelToken, ColdGuess, GaitProblem, GaitSettings, SolveOptions, SolveStatus, Subject, solve_from_guesses,
+};
 use golden_gaits::{golden, golden_gait, golden_with, numbers};
 
 #[test]
@@ -94,5 +97,32 @@ fn activations_do_not_alternate_with_the_default_weights() {
         assert_eq!(activation_alternations(&gait), 0, "after {} iterations", result.iterations);
         let theirs = golden.data["obj"].as_f64().unwrap();
         assert!(result.objective > theirs && result.objective < 1.01 * theirs, "{} {theirs}", result.objective);
+    }
+}
+
+/// What a cold start took where this was written, by subject, muscles and guess; another machine's rounding may cost a
+/// seventh more.
+#[test]
+fn cold_starts_take_no_more_iterations_than_before() {
+    let known = [
+        ((1, false, ColdGuess::NATURAL), 130),
+        ((1, false, ColdGuess::EARLY_RISE), 145),
+        ((2, false, ColdGuess::NATURAL), 143),
+        ((2, false, ColdGuess::EARLY_RISE), 151),
+        ((1, true, ColdGuess::NATURAL), 203),
+        ((1, true, ColdGuess::EARLY_RISE), 183),
+        ((2, true, ColdGuess::NATURAL), 201),
+        ((2, true, ColdGuess::EARLY_RISE), 227),
+    ];
+    let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
+    for ((subject, muscles, guess), iterations) in known.into_iter().take(if long { 8 } else { 2 }) {
+        let problem = GaitProblem::new(Subject::builtin(subject).unwrap(), muscles).unwrap();
+        let problem = GaitProblem { settings: GaitSettings::reference_problem(), ..problem };
+        let options = SolveOptions::default();
+        let outcome = solve_from_guesses(&problem, &[guess], &options, &mut |_| {}, &CancelToken::new()).unwrap();
+        let report = outcome.report;
+        println!("subject {subject} muscles {muscles} {}: {}", guess.label(), report.iterations);
+        assert_eq!(report.status, SolveStatus::Converged);
+        assert!(report.iterations <= iterations + iterations / 7, "{}: {}", guess.label(), report.iterations);
     }
 }

@@ -75,11 +75,11 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     assert!(["infeasible", "stalled", "iteration_limit"].contains(&status), "{}", rows[2]);
     assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "out.csv"]);
 
-    // Another mesh is refused in words, once for the whole table.
-    let output = cli::run(BINARY, folder, &[&sweep[..], &["60", "--muscles", "off"]].concat());
+    // A gait of the other variant is refused in words, once for the whole table.
+    let output = cli::run(BINARY, folder, &[&sweep[..], &["60", "--muscles", "on"]].concat());
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("its mesh is 2,2,3,3, the problem's is "), "{text}");
+    assert!(text.contains("it is without muscles, the problem is with muscles"), "{text}");
 }
 
 /// A place that goes away while the solve runs: the figures are printed all the same.

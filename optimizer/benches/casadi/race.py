@@ -1,20 +1,22 @@
 """Ours against CasADi + IPOPT, alternately, from the same start: prints every run, medians and the ratio.
 
-    python race.py [--subject 1] [--muscles] [--runs 3] [--backend vm|c] [--threads 1] [--limit 900] [--json FILE]
+    python race.py [--subject 1] [--muscles] [--runs 3] [--backend vm|c] [--guess 1] [--threads 1] [--limit 900]
+        [--json FILE]
 
 Wall seconds and processor seconds (user + system) are both reported: on a machine that is shared only the latter are
 comparable. CasADi's symbolic set-up and compilation are not in its time; posture and motion guess are in ours.
+Memory is the peak of the process, CasADi's with Python and set-up.
 """
 
 import argparse
 import json
 import os
 import platform
-import resource
 import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -39,17 +41,25 @@ def example(name):
 
 
 def timed(command, limit):
-    """Standard output, wall seconds and processor seconds of a child."""
-    before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    output = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT, timeout=limit).stdout
-    wall, after = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
-    return output, wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    """Standard output, wall seconds, processor seconds and peak memory (MB) of a child."""
+    started = time.perf_counter()
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
+    alarm = threading.Timer(limit, child.kill)
+    alarm.start()
+    output = child.stdout.read()
+    _, status, usage = os.wait4(child.pid, 0)
+    alarm.cancel()
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode != 0:
+        raise subprocess.CalledProcessError(child.returncode, command)
+    wall = time.perf_counter() - started
+    return output, wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def run_ours(program, arguments, limit):
     command = [program, "--subject", str(arguments.subject), "--threads", str(arguments.threads)]
-    command += ["--muscles"] if arguments.muscles else []
-    output, wall, cpu = timed(command, limit)
+    command += ["--guess", str(arguments.guess)] + (["--muscles"] if arguments.muscles else [])
+    output, _, cpu, memory = timed(command, limit)
     result = json.loads(output)
     report = result["report"]
     return {
@@ -62,6 +72,7 @@ def run_ours(program, arguments, limit):
         "violation": report["max_violation"],
         "wall": report["seconds_total"],
         "cpu": cpu,
+        "memory": memory,
         "evaluation": report["seconds_evaluation"],
     }
 
@@ -72,7 +83,8 @@ def run_casadi(start, arguments, limit, folder):
     options = {"problem": problem, "start": start["start"], "backend": arguments.backend, "cache": str(folder)}
     given, result = folder / "options.json", folder / "result.json"
     given.write_text(json.dumps(options))
-    timed([sys.executable, str(HERE / "gait_casadi.py"), "solve", str(given), str(result)], limit)
+    command = [sys.executable, str(HERE / "gait_casadi.py"), "solve", str(given), str(result)]
+    _, _, _, memory = timed(command, limit)
     result = json.loads(result.read_text())
     return {
         "side": "casadi",
@@ -84,6 +96,7 @@ def run_casadi(start, arguments, limit, folder):
         "violation": result["violation"],
         "wall": result["seconds_ipopt"],
         "cpu": result["seconds_ipopt_cpu"],
+        "memory": memory,
         "evaluation": result["seconds_evaluation"],
         "setup": result["seconds_setup"],
         "compile": result["seconds_compile"],
@@ -103,7 +116,8 @@ def main():
     parser.add_argument("--muscles", action="store_true")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--backend", default="vm", choices=["vm", "c"])
-    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--guess", type=int, default=1, help="number of our guess in the catalogue")
+    parser.add_argument("--threads", type=int, default=1, help="of ours; IPOPT's linear algebra has one")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a single run is given up")
     parser.add_argument("--json", help="file for all figures")
     arguments = parser.parse_args()
@@ -130,6 +144,7 @@ def main():
                     f"{number + 1} {side:7} {run['status']:20} {run['iterations']:5} iterations "
                     f"objective {run['objective']:.8f} violation {run['violation']:.1e} "
                     f"wall {run['wall']:8.2f} s  cpu {run['cpu']:8.2f} s  evaluation {run['evaluation']:7.2f} s  "
+                    f"memory {run['memory']:5.0f} MB  "
                     f"load {run['load']:.1f}  {run['by_phase']}",
                     flush=True,
                 )

@@ -254,11 +254,14 @@ impl<'p> Formulation<'p> {
         self.tally.seconds += clock.elapsed().as_secs_f64();
     }
 
-    /// Hessian of F + y^T c without the diagonal of [`curvature`](Self::curvature).
-    pub(super) fn hessian(&mut self, w: &[f64], y: &[f64], values: &mut [f64]) {
+    /// Hessian of F + y^T c, of F alone without y; without the diagonal of [`curvature`](Self::curvature).
+    pub(super) fn hessian(&mut self, w: &[f64], y: Option<&[f64]>, values: &mut [f64]) {
         let clock = Instant::now();
-        for i in 0..self.m {
-            self.scaled_multipliers[i] = if self.rows[i] == RowKind::Free { 0.0 } else { y[i] * self.row_scale[i] };
+        self.scaled_multipliers.fill(0.0);
+        if let Some(y) = y {
+            for i in (0..self.m).filter(|&i| self.rows[i] != RowKind::Free) {
+                self.scaled_multipliers[i] = y[i] * self.row_scale[i];
+            }
         }
         let sigma = match self.goal {
             Goal::Program => self.objective_scale,

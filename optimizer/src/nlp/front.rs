@@ -60,8 +60,10 @@ pub(super) struct Front {
     pub row_coupling: usize,
     pub row_diagonal: usize,
     pub reduced: usize,
-    /// Length of the numbers.
+    /// Length of the numbers while it is factorised.
     pub length: usize,
+    /// Length of those that solves need: all before the Schur complement.
+    pub kept: usize,
 }
 
 /// Place of an index in a front.
@@ -117,6 +119,7 @@ impl Front {
         front.row_coupling = front.coupling + front.wide * variables;
         front.row_diagonal = front.row_coupling + front.wide * rows;
         front.reduced = front.row_diagonal + padded(rows);
+        front.kept = front.reduced + front.wide * front.pivot_slots();
         front.length = front.reduced + front.wide * size;
         let square = |k: usize| (k * k) as f64;
         front.flops = 2.0 * (square(rows) * (variables + 2 * size) as f64 + rows as f64 * square(size))
@@ -142,6 +145,11 @@ impl Front {
     /// All slots.
     pub(super) fn slots(&self) -> usize {
         self.pivot_slots() + self.border.len()
+    }
+
+    /// Length of the Schur complement, columns of the lower triangle one after the other.
+    pub(super) fn schur_length(&self) -> usize {
+        self.border.len() * (self.border.len() + 1) / 2
     }
 
     /// Index and place of everything in the front.

@@ -68,6 +68,8 @@ pub(super) struct Run<'p> {
     pub rhs: PrimalDual,
     pub search: Search,
     free_mu: FreeMu,
+    /// Whether the violation has been small enough for the rows' curvature (`NlpSettings::curvature_from_violation`).
+    rows_curve: bool,
 }
 
 /// Memory of the adaptive barrier strategy.
@@ -77,6 +79,10 @@ struct FreeMu {
     free: bool,
     /// The last optimality errors.
     recent: Vec<f64>,
+}
+
+fn unscaled_violation(c: &[f64], scale: &[f64]) -> f64 {
+    c.iter().zip(scale).fold(0.0, |v: f64, (c, s)| if c.is_nan() { f64::INFINITY } else { v.max(c.abs() / s) })
 }
 
 /// Whether a feasibility phase may end at this w.
@@ -109,6 +115,7 @@ impl<'p> Run<'p> {
             rhs: PrimalDual::zeros(&form),
             search: Search::new(&form),
             free_mu: FreeMu { free: true, recent: Vec::new() },
+            rows_curve: false,
             point,
             form,
         }
@@ -188,15 +195,19 @@ impl<'p> Run<'p> {
         Optimality::new(&self.form, &self.point, &self.at, &self.c, &self.lagrangian, mu)
     }
 
+    /// Largest violation of the rows, unscaled; infinite for NaN.
+    fn largest_violation(&self) -> f64 {
+        unscaled_violation(&self.c, &self.form.row_scale)
+    }
+
     /// Largest violation of the program's own rows, unscaled, elastics left out.
     pub(super) fn program_violation(&self) -> f64 {
+        let Goal::Feasibility { first, .. } = self.form.goal else { return self.largest_violation() };
         let mut own = self.c.clone();
-        if let Goal::Feasibility { first, .. } = self.form.goal {
-            for (a, t) in self.form.attached.iter().zip(&self.point.w[self.form.n..]).skip(first) {
-                own[a.row] -= a.sign * t;
-            }
+        for (a, t) in self.form.attached.iter().zip(&self.point.w[self.form.n..]).skip(first) {
+            own[a.row] -= a.sign * t;
         }
-        own.iter().zip(&self.form.row_scale).fold(0.0, |v: f64, (c, s)| v.max(c.abs() / s))
+        unscaled_violation(&own, &self.form.row_scale)
     }
 
     pub(super) fn current_optimality(&mut self) -> Optimality {
@@ -214,7 +225,7 @@ impl<'p> Run<'p> {
     fn is_converged(&self, settings: &NlpSettings, now: &Optimality) -> bool {
         let scale = self.form.objective_scale;
         now.error() <= settings.tolerance
-            && self.c.iter().zip(&self.form.row_scale).all(|(c, s)| c.abs() / s <= settings.violation_tolerance)
+            && self.largest_violation() <= settings.violation_tolerance
             && now.dual / scale <= settings.dual_tolerance
             && now.complementarity / scale <= settings.complementarity_tolerance
     }
@@ -263,7 +274,12 @@ impl<'p> Run<'p> {
     /// Newton direction with inertia correction; false when no regularisation gives one.
     fn compute_direction(&mut self, session: &mut Session) -> bool {
         let settings = session.settings;
-        self.form.hessian(&self.point.w, &self.point.y, &mut self.at.hessian);
+        if !self.rows_curve {
+            self.rows_curve =
+                self.phase() == Phase::Feasibility || self.largest_violation() <= settings.curvature_from_violation;
+        }
+        let multipliers = self.rows_curve.then_some(self.point.y.as_slice());
+        self.form.hessian(&self.point.w, multipliers, &mut self.at.hessian);
         for j in 0..self.form.length() {
             let (sl, su) = (self.at.slack_lower[j], self.at.slack_upper[j]);
             self.rhs.w[j] = -(self.lagrangian[j] + DAMPING * self.mu * self.form.single_side(j));

@@ -27,7 +27,10 @@ const WORTH_A_THREAD: f64 = 8e6;
 /// Numbers of a front.
 #[derive(Debug, Default)]
 struct Factor {
+    /// What solves need.
     numbers: Vec<f64>,
+    /// The Schur complement, where its parent is done by another piece of the schedule; the others wait on a stack.
+    schur: Vec<f64>,
     null_space: NullSpace,
     /// Subdiagonal of B and order of the slots, of stage 2.
     off_diagonal: Vec<f64>,
@@ -45,7 +48,7 @@ impl Factor {
             rank: front.rows.len(),
         };
         Self {
-            numbers: vec![0.0; front.length],
+            numbers: vec![0.0; front.kept],
             null_space,
             off_diagonal: vec![0.0; pivots],
             order: (0..pivots).collect(),
@@ -92,13 +95,17 @@ impl Multifrontal {
         let members = postordered(column_starts, row_indices, front_of);
         let fronts =
             analyse(column_starts, row_indices, &members, kinds).ok_or_else(|| fail("a front is too large"))?;
-        let factors = fronts.iter().map(Factor::new).collect();
+        let mut factors: Vec<Factor> = fronts.iter().map(Factor::new).collect();
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
         let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
+        let pieces = schedule(&fronts, threads);
+        for root in pieces.iter().map(|piece| piece.end - 1) {
+            factors[root].schur = vec![0.0; fronts[root].schur_length()];
+        }
         Ok(Self {
             order,
             architecture: Arch::new(),
-            pieces: schedule(&fronts, threads),
+            pieces,
             neglected: fronts.iter().flat_map(Front::neglected).collect(),
             factors,
             workspaces: (0..threads).map(|_| Workspace::new(&fronts)).collect(),
@@ -267,14 +274,14 @@ fn schedule(fronts: &[Front], threads: usize) -> Vec<Piece> {
     pieces
 }
 
-/// Factorises fronts [start, end) whose children all lie in the range that `before` begins with.
+/// Factorises a piece: a subtree, or one front whose children are done.
 struct FactorPiece<'a> {
     fronts: &'a [Front],
     values: &'a [f64],
-    range: std::ops::Range<usize>,
-    /// Number of the first of the factors.
-    base: usize,
+    piece: Piece,
+    /// From front number `base` to the end of the piece.
     factors: &'a mut [Factor],
+    base: usize,
     work: &'a mut Workspace,
 }
 
@@ -283,45 +290,79 @@ impl WithSimd for FactorPiece<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        for f in self.range {
-            let (before, rest) = self.factors.split_at_mut(f - self.base);
-            if let Some(own) = rest.first_mut() {
-                factor_front(simd, self.fronts, f, self.values, before, self.base, own, self.work);
+        let Self { fronts, values, piece, factors, base, work } = self;
+        work.stack.clear();
+        for f in piece.start..piece.end {
+            let (before, rest) = factors.split_at_mut(f - base);
+            let Some(own) = rest.first_mut() else { continue };
+            let mut numbers = std::mem::take(&mut work.numbers);
+            let front = &fronts[f];
+            let scratch = &mut numbers[..front.length];
+            scratch.fill(0.0);
+            for &(q, offset) in &front.sources {
+                scratch[offset as usize] += values[q as usize];
             }
+            own.broke_down = !add_children(fronts, f, scratch, before, base, &mut work.stack)
+                || !factor_front(simd, front, scratch, own, work);
+            if !own.broke_down {
+                own.numbers.copy_from_slice(&scratch[..front.kept]);
+                if f + 1 == piece.end {
+                    let mut at = 0;
+                    for column in schur_columns(front, scratch) {
+                        own.schur[at..at + column.len()].copy_from_slice(column);
+                        at += column.len();
+                    }
+                } else {
+                    schur_columns(front, scratch).for_each(|column| work.stack.extend_from_slice(column));
+                }
+            }
+            work.numbers = numbers;
         }
     }
 }
 
-/// Factorises front number `f` (its children are in `before`, which begins with front number `base`).
-#[allow(clippy::too_many_arguments)] // one call
+/// Columns of the lower triangle of the Schur complement.
 #[inline(always)]
-fn factor_front<S: Simd>(
-    simd: S,
+fn schur_columns<'a>(front: &'a Front, numbers: &'a [f64]) -> impl Iterator<Item = &'a [f64]> {
+    let end = front.slots();
+    (front.pivot_slots()..end).map(move |c| &numbers[front.reduced + c * front.wide..][c..end])
+}
+
+/// Adds the Schur complements of the children of front `f`; false when one of them broke down. A front alone finds them
+/// with its children (in `before`, which begins with front number `base`), one of a subtree on top of the stack.
+#[inline(always)]
+fn add_children(
     fronts: &[Front],
     f: usize,
-    values: &[f64],
+    numbers: &mut [f64],
     before: &[Factor],
     base: usize,
-    own: &mut Factor,
-    work: &mut Workspace,
-) {
+    stack: &mut Vec<f64>,
+) -> bool {
     let front = &fronts[f];
-    own.numbers.fill(0.0);
-    own.inertia = Inertia::default();
-    own.broke_down = true;
-    for &(q, offset) in &front.sources {
-        own.numbers[offset as usize] += values[q as usize];
+    if front.children.iter().any(|(child, _)| before[child - base].broke_down) {
+        return false;
     }
+    let waiting = |child: usize| if before[child - base].schur.is_empty() { fronts[child].schur_length() } else { 0 };
+    let bottom = stack.len() - front.children.iter().map(|(child, _)| waiting(*child)).sum::<usize>();
+    let mut at = bottom;
     for (child, map) in &front.children {
-        let factor = &before[child - base];
-        if factor.broke_down {
-            return;
-        }
-        add_child(front, &mut own.numbers, &fronts[*child], &factor.numbers, map);
+        let length = waiting(*child);
+        let schur = if length > 0 { &stack[at..at + length] } else { &before[child - base].schur };
+        at += length;
+        add_child(front, numbers, schur, map);
     }
+    stack.truncate(bottom);
+    true
+}
+
+/// Factorises the assembled front; false when it breaks down.
+#[inline(always)]
+fn factor_front<S: Simd>(simd: S, front: &Front, numbers: &mut [f64], own: &mut Factor, work: &mut Workspace) -> bool {
+    own.inertia = Inertia::default();
     if !front.rows.is_empty() {
-        if !null_space::eliminate(simd, front, &mut own.numbers, &mut own.null_space, work) {
-            return;
+        if !null_space::eliminate(simd, front, numbers, &mut own.null_space, work) {
+            return false;
         }
         own.inertia.positive += own.null_space.rank;
         own.inertia.negative += own.null_space.rank;
@@ -332,7 +373,7 @@ fn factor_front<S: Simd>(
         size: front.slots(),
         stride: front.wide,
     };
-    let reduced = &mut own.numbers[front.reduced..];
+    let reduced = &mut numbers[front.reduced..];
     let done = bunch_kaufman::eliminate(
         simd,
         reduced,
@@ -342,29 +383,31 @@ fn factor_front<S: Simd>(
         &mut own.inertia,
         &mut work.columns,
     );
-    own.broke_down = !(done && all_finite(reduced));
+    done && all_finite(reduced)
 }
 
 /// Adds a child's Schur complement. Its border is in elimination order, in which a front's variables come before its
 /// slots, so places that are slots ascend.
 #[inline(always)]
-fn add_child(front: &Front, numbers: &mut [f64], child: &Front, child_numbers: &[f64], map: &ChildMap) {
-    let first = child.pivot_slots();
-    let schur = &child_numbers[child.reduced..];
+fn add_child(front: &Front, numbers: &mut [f64], schur: &[f64], map: &ChildMap) {
     let count = map.variables.len();
-    for column in 0..count + map.slots.len() {
-        let source = &schur[(first + column) * child.wide + first..][..count + map.slots.len()];
+    let size = count + map.slots.len();
+    let mut rest = schur;
+    for column in 0..size {
+        let (mut source, below) = rest.split_at(size - column);
+        rest = below;
         let target = if let Some(&variable) = map.variables.get(column) {
-            for (value, &other) in source.iter().zip(&map.variables).skip(column) {
+            let (among, others) = source.split_at(count - column);
+            for (value, &other) in among.iter().zip(&map.variables[column..]) {
                 numbers[front.offset(Place::Variable(variable), Place::Variable(other))] += value;
             }
+            source = others;
             &mut numbers[front.coupling + variable as usize * front.wide..][..front.wide]
         } else {
             let slot = map.slots[column - count] as usize;
             &mut numbers[front.reduced + slot * front.wide..][..front.wide]
         };
-        let begin = column.max(count);
-        for (value, &slot) in source[begin..].iter().zip(&map.slots[begin - count..]) {
+        for (value, &slot) in source.iter().zip(&map.slots[column.max(count) - count..]) {
             target[slot as usize] += value;
         }
     }
@@ -393,8 +436,7 @@ impl KktSolver for Multifrontal {
         }
         let play = |hand: Vec<(Piece, &mut [Factor])>, work: &mut Workspace| {
             for (piece, factors) in hand {
-                let range = piece.start..piece.end;
-                architecture.dispatch(FactorPiece { fronts, values, range, base: piece.start, factors, work });
+                architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: piece.start, work });
             }
         };
         std::thread::scope(|scope| {
@@ -409,8 +451,8 @@ impl KktSolver for Multifrontal {
         });
         if let Some(work) = self.workspaces.first_mut() {
             for piece in self.pieces.iter().filter(|p| p.thread.is_none()) {
-                let (range, factors) = (piece.start..piece.end, &mut self.factors);
-                architecture.dispatch(FactorPiece { fronts, values, range, base: 0, factors, work });
+                let (piece, factors) = (*piece, &mut self.factors);
+                architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: 0, work });
             }
         }
         let mut inertia = Inertia::default();
@@ -440,7 +482,7 @@ impl KktSolver for Multifrontal {
     }
 
     fn factor_entries(&self) -> usize {
-        self.fronts.iter().map(|front| front.length).sum()
+        self.fronts.iter().map(|front| front.kept).sum()
     }
 }
 

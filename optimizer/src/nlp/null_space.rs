@@ -36,9 +36,13 @@ pub(super) struct NullSpace {
     pub rank: usize,
 }
 
-/// Work arrays of a front.
+/// Work arrays of a thread.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
+    /// The numbers of the front in work: one place for all of them stays in the cache.
+    pub numbers: Vec<f64>,
+    /// Schur complements that wait for their parents.
+    pub stack: Vec<f64>,
     /// Columns as long as the slots.
     pub columns: Vec<f64>,
     /// Copy of the transposed Jacobian.
@@ -52,12 +56,25 @@ impl Workspace {
     pub(super) fn new(fronts: &[Front]) -> Self {
         let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
         Self {
+            numbers: vec![0.0; largest(&|f| f.length)],
+            stack: Vec::with_capacity(highest_stack(fronts)),
             columns: vec![0.0; largest(&|f| f.wide * f.rows.len().max(2))],
             jacobian: vec![0.0; largest(&|f| f.tall * f.rows.len())],
             pivot: vec![0.0; largest(&|f| f.tall)],
             terms: Vec::with_capacity(largest(&|f| f.variables.len())),
         }
     }
+}
+
+/// The most that waits on the stack when the fronts are factorised one after the other.
+fn highest_stack(fronts: &[Front]) -> usize {
+    let (mut height, mut highest) = (0, 0);
+    for front in fronts {
+        height -= front.children.iter().map(|(child, _)| fronts[*child].schur_length()).sum::<usize>();
+        height += front.schur_length();
+        highest = highest.max(height);
+    }
+    highest
 }
 
 impl Front {

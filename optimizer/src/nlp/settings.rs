@@ -111,6 +111,11 @@ pub struct NlpSettings {
     /// this. `None`: no scaling (the problem is scaled by hand). Default none. IPOPT uses 100.
     pub gradient_scaling: Option<f64>,
 
+    /// Until the unscaled violation has once been as small as this, the Hessian is that of the objective alone: far from
+    /// a feasible point the multipliers are large and mean little, and the curvature they give the rows only calls for
+    /// regularisation and short steps. Default infinite (JSON: null): always the whole Hessian.
+    #[serde(with = "infinite_as_null")]
+    pub curvature_from_violation: f64,
     /// First regularisation of the Hessian. Default 1e-4 (WB06 delta_w^0).
     pub hessian_regularisation_first: f64,
     /// Smallest regularisation of the Hessian. Default 1e-20 (WB06 delta_w^min).
@@ -190,6 +195,7 @@ impl Default for NlpSettings {
             bound_multiplier_start: BoundMultiplierStart::default(),
             multiplier_limit: 1000.0,
             gradient_scaling: None,
+            curvature_from_violation: f64::INFINITY,
             hessian_regularisation_first: 1e-4,
             hessian_regularisation_min: 1e-20,
             hessian_regularisation_max: 1e20,
@@ -245,6 +251,7 @@ impl NlpSettings {
         if let Some(limit) = self.gradient_scaling {
             positive("gradient_scaling", limit)?;
         }
+        in_range("curvature_from_violation", self.curvature_from_violation, 0.0, f64::INFINITY)?;
         positive("hessian_regularisation_first", self.hessian_regularisation_first)?;
         positive("hessian_regularisation_min", self.hessian_regularisation_min)?;
         in_range(

@@ -2,11 +2,11 @@
 
 use super::cold_guesses::ColdGuess;
 use super::run::{Context, Run};
-use super::{Attempt, BasinChoice, IterationRecord, SolveError, SolveStatus, WarmStart};
+use super::{Attempt, BasinChoice, IterationRecord, SolveError, SolveStatus};
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
 use crate::metrics::gait_rmse;
-use crate::nlp::{NlpResult, NonlinearProgram};
+use crate::nlp::{NlpResult, NonlinearProgram, WarmPoint};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
@@ -69,6 +69,11 @@ pub(super) struct Tried {
 }
 
 impl Tried {
+    /// Whether nothing more is to be tried: a gait, or an end that was asked for.
+    pub(super) fn is_final(&self) -> bool {
+        matches!(self.choice.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
+    }
+
     fn new(context: &Context<'_>, result: NlpResult, strategy: &str, run: &Run<'_>) -> Self {
         let choice = Choice::new(context, result);
         Self {
@@ -83,12 +88,13 @@ impl Tried {
 /// Tries a warm start.
 pub(super) fn try_warm(
     context: &Context<'_>,
-    warm: &WarmStart,
+    point: WarmPoint,
+    strategy: &str,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Tried, SolveError> {
     let mut run = Run::new(context, context.options.threads, observer);
-    let result = run.warm(warm)?;
-    Ok(Tried::new(context, result, "warm start", &run))
+    let result = run.warm(point)?;
+    Ok(Tried::new(context, result, strategy, &run))
 }
 
 fn try_guess(
@@ -111,17 +117,18 @@ enum Message {
     Done(usize, Result<Tried, SolveError>),
 }
 
-/// Tries every guess, as many at a time as there are threads. Results come in the order of the guesses and do not
-/// depend on the number of threads.
+/// Tries every guess, as many at a time as there are threads. Results come in the order of the guesses, the first of
+/// which has number `first`, and do not depend on the number of threads.
 pub(super) fn try_guesses(
     context: &Context<'_>,
     guesses: &[ColdGuess],
+    first: usize,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Vec<Tried>, SolveError> {
     let threads = context.options.threads;
     let workers = threads.min(guesses.len());
     if workers <= 1 {
-        return guesses.iter().enumerate().map(|(i, guess)| try_guess(context, i, guess, threads, observer)).collect();
+        return (first..).zip(guesses).map(|(i, guess)| try_guess(context, i, guess, threads, observer)).collect();
     }
     let next = AtomicUsize::new(0);
     let mut done: Vec<Option<Result<Tried, SolveError>>> = guesses.iter().map(|_| None).collect();
@@ -137,7 +144,7 @@ pub(super) fn try_guesses(
                         // Nobody listens any more only when the calling thread is unwinding.
                         let _ = sender.send(Message::Iteration(*record));
                     };
-                    let tried = try_guess(context, index, guess, threads / workers, &mut tell);
+                    let tried = try_guess(context, first + index, guess, threads / workers, &mut tell);
                     let _ = sender.send(Message::Done(index, tried));
                 }
             });
@@ -151,6 +158,22 @@ pub(super) fn try_guesses(
         }
     });
     done.into_iter().flatten().collect()
+}
+
+/// Tries the guesses of the catalogue: the first ones side by side, the others while nothing has come of any.
+pub(super) fn try_catalogue(
+    context: &Context<'_>,
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<Vec<Tried>, SolveError> {
+    let (first, others) = ColdGuess::CATALOGUE.split_at(context.options.cold_guesses);
+    let mut tried = try_guesses(context, first, 0, observer)?;
+    for guess in others.iter().filter(|_| context.options.retry) {
+        if tried.iter().any(Tried::is_final) {
+            break;
+        }
+        tried.extend(try_guesses(context, std::slice::from_ref(guess), tried.len(), observer)?);
+    }
+    Ok(tried)
 }
 
 /// Index of the answer: a cancelled attempt if there is one (the caller wants no answer), otherwise by `choice` among

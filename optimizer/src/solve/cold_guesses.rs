@@ -18,6 +18,9 @@ pub enum ColdRoute {
     PlainOptimum,
 }
 
+/// No violation of the scaled programme is this large: the constraints' curvature counts from the first iteration.
+const WHOLE_HESSIAN: f64 = 1e6;
+
 /// Place of the knee among the reference's angles.
 const KNEE: usize = 2;
 
@@ -57,6 +60,10 @@ pub struct ColdGuess {
     pub timing: GuessTiming,
     /// First barrier parameter of the cost phase.
     pub barrier: f64,
+    /// Scaled violation from which on the constraints' curvature counts (`NlpSettings::curvature_from_violation`).
+    pub curvature_from: f64,
+    /// Whether the cost phase may raise and lower the barrier parameter by the complementarity it meets.
+    pub adaptive_barrier: bool,
 }
 
 impl ColdGuess {
@@ -68,17 +75,24 @@ impl ColdGuess {
         stride_length_m: 1.15,
         timing: GuessTiming::Even,
         barrier: 1e-4,
+        curvature_from: 0.03,
+        adaptive_barrier: false,
     };
+    /// The basin with the lowest objective, mostly: stiff swing knee with muscles.
+    pub const EARLY_RISE: Self = Self { timing: GuessTiming::EarlyRise, curvature_from: 0.3, ..Self::NATURAL };
 
-    /// The guesses of a cold start, the first [`SolveOptions::cold_guesses`](super::SolveOptions) of which are tried.
-    /// The timing decides the basin (with muscles: natural or stiff swing knee); route, knee flexion, stride and barrier
-    /// hardly matter (`examples/basins.rs`).
-    pub const CATALOGUE: [Self; 5] = [
+    /// The guesses of a cold start: the first [`SolveOptions::cold_guesses`](super::SolveOptions) of them are tried, the
+    /// others one after the other only while none has converged.
+    /// The timing decides the basin most (with muscles: natural or stiff swing knee), then when the curvature of the
+    /// constraints counts; route, knee flexion, stride and barrier hardly matter (`examples/basins.rs`).
+    pub const CATALOGUE: [Self; 7] = [
         Self::NATURAL,
-        Self { timing: GuessTiming::EarlyRise, ..Self::NATURAL },
+        Self::EARLY_RISE,
+        Self { curvature_from: WHOLE_HESSIAN, ..Self::NATURAL },
         Self { route: ColdRoute::MuscleTracking, ..Self::NATURAL },
-        Self { route: ColdRoute::MuscleTracking, timing: GuessTiming::EarlyRise, ..Self::NATURAL },
+        Self { route: ColdRoute::MuscleTracking, ..Self::EARLY_RISE },
         Self { route: ColdRoute::PlainOptimum, ..Self::NATURAL },
+        Self { adaptive_barrier: true, ..Self::NATURAL },
     ];
 
     /// Checks every field.
@@ -90,6 +104,7 @@ impl ColdGuess {
         ModelError::check_range("guess.stride_time_s", self.stride_time_s, 0.5, 3.0)?;
         ModelError::check_range("guess.stride_length_m", self.stride_length_m, 0.4, 2.0)?;
         ModelError::check_range("guess.barrier", self.barrier, 1e-9, 1.0)?;
+        ModelError::check_range("guess.curvature_from", self.curvature_from, 0.0, WHOLE_HESSIAN)?;
         Ok(())
     }
 
@@ -117,14 +132,23 @@ impl ColdGuess {
         if self.timing == GuessTiming::EarlyRise {
             label.push_str(", early rise");
         }
-        let normal = Self::NATURAL;
+        if self.adaptive_barrier {
+            label.push_str(", adaptive barrier");
+        }
+        let normal = match self.timing {
+            GuessTiming::Even => Self::NATURAL,
+            GuessTiming::EarlyRise => Self::EARLY_RISE,
+        };
         for (name, value, usual, unit) in [
             ("knee flexion x", self.knee_flexion, normal.knee_flexion, ""),
             ("stride time ", self.stride_time_s, normal.stride_time_s, " s"),
             ("stride length ", self.stride_length_m, normal.stride_length_m, " m"),
             ("barrier ", self.barrier, normal.barrier, ""),
+            ("curvature from violation ", self.curvature_from, normal.curvature_from, ""),
         ] {
-            if value != usual {
+            if value == WHOLE_HESSIAN {
+                label.push_str(", whole Hessian");
+            } else if value != usual {
                 for part in [", ", name, &value.to_string(), unit] {
                     label.push_str(part);
                 }

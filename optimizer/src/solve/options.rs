@@ -17,8 +17,10 @@ pub struct SolveOptions {
     /// Threads, 1 to 16: for the cold guesses side by side, then for the linear algebra of each. The result does not
     /// depend on it.
     pub threads: usize,
-    /// How many guesses of [`ColdGuess::CATALOGUE`] a cold start tries.
+    /// How many guesses of [`ColdGuess::CATALOGUE`] a cold start tries, whatever becomes of them.
     pub cold_guesses: usize,
+    /// Whether the other guesses follow, one after the other, until one converges.
+    pub retry: bool,
     /// Which of the converged guesses is the answer.
     pub basin_choice: BasinChoice,
 }
@@ -31,6 +33,7 @@ impl Default for SolveOptions {
             time_limit_s: None,
             threads: 1,
             cold_guesses: 2,
+            retry: true,
             basin_choice: BasinChoice::default(),
         }
     }

@@ -1,12 +1,12 @@
 //! One attempt in progress: its phases, and what they cost.
 
 use super::cold_guesses::{ColdGuess, ColdRoute};
-use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveOptions, WarmStart};
+use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveOptions};
 use crate::cold_start;
 use crate::gait_problem::GaitProgramme;
 use crate::nlp::{
-    self, BoundMultiplierStart, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, Residuals,
-    StartPoint, Timing,
+    self, BarrierStrategy, BoundMultiplierStart, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram,
+    Residuals, StartPoint, Timing, WarmPoint,
 };
 use std::time::Instant;
 
@@ -134,13 +134,11 @@ impl<'a> Run<'a> {
         let plain = tracked_problem.programme(false)?.with_timing(&guess.timing.fractions());
         let postures = cold_start::posture::solve(&plain, &settings);
         let first = cold_start::motion::guess(&plain, &postures, &settings);
+        let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..NlpSettings::default() };
         let tracking_settings =
-            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..NlpSettings::default() };
-        let cost_settings = |mu_initial| NlpSettings {
-            tolerance: self.context.options.tolerance,
-            mu_initial,
-            ..NlpSettings::default()
-        };
+            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..every_phase.clone() };
+        let cost_settings =
+            |mu_initial| NlpSettings { tolerance: self.context.options.tolerance, mu_initial, ..every_phase.clone() };
         let mut tracked = self.phase(
             Phase::Tracking,
             &plain.for_tracking(TRACKING_WEIGHT),
@@ -173,18 +171,21 @@ impl<'a> Run<'a> {
         if Self::interrupted(&tracked) {
             return Ok(tracked);
         }
-        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), cost_settings(guess.barrier))
+        let barrier_strategy =
+            if guess.adaptive_barrier { BarrierStrategy::Adaptive } else { BarrierStrategy::Monotone };
+        let settings = NlpSettings { barrier_strategy, ..cost_settings(guess.barrier) };
+        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), settings)
     }
 
     /// Begins with the barrier parameter that a cold start ends with: a larger one forgets the point, and with a smaller
     /// or larger one the same problem would end elsewhere.
-    pub(super) fn warm(&mut self, warm: &WarmStart) -> Result<NlpResult, SolveError> {
+    pub(super) fn warm(&mut self, point: WarmPoint) -> Result<NlpResult, SolveError> {
         let defaults = NlpSettings::default();
         let mu_warm = self.context.options.tolerance / (defaults.kappa_epsilon + 1.0);
         self.phase(
             Phase::Cost,
             self.context.programme,
-            &StartPoint::Warm(warm.point.clone()),
+            &StartPoint::Warm(point),
             NlpSettings {
                 tolerance: self.context.options.tolerance,
                 mu_initial: MU_COST,

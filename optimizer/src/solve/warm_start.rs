@@ -1,12 +1,13 @@
 //! Where an earlier solve ended, as a start.
 
 use super::{GaitProblem, SolveError};
-use crate::gait_problem::GaitProgramme;
+use crate::gait_problem::{GaitProgramme, mesh_transfer};
 use crate::nlp::{NonlinearProgram, WarmPoint};
 use crate::settings::Mesh;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
-/// Primal-dual point of an earlier solve of a problem of the same mesh and variant.
+/// Primal-dual point of an earlier solve of a problem of the same variant, on this mesh or another.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WarmStart {
@@ -18,12 +19,12 @@ pub struct WarmStart {
     pub point: WarmPoint,
 }
 
-/// Refuses a start of another variant, mesh or size.
-pub(super) fn check_shape(
+/// The start on the mesh of `programme`. Refuses one of another variant or size.
+pub(super) fn on_mesh_of<'a>(
     problem: &GaitProblem,
     programme: &GaitProgramme,
-    warm: &WarmStart,
-) -> Result<(), SolveError> {
+    warm: &'a WarmStart,
+) -> Result<Cow<'a, WarmPoint>, SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
             "it is {} muscles, the problem is {} muscles",
@@ -31,15 +32,19 @@ pub(super) fn check_shape(
             if problem.muscles { "with" } else { "without" }
         )));
     }
-    if warm.mesh != problem.settings.mesh {
-        return Err(SolveError::WarmStartShape(format!(
-            "its mesh is {}, the problem's is {} (intervals of DS2,DS3,SS2,SS1)",
-            in_words(&warm.mesh),
-            in_words(&problem.settings.mesh)
-        )));
+    if warm.mesh == problem.settings.mesh {
+        check_shape(programme, &warm.point)?;
+        return Ok(Cow::Borrowed(&warm.point));
     }
+    let mut of_its_mesh = problem.clone();
+    of_its_mesh.settings.mesh = warm.mesh;
+    let own = of_its_mesh.programme(problem.muscles)?;
+    check_shape(&own, &warm.point)?;
+    Ok(Cow::Owned(mesh_transfer::transfer(&own, programme, &warm.point)))
+}
+
+fn check_shape(programme: &GaitProgramme, point: &WarmPoint) -> Result<(), SolveError> {
     let (n, m) = (programme.variables(), programme.rows());
-    let point = &warm.point;
     for (name, found, expected) in [
         ("variables", point.x.len(), n),
         ("lower multipliers", point.lower_multipliers.len(), n),
@@ -54,8 +59,4 @@ pub(super) fn check_shape(
         }
     }
     Ok(())
-}
-
-fn in_words(mesh: &Mesh) -> String {
-    format!("{},{},{},{}", mesh.ds2, mesh.ds3, mesh.ss2, mesh.ss1)
 }
