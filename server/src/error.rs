@@ -59,6 +59,9 @@ pub enum Error {
     /// The request cannot be read.
     #[error("{0}")]
     Malformed(String),
+    /// A field of the request cannot be read.
+    #[error("{}", .0.message)]
+    Unreadable(Box<FieldError>),
     /// The request can be read, but a field is not acceptable.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),

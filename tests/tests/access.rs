@@ -4,6 +4,7 @@
 
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
+use futures_util::future::join_all;
 use gaitwright::access::people::{self, NewUser};
 use gaitwright::access::tokens::{self, NewToken};
 use gaitwright::access::{Right, Role, secret, sign_in};
@@ -228,7 +229,8 @@ async fn a_link_signs_in_once_and_a_password_after_that() {
     assert_eq!((first.status, &first.headers["location"]), (StatusCode::SEE_OTHER, &"/".parse().unwrap()));
     let ada = session_of(&first);
     let again = send(&service, &As::Nobody, &Method::POST, &path, FORM, "").await;
-    assert_eq!(again.headers["location"], "/sign-in", "a link works once");
+    assert_eq!(again.status, StatusCode::UNAUTHORIZED, "a link works once");
+    assert!(again.text.contains("this link was used or is too old"), "{}", again.text);
 
     let me = send(&service, &ada, &Method::GET, "/api/v1/me", "", "").await.json();
     assert_eq!((&me["name"], &me["role"]), (&json!("Ada"), &json!("admin")));
@@ -359,4 +361,26 @@ async fn every_answer_carries_the_security_headers() {
     let answer = send(&service, &admin, &Method::POST, "/api/v1/subjects", "application/json", &large).await;
     assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
     service.stop().await;
+}
+
+#[tokio::test]
+async fn guesses_at_the_same_time_are_as_few_as_one_after_the_other() {
+    let (_folder, service) = service().await;
+    let (_, _) = user(&service, "Ada", Role::Admin).await;
+    let guess = |number: u32| {
+        let service = &service;
+        async move { service.post_text("/sign-in", FORM, &format!("name=Ada&password=guess+{number}")).await.status }
+    };
+    let statuses = join_all((0..30).map(guess)).await;
+    let looked_at = statuses.iter().filter(|status| **status == StatusCode::UNAUTHORIZED).count();
+    let refused = statuses.iter().filter(|status| **status == StatusCode::TOO_MANY_REQUESTS).count();
+    // Four at once, and one more for every wait that passes meanwhile.
+    assert!((4..=7).contains(&looked_at) && looked_at + refused == 30, "{statuses:?}");
+}
+
+#[tokio::test]
+async fn programs_are_not_sent_to_a_form() {
+    let (_folder, service) = service().await;
+    let figures = service.fetch("/metrics").await;
+    assert_eq!((figures.status, figures.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
 }

@@ -12,6 +12,7 @@ use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::trials::Trial;
 use gaitwright::store::{StudyId, feedback};
+use gaitwright::studies::search;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
@@ -66,6 +67,11 @@ fn text(value: &Value) -> &str {
     value.as_str().unwrap()
 }
 
+/// A level of a6 that is not that of the trial.
+fn elsewhere(trial: &Trial) -> f64 {
+    if search::table_i().unwrap().values(trial.action_index)[5] == 0.3 { 0.2 } else { 0.3 }
+}
+
 #[tokio::test]
 async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,6 +121,11 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let given = scene.one(done, "post /studies/{id}/preferences", &give, answer).await;
     let retract = format!("{api}/preferences/{}/retract", text(&given["id"]));
     scene.one(done, "post /preferences/{id}/retract", &retract, json!({"reason": "r"})).await;
+
+    let better = json!({"over": trials[0].id, "bounds": {"a6": elsewhere(&trials[0])}});
+    let suggest = format!("{api}/studies/{finished}/suggestions");
+    scene.one(done, "post /studies/{id}/suggestions", &suggest, better).await;
+    scene.one(done, "post /backups", &format!("{api}/backups"), json!({})).await;
 
     let next = format!("{api}/studies/{human}/blind/next");
     let pair = scene.one(done, "post /studies/{id}/blind/next", &next, json!({})).await;

@@ -233,3 +233,16 @@ fn the_environment_is_not_misread_in_silence() {
         assert!(text.contains(name) && text.contains(value), "{text}");
     }
 }
+
+#[test]
+fn files_that_name_no_fields_and_a_dash_for_a_file_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("array.json"), r#"["AMPRO3", 1.0, 0.1]"#).unwrap();
+    for flag in ["--device", "--reference", "--settings", "--warm"] {
+        let output = gaitwright(folder.path(), &["solve", flag, "array.json"]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{flag}: {text}");
+        assert!(text.contains("array.json: not "), "{flag}: {text}");
+    }
+    refused(&["solve", "--out", "-"], "- is no file");
+}

@@ -177,7 +177,7 @@ async fn studies_that_cannot_be_are_refused_by_field() {
         ("name", json!("x".repeat(121)), "name"),
         ("base_bounds", json!({"a1": 1e9}), "a1"),
         ("gait_settings", json!({"mesh": {"ds2": 0}}), "mesh.ds2"),
-        ("search_space", json!({"dimensions": [{"name": "a9", "values": [1.0], "lengthscale": 1.0}]}), "bounds"),
+        ("search_space", json!({"dimensions": [{"name": "a9", "values": [1.0], "lengthscale": 1.0}]}), "search_space"),
         ("learner", json!({"ordinal_thresholds": [0.0, 1.0]}), "learner.ordinal_thresholds"),
     ] {
         let mut body = json!({"subject_id": subject});

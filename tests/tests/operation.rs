@@ -2,16 +2,20 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use gaitwright::cli::study::{import, prune};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, archive, gaits, studies};
+use gaitwright::store::{Store, archive, backup, gaits, studies};
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
+use http_body_util::BodyExt;
 use serde_json::json;
+use sqlx::sqlite::SqliteConnectOptions;
 use std::path::Path;
 use std::process::Command;
+use tower::ServiceExt;
 
 async fn posterior(service: &Service, study: gaitwright::store::StudyId) -> Vec<(u64, u64)> {
     let mut reader = service.store.read().await.unwrap();
@@ -104,6 +108,16 @@ async fn figures_for_prometheus_count_requests_by_route() {
         let value = line.rsplit(' ').next().unwrap();
         assert!(value.parse::<f64>().is_ok(), "{line}");
     }
+    let router = service.router();
+    let send = async |method: &str, path: &str| {
+        let request = Request::builder().method(method).uri(path).body(Body::empty()).unwrap();
+        router.clone().oneshot(request).await.unwrap().into_body().collect().await.unwrap().to_bytes()
+    };
+    for number in 0..3 {
+        send(&format!("INVENTED{number}"), "/health").await;
+    }
+    let text = String::from_utf8(send("GET", "/metrics").await.to_vec()).unwrap();
+    assert!(text.contains("method=\"other\"") && !text.contains("INVENTED"), "{text}");
     assert_eq!(service.fetch("/ready").await.status, StatusCode::OK);
     service.director.stop();
     assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
@@ -145,6 +159,78 @@ async fn a_copy_is_restored_and_the_present_record_is_kept_beside_it() {
     assert_eq!(service.fetch(&format!("/api/v1/studies/{study}/trials")).await.text, before);
     assert_eq!(service.fetch(&format!("/api/v1/studies/{later}")).await.status, StatusCode::NOT_FOUND);
     service.stop().await;
+}
+
+/// How many studies a file holds.
+async fn studies_in(file: &Path) -> usize {
+    let pool = backup::open_read_only(file).await.unwrap();
+    let rows = sqlx::query("select 1 from studies").fetch_all(&pool).await.unwrap();
+    pool.close().await;
+    rows.len()
+}
+
+#[tokio::test]
+async fn a_copy_takes_the_place_of_a_damaged_and_of_a_newer_record_and_none_that_was_there_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let (database, copy) = (folder.path().join("gaitwright.db"), folder.path().join("copy.db"));
+    let service = Service::start(&copy, Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 2).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    service.stop().await;
+
+    std::fs::write(&database, "was a record once").unwrap();
+    std::fs::write(folder.path().join("gaitwright.db-wal"), "and its log").unwrap();
+    let mut kept = Vec::new();
+    for _ in 0..3 {
+        let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
+        assert!(done, "{text}");
+        kept.push(text.lines().next().unwrap().rsplit(' ').next().unwrap().to_owned());
+        assert_eq!(studies_in(&database).await, 1);
+    }
+    assert!(kept[0] != kept[1] && kept[1] != kept[2] && kept[0] != kept[2], "{kept:?}");
+    assert_eq!(std::fs::read(folder.path().join(&kept[0])).unwrap(), b"was a record once");
+    assert_eq!(std::fs::read(folder.path().join(format!("{}-wal", kept[0]))).unwrap(), b"and its log");
+
+    let pool = sqlx::SqlitePool::connect_with(SqliteConnectOptions::new().filename(&database)).await.unwrap();
+    let newer = "insert into _sqlx_migrations select 9999, 'later', installed_on, 1, checksum, 0 from _sqlx_migrations \
+                 where version = 1";
+    sqlx::query(newer).execute(&pool).await.unwrap();
+    pool.close().await;
+    let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
+    assert!(done, "{text}");
+    let (done, text) = gaitwright(folder.path(), &["audit", "verify"]);
+    assert!(done && text.matches("whole: ").count() == 2, "{text}");
+}
+
+#[tokio::test]
+async fn a_copy_is_restored_with_what_is_in_its_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let live = folder.path().join("live.db");
+    let service = Service::start(&live, Analytic::default(), 1).await;
+    service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    // By hand, as one should not, but with the log.
+    for ending in ["", "-wal"] {
+        std::fs::copy(folder.path().join(format!("live.db{ending}")), folder.path().join(format!("copy.db{ending}")))
+            .unwrap();
+    }
+    service.stop().await;
+    let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
+    assert!(done, "{text}");
+    assert_eq!(studies_in(&folder.path().join("gaitwright.db")).await, 1);
+}
+
+#[tokio::test]
+async fn a_record_with_two_names_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    Service::start(&database, Analytic::default(), 1).await.stop().await;
+    std::fs::hard_link(&database, folder.path().join("b.db")).unwrap();
+    for name in ["a.db", "b.db"] {
+        let refused = Store::open(&folder.path().join(name)).await.unwrap_err().to_string();
+        assert!(refused.contains("several names"), "{refused}");
+    }
+    std::fs::remove_file(folder.path().join("b.db")).unwrap();
+    Store::open(&database).await.unwrap().close().await;
 }
 
 #[tokio::test]

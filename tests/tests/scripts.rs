@@ -127,7 +127,7 @@ async fn a_change_made_from_an_old_reading_is_refused() {
     let stale = send(&service, Method::POST, &format!("{path}/start"), Some(&tag), &json!({})).await;
     assert_eq!(stale.status, StatusCode::PRECONDITION_FAILED);
     let bad = send(&service, Method::POST, &format!("{path}/start"), Some("seven"), &json!({})).await;
-    assert_eq!(bad.status, StatusCode::BAD_REQUEST);
+    assert_eq!(bad.status, StatusCode::PRECONDITION_FAILED);
     assert_eq!(send(&service, Method::PATCH, &path, None, &json!({"priority": 11})).await.json()["field"], "priority");
     let started = send(&service, Method::POST, &format!("{path}/start"), Some(&newer), &json!({"reason": "go"})).await;
     assert_eq!((started.status, &started.json()["state_reason"]), (StatusCode::OK, &json!("go")));

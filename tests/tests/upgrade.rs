@@ -4,8 +4,8 @@
 
 use axum::http::StatusCode;
 use gaitwright::store::audit::{self, Verdict};
-use gaitwright::store::backup;
 use gaitwright::store::studies::{Evaluation, StudyState};
+use gaitwright::store::{backup, seals};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -121,6 +121,12 @@ async fn an_old_record_is_copied_and_brought_up_to_date_with_every_row() {
     let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
     assert!(matches!(verdict, Verdict::Whole { rows, .. } if rows == before[10].len() as u64), "{verdict:?}");
 
+    let sealed = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    let rows: usize = before.iter().map(Vec::len).sum();
+    assert!(matches!(sealed, seals::Verdict::Whole { seals, .. } if seals > rows as u64 / 2), "{sealed:?}");
+    let unsealed = seals::verify(&mut kept.acquire().await.unwrap()).await.unwrap();
+    assert_eq!(unsealed, seals::Verdict::None, "the copy is of a version without seals");
+
     // The constraint is wider for trials of scripts, and for no other.
     let bare = "update trials set report = null, asked_by = ? where id = ?";
     let loosen = "drop trigger trials_result_fixed";
@@ -165,4 +171,14 @@ async fn the_copy_of_an_upgrade_that_broke_off_is_made_anew_and_a_whole_one_is_k
     }
     Service::start_as_is(&old, Analytic::default(), 1).await.stop().await;
     assert_eq!(std::fs::read(&copy).unwrap(), kept);
+    assert!(!folder.path().join("old.db.v2-2").exists());
+
+    // Another record of that version under the same name: both copies are kept.
+    std::fs::copy(&copy, &old).unwrap();
+    let pool = open(&old).await;
+    sqlx::query("update subjects set notes = 'went on'").execute(&pool).await.unwrap();
+    pool.close().await;
+    Service::start_as_is(&old, Analytic::default(), 1).await.stop().await;
+    assert_eq!(std::fs::read(&copy).unwrap(), kept);
+    backup::check(&folder.path().join("old.db.v2-2")).await.unwrap();
 }

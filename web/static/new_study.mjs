@@ -9,6 +9,8 @@ const PAUSE = 350;
 
 if (form) {
   const outlook = /** @type {HTMLElement} */ (form.querySelector("[data-outlook]"));
+  const chosen = form.querySelector("[data-reference]");
+  let drawn = "";
   let timer = 0;
   let asked = 0;
 
@@ -19,11 +21,15 @@ if (form) {
     const answer = await fetch("/studies/new/check", { method: "POST", body }).catch(() => null);
     // A later question has its own answer.
     if (!answer?.ok || turn !== asked) return;
-    const { field, text } = await answer.json();
+    const { field, text, reference } = await answer.json();
     for (const input of form.querySelectorAll("[aria-invalid]")) input.removeAttribute("aria-invalid");
     if (field) form.querySelector(`[name="${CSS.escape(field)}"]`)?.setAttribute("aria-invalid", "true");
     outlook.classList.toggle("bad", Boolean(field));
     outlook.textContent = text;
+    if (reference && reference !== drawn) {
+      drawn = reference;
+      chosen?.replaceChildren(...new DOMParser().parseFromString(reference, "text/html").body.childNodes);
+    }
   };
 
   form.addEventListener("input", () => {

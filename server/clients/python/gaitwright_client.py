@@ -36,6 +36,7 @@ OPERATIONS = {
     "prefer": ("post", "/api/v1/studies/{id}/preferences"),
     "preferences": ("get", "/api/v1/studies/{id}/preferences"),
     "retract": ("post", "/api/v1/preferences/{id}/retract"),
+    "suggest": ("post", "/api/v1/studies/{id}/suggestions"),
 }
 
 
@@ -178,3 +179,7 @@ class Client:
 
     def retract(self, preference, reason):
         return self.call("retract", preference, {"reason": reason})
+
+    def suggest(self, study, over, bounds, note=""):
+        """With these bounds it would have been better than in the trial `over`."""
+        return self.call("suggest", study, {"over": over, "bounds": bounds, "note": note})

@@ -22,15 +22,17 @@ struct Failures {
 pub struct BackOff(Mutex<HashMap<String, Failures>>);
 
 impl BackOff {
-    /// How long the name must still wait; `None`: an attempt may be made.
-    pub fn wait(&self, name: &str, now: Instant) -> Option<Duration> {
-        let until = self.names().get(&name.to_lowercase())?.until;
-        until.checked_duration_since(now).filter(|wait| !wait.is_zero())
-    }
-
-    /// Counts a failed attempt.
-    pub fn failed(&self, name: &str, now: Instant) {
+    /// Begins an attempt, which counts as failed until it has succeeded: many at once are as many as one after the
+    /// other. `Err`: how long the name must still wait.
+    ///
+    /// # Errors
+    /// The wait.
+    pub fn begin(&self, name: &str, now: Instant) -> Result<(), Duration> {
         let mut names = self.names();
+        let until = names.get(&name.to_lowercase()).map(|failures| failures.until);
+        if let Some(wait) = until.and_then(|until| until.checked_duration_since(now)).filter(|wait| !wait.is_zero()) {
+            return Err(wait);
+        }
         if names.len() >= MOST_NAMES {
             names.retain(|_, failures| failures.until > now);
             if names.len() >= MOST_NAMES {
@@ -40,6 +42,14 @@ impl BackOff {
         let failures = names.entry(name.to_lowercase()).or_insert(Failures { count: 0, until: now });
         failures.count = failures.count.saturating_add(1);
         failures.until = now + wait_after(failures.count);
+        Ok(())
+    }
+
+    /// An attempt has failed: the wait begins now.
+    pub fn failed(&self, name: &str, now: Instant) {
+        if let Some(failures) = self.names().get_mut(&name.to_lowercase()) {
+            failures.until = failures.until.max(now + wait_after(failures.count));
+        }
     }
 
     /// Forgets the failures of a name that signed in.
@@ -68,16 +78,20 @@ mod tests {
     fn waits_double_after_three_failures_and_end_with_a_success() {
         let back_off = BackOff::default();
         let now = Instant::now();
-        let mut waits = Vec::new();
-        for _ in 0..8 {
-            back_off.failed("Ada", now);
-            waits.push(back_off.wait("ada", now).map_or(0, |wait| wait.as_secs()));
+        for _ in 0..4 {
+            assert_eq!(back_off.begin("Ada", now), Ok(()));
         }
-        assert_eq!(waits, [0, 0, 0, 2, 4, 8, 16, 32]);
-        assert_eq!(back_off.wait("ada", now + Duration::from_secs(32)), None);
-        assert_eq!(back_off.wait("bob", now), None, "others do not wait");
+        let mut later = now + Duration::from_secs(1);
+        back_off.failed("ADA", later);
+        for seconds in [2, 4, 8, 16, 32] {
+            let wait = Duration::from_secs(seconds);
+            assert_eq!(back_off.begin("ada", later), Err(wait));
+            later += wait;
+            assert_eq!(back_off.begin("ada", later), Ok(()));
+        }
+        assert_eq!(back_off.begin("bob", now), Ok(()), "others do not wait");
         back_off.succeeded("ADA");
-        assert_eq!(back_off.wait("ada", now), None);
+        assert_eq!(back_off.begin("ada", later), Ok(()));
     }
 
     #[test]

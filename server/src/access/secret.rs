@@ -6,6 +6,7 @@ use argon2::password_hash::phc::PasswordHash;
 use argon2::password_hash::{PasswordHasher as _, PasswordVerifier as _};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
+use tokio::sync::Semaphore;
 
 /// Shortest password.
 pub const SHORTEST_PASSWORD: usize = 10;
@@ -25,7 +26,20 @@ pub fn hash(secret: &str) -> String {
     hexadecimal(&Sha256::digest(secret.as_bytes()))
 }
 
-/// What is stored of a password. Takes tens of milliseconds on purpose: call it where that does no harm.
+/// Each takes a core and 19 MiB: whoever asks for many waits.
+static AT_ONCE: Semaphore = Semaphore::const_new(2);
+
+/// Works on a password where that holds up nothing else.
+///
+/// # Errors
+/// When the work panics.
+pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
+    let failed = |reason: String| Error::Internal(format!("working on a password: {reason}"));
+    let _turn = AT_ONCE.acquire().await.map_err(|e| failed(e.to_string()))?;
+    tokio::task::spawn_blocking(work).await.map_err(|e| failed(e.to_string()))
+}
+
+/// What is stored of a password. Takes tens of milliseconds on purpose: call it [`aside`].
 ///
 /// # Errors
 /// [`Error::Invalid`] for a password that is too short or too long.

@@ -24,6 +24,9 @@ impl OutFile {
     /// # Errors
     /// [`Error::Malformed`] with the reason when it cannot.
     pub(super) fn open(path: &Path, inputs: &[&Path]) -> Result<Self, Error> {
+        if path == Path::new("-") {
+            return Err(failed(path, "- is no file; what goes to standard output goes there without --out"));
+        }
         let known = path.canonicalize().ok();
         if let (Some(known), Some(input)) = (&known, inputs.iter().find(|i| i.canonicalize().ok() == known)) {
             return Err(failed(path, format!("{} is read by this command ({})", input.display(), known.display())));
@@ -37,8 +40,11 @@ impl OutFile {
         }
         let path = known.unwrap_or_else(|| path.to_owned());
         let name = path.file_name().unwrap_or_default().to_string_lossy();
+        remove_left_over(&path, &name);
         let part = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
         let file = OpenOptions::new().write(true).create_new(true).open(&part).map_err(|e| failed(&path, e))?;
+        // For as long as this process lives; where files cannot be locked, none is taken for left over.
+        let _ = file.try_lock();
         Ok(Self { path, part: Some(part), file: Some(file) })
     }
 
@@ -101,6 +107,45 @@ impl Drop for OutFile {
     }
 }
 
+/// Removes the empty parts of this file that killed processes left. One with rows in it may be wanted.
+fn remove_left_over(path: &Path, name: &str) {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (start, end) = (format!(".{name}."), ".part");
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let other = entry.file_name();
+        let process = other.to_str().and_then(|other| other.strip_prefix(&start)?.strip_suffix(end));
+        let is_part = process.is_some_and(|number| number.parse::<u32>().is_ok());
+        if is_part
+            && entry.metadata().is_ok_and(|part| part.len() == 0)
+            && File::open(entry.path()).is_ok_and(|part| part.try_lock().is_ok())
+        {
+            // Whoever may not remove it may still write beside it.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 fn failed(path: &Path, reason: impl std::fmt::Display) -> Error {
     Error::Malformed(format!("cannot write {}: {reason}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_unless_rows_are_in_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for (part, text) in [("1", ""), ("2", "a1,a2\n"), ("3", ""), ("x", "")] {
+            std::fs::write(at(&format!(".out.csv.{part}.part")), text).unwrap();
+        }
+        let at_work = File::open(at(".out.csv.3.part")).unwrap();
+        at_work.lock().unwrap();
+        OutFile::open(&at("out.csv"), &[]).unwrap().write("a1\n").unwrap();
+        let left = ["1", "2", "3", "x"].map(|part| at(&format!(".out.csv.{part}.part")).exists());
+        assert_eq!(left, [false, true, true, true]);
+        assert_eq!(std::fs::read_to_string(at("out.csv")).unwrap(), "a1\n");
+        assert!(OutFile::open(Path::new("-"), &[]).is_err());
+    }
 }

@@ -11,6 +11,7 @@ use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, Mesh, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
     WarmStart,
 };
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Files that describe what differs from the built-in problem.
@@ -31,7 +32,11 @@ pub(super) struct ProblemFiles {
 impl ProblemFiles {
     pub(super) fn device(&self) -> Result<Device, Error> {
         Ok(match &self.device {
-            Some(path) => Device::from_json(&read(path)?)?,
+            Some(path) => {
+                let device: Device = read_document(path, "a device file")?;
+                device.validate()?;
+                device
+            }
             None => Device::ampro3()?,
         })
     }
@@ -39,8 +44,7 @@ impl ProblemFiles {
     /// Validated as far as they stand in the file.
     pub(super) fn settings(&self) -> Result<GaitSettings, Error> {
         let settings: GaitSettings = match &self.settings {
-            Some(path) => document::read(read(path)?.as_bytes())
-                .map_err(|e| Error::Malformed(format!("{}: not settings of the gait problem: {e}", path.display())))?,
+            Some(path) => read_document(path, "settings of the gait problem")?,
             None => GaitSettings::default(),
         };
         settings.validate()?;
@@ -49,7 +53,11 @@ impl ProblemFiles {
 
     pub(super) fn reference(&self) -> Result<ReferenceGait, Error> {
         Ok(match &self.reference {
-            Some(path) => ReferenceGait::from_json(&path.display().to_string(), &read(path)?)?,
+            Some(path) => {
+                let reference: ReferenceGait = read_document(path, "a reference gait")?;
+                reference.validate()?;
+                reference
+            }
             None => ReferenceGait::builtin()?,
         })
     }
@@ -108,15 +116,17 @@ impl ProblemFlags {
 
     pub(super) fn warm_start(&self) -> Result<Option<WarmStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let outcome: SolveOutcome = document::read(read(path)?.as_bytes()).map_err(|e| {
-            Error::Malformed(format!("{}: not a file of `gaitwright solve --out`: {e}", path.display()))
-        })?;
+        let outcome: SolveOutcome = read_document(path, "a file of `gaitwright solve --out`")?;
         Ok(Some(outcome.warm_start))
     }
 }
 
 pub(super) fn read(path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
+}
+
+fn read_document<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T, Error> {
+    document::read(read(path)?.as_bytes()).map_err(|e| Error::Malformed(format!("{}: not {what}: {e}", path.display())))
 }
 
 /// A token that the first Ctrl-C cancels.

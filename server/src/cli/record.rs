@@ -2,8 +2,7 @@
 
 use super::output::{data, tell};
 use crate::error::Error;
-use crate::store::audit::{self, Verdict};
-use crate::store::{Store, StoreError, backup};
+use crate::store::{Connection, StoreError, audit, backup, restore, seals};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -15,7 +14,7 @@ pub(super) struct Audit {
 
 #[derive(Debug, Subcommand)]
 enum AuditCommand {
-    /// Walk the hash chain of the audit trail; a change of the past is found.
+    /// Walk the hash chain of the audit trail and compare every row with its seal; a change of the past is found.
     Verify {
         /// The SQLite file.
         #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
@@ -28,14 +27,30 @@ impl Audit {
         let AuditCommand::Verify { database } = self.what;
         exists(&database)?;
         let pool = backup::open_read_only(&database).await?;
-        let verdict = match pool.acquire().await {
-            Ok(mut reader) => audit::verify(&mut reader).await,
-            Err(error) => Err(StoreError::from(error)),
+        let found = match pool.acquire().await {
+            Ok(mut reader) => verify(&mut reader).await,
+            Err(error) => Err(StoreError::from(error).into()),
         };
         pool.close().await;
-        match verdict? {
-            Verdict::Whole { rows, last } => data(&format!("whole: {rows} rows, last hash {last}")),
-            Verdict::Broken { seq } => Err(Error::Internal(format!("the audit trail is broken at row {seq}"))),
+        data(&found?)
+    }
+}
+
+/// What is to be said of a whole record.
+async fn verify(db: &mut Connection) -> Result<String, Error> {
+    let broken = |reason| Error::Store(StoreError::Damaged { what: "evidence", reason });
+    let trail = match audit::verify(db).await? {
+        audit::Verdict::Whole { rows, last } => format!("whole: {rows} rows, last hash {last}"),
+        audit::Verdict::Broken { seq } => return Err(broken(format!("the audit trail is broken at row {seq}"))),
+    };
+    match seals::verify(db).await? {
+        seals::Verdict::Whole { seals, last } => Ok(format!("{trail}\nwhole: {seals} seals, last hash {last}")),
+        seals::Verdict::None => {
+            Ok(format!("{trail}\nno seals: an older version wrote this record; it is sealed when it is next opened"))
+        }
+        seals::Verdict::Broken { seq } => Err(broken(format!("the seals are broken at number {seq}"))),
+        seals::Verdict::Touched { table, key } => {
+            Err(broken(format!("row {key} of {table} is not as this program wrote it")))
         }
     }
 }
@@ -73,18 +88,9 @@ pub(super) struct Restore {
 impl Restore {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.from)?;
-        backup::check(&self.from).await?;
-        let failed = |e: std::io::Error| Error::Internal(e.to_string());
-        if self.database.exists() {
-            // Owning the file proves that no service runs on it; closing folds its log into it.
-            let present = Store::open(&self.database).await?;
-            let kept = self.database.with_extension(format!("before-{}", present.stamp()));
-            present.close().await;
-            std::fs::copy(&self.database, &kept).map_err(failed)?;
+        if let Some(kept) = restore::from_file(&self.from, &self.database).await? {
             tell(&format!("the present record is kept as {}", kept.display()));
         }
-        let part = self.database.with_extension("part");
-        std::fs::copy(&self.from, &part).and_then(|_| std::fs::rename(&part, &self.database)).map_err(failed)?;
         tell(&format!("restored {}", self.database.display()));
         Ok(())
     }

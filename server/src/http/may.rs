@@ -2,7 +2,7 @@
 
 use crate::access::{Caller, Permission};
 use crate::error::Error;
-use crate::http::pages::error::PageError;
+use crate::http::pages::error::{PageError, is_for_programs};
 use axum::extract::{FromRequestParts, OptionalFromRequestParts, OriginalUri};
 use axum::http::Extensions;
 use axum::http::request::Parts;
@@ -18,16 +18,16 @@ pub(crate) struct May<P> {
     right: PhantomData<P>,
 }
 
-/// The refusal: a problem document below `/api/`, a page elsewhere.
+/// The refusal: a problem document for programs, a page for people.
 #[derive(Debug)]
 pub(crate) struct Refused {
     error: Error,
-    api: bool,
+    for_program: bool,
 }
 
 impl IntoResponse for Refused {
     fn into_response(self) -> Response {
-        if self.api { self.error.into_response() } else { PageError::from(self.error).into_response() }
+        if self.for_program { self.error.into_response() } else { PageError::from(self.error).into_response() }
     }
 }
 
@@ -46,8 +46,8 @@ impl<P: Permission, S: Send + Sync> FromRequestParts<S> for May<P> {
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refused> {
         // Nested routers see the rest of the path alone.
         let whole = parts.extensions.get::<OriginalUri>().map_or(&parts.uri, |original| &original.0);
-        let api = whole.path().starts_with("/api/");
-        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused { error, api })?;
+        let for_program = is_for_programs(whole.path());
+        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused { error, for_program })?;
         Ok(Self { caller, right: PhantomData })
     }
 }

@@ -6,7 +6,7 @@ use crate::access::Read;
 use crate::error::Error;
 use crate::store::totals;
 use axum::extract::{MatchedPath, Request, State};
-use axum::http::{StatusCode, header};
+use axum::http::{Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::collections::BTreeMap;
@@ -48,11 +48,17 @@ impl Requests {
 /// Counts and times a request by its route, not by its address: addresses are without number.
 pub(super) async fn count(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
-    let method = request.method().as_str().to_owned();
+    let method = named(request.method()).to_owned();
     let begun = Instant::now();
     let answer = next.run(request).await;
     app.requests.add(method, route, answer.status(), begun.elapsed().as_secs_f64());
     answer
+}
+
+/// Methods are without number, too: anybody may invent one.
+fn named(method: &Method) -> &str {
+    let known = [Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::PATCH, Method::DELETE, Method::OPTIONS];
+    if known.contains(method) { method.as_str() } else { "other" }
 }
 
 /// `GET /metrics`.

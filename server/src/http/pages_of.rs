@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// A page of what is older than something, newest first.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct Before<K> {
     /// Where the page before ended.
     pub(crate) before: Option<K>,
@@ -17,6 +18,7 @@ pub(crate) struct Before<K> {
 
 /// A page of what comes after something, in order.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct After<K> {
     /// Where the page before ended.
     pub(crate) after: Option<K>,

@@ -1,6 +1,6 @@
 //! Problem documents (RFC 9457): the one table from errors to answers.
 
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -39,6 +39,11 @@ impl Problem {
         Self { kind, title, status: status.as_u16(), detail, field: None, value: None, allowed: None }
     }
 
+    fn of(self, field: &FieldError) -> Self {
+        let FieldError { field, value, allowed, .. } = field.clone();
+        Self { field: Some(field), value: Some(value), allowed: Some(allowed), ..self }
+    }
+
     /// The HTTP status of this problem.
     pub(super) fn status(&self) -> StatusCode {
         StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
@@ -55,17 +60,17 @@ impl From<&Error> for Problem {
             Error::Malformed(_) => {
                 Self::new(StatusCode::BAD_REQUEST, "/problems/malformed", "The request cannot be read", detail)
             }
-            Error::Invalid(field) => Self {
-                field: Some(field.field.clone()),
-                value: Some(field.value.clone()),
-                allowed: Some(field.allowed.clone()),
-                ..Self::new(
-                    StatusCode::UNPROCESSABLE_ENTITY,
-                    "/problems/invalid-field",
-                    "A field is not acceptable",
-                    detail,
-                )
-            },
+            Error::Unreadable(field) => {
+                Self::new(StatusCode::BAD_REQUEST, "/problems/malformed", "The request cannot be read", detail)
+                    .of(field)
+            }
+            Error::Invalid(field) => Self::new(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "/problems/invalid-field",
+                "A field is not acceptable",
+                detail,
+            )
+            .of(field),
             Error::NotSignedIn(_) => {
                 Self::new(StatusCode::UNAUTHORIZED, "/problems/not-signed-in", "Sign in first", detail)
             }

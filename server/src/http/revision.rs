@@ -11,19 +11,22 @@ use utoipa::openapi::Required;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{ObjectBuilder, Type};
 
-/// The revision that a change was made from; without the header, any.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct IfMatch(Option<i64>);
+/// The revisions that a change may be made from; without the header, any.
+#[derive(Debug)]
+pub(crate) struct IfMatch(Option<String>);
 
 impl IfMatch {
     /// Refuses when the present revision is another one.
     pub(crate) fn check(self, present: i64) -> Result<(), Error> {
-        match self.0 {
-            Some(expected) if expected != present => Err(Error::Changed(format!(
-                "If-Match names revision {expected}, the present one is {present}: read it again and decide anew"
-            ))),
-            _ => Ok(()),
+        let Some(named) = self.0 else { return Ok(()) };
+        let tag = format!("\"{present}\"");
+        // A weak tag never matches: it does not say that nothing changed.
+        if named.split(',').map(str::trim).any(|one| one == "*" || one == tag) {
+            return Ok(());
         }
+        let reason =
+            format!("If-Match names revision {named}, the present one is {tag}: read it again and decide anew");
+        Err(Error::Changed(reason))
     }
 }
 
@@ -31,14 +34,8 @@ impl<S: Send + Sync> FromRequestParts<S> for IfMatch {
     type Rejection = Error;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Error> {
-        let Some(value) = parts.headers.get(header::IF_MATCH) else { return Ok(Self(None)) };
-        let text = value.to_str().unwrap_or("").trim();
-        if text == "*" {
-            return Ok(Self(None));
-        }
-        let revision = text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).and_then(|t| t.parse().ok());
-        let malformed = || Error::Malformed(format!("If-Match: {text:?} is no entity tag of this service"));
-        revision.map(|revision| Self(Some(revision))).ok_or_else(malformed)
+        let lines: Vec<_> = parts.headers.get_all(header::IF_MATCH).iter().map(|v| v.to_str().unwrap_or("?")).collect();
+        Ok(Self((!lines.is_empty()).then(|| lines.join(", "))))
     }
 }
 

@@ -250,17 +250,12 @@ fn to_json(row: &SqliteRow) -> StoreResult<Map<String, Value>> {
             _ if raw.is_null() => Value::Null,
             "INTEGER" | "BOOLEAN" => row.try_get::<i64, _>(index)?.into(),
             "REAL" => row.try_get::<f64, _>(index)?.into(),
-            "BLOB" => json!({ "hexadecimal": hexadecimal(row.try_get(index)?) }),
+            "BLOB" => json!({ "hexadecimal": json::hexadecimal(row.try_get(index)?) }),
             _ => row.try_get::<String, _>(index)?.into(),
         };
         object.insert(column.name().to_owned(), value);
     }
     Ok(object)
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]).map(|half| char::from(DIGITS[usize::from(half)])).collect()
 }
 
 fn bytes_of(object: &Map<String, Value>) -> StoreResult<Vec<u8>> {

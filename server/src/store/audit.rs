@@ -8,7 +8,7 @@ use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
 /// Hash before the first row.
-const ORIGIN: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+pub(super) const ORIGIN: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 /// Rows read at a time when the chain is walked.
 const BATCH: i64 = 1000;
 
@@ -133,7 +133,7 @@ pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
             .fetch_all(&mut *db)
             .await?;
         if batch.is_empty() {
-            return Ok(Verdict::Whole { rows, last });
+            break;
         }
         for raw in &batch {
             let seq: i64 = raw.try_get("seq")?;
@@ -148,6 +148,17 @@ pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
             (rows, last, after) = (rows + 1, row.hash, seq);
         }
     }
+    // The database counts for itself how many there were.
+    if last_ever(db, "audit").await? != after {
+        return Ok(Verdict::Broken { seq: after + 1 });
+    }
+    Ok(Verdict::Whole { rows, last })
+}
+
+/// The largest number that a table ever gave to a row, also when the row is there no more.
+pub(super) async fn last_ever(db: &mut Connection, table: &str) -> StoreResult<i64> {
+    let last = sqlx::query_scalar("select seq from sqlite_sequence where name = ?");
+    Ok(last.bind(table).fetch_optional(db).await?.unwrap_or(0))
 }
 
 /// Hash of a row and the one before: of an object with sorted keys, so that there is one way to write it.

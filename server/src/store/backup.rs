@@ -1,10 +1,10 @@
 //! Copies of the record: consistent while the service runs, checked before they are trusted.
 
-use super::{Store, StoreError, StoreResult};
+use super::{Store, StoreError, StoreResult, free_name};
 use super::{file_kind, migrations};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes a compact copy of an open record to a new file and checks the copy.
 ///
@@ -12,6 +12,17 @@ use std::path::Path;
 /// When the file exists, cannot be written, or the copy is not whole.
 pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
     into_file(&store.readers, to).await
+}
+
+/// Writes a compact copy beside the record (`gaitwright.db.backup-20260501T101500`) and checks it: the file and its size.
+///
+/// # Errors
+/// As [`of_store`].
+pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
+    let to = free_name(store.path(), "backup");
+    of_store(store, &to).await?;
+    let size = std::fs::metadata(&to).map_err(|source| StoreError::Open { path: to.clone(), source })?.len();
+    Ok((to, size))
 }
 
 /// Writes a compact copy of a record that another process may own, and checks the copy.

@@ -35,6 +35,12 @@ pub enum StoreError {
         /// The file.
         path: PathBuf,
     },
+    /// The file can be reached by another name, under which another process may own it.
+    #[error("the database {} has several names (hard links), which mixes up its log: leave it one; `gaitwright backup` copies it", path.display())]
+    SeveralNames {
+        /// The file.
+        path: PathBuf,
+    },
     /// A newer version of the program wrote the file.
     #[error(
         "the database {} has schema version {found}, this program knows up to {known}: use a newer gaitwright; nothing was changed",

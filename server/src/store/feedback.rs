@@ -220,12 +220,31 @@ pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreR
 /// # Errors
 /// What the database reports.
 pub async fn comparisons(db: &mut Connection, study: StudyId, after: i64, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
+    answers(db, study, false, after, limit).await
+}
+
+/// The same of suggestions.
+///
+/// # Errors
+/// What the database reports.
+pub async fn suggestions(db: &mut Connection, study: StudyId, after: i64, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
+    answers(db, study, true, after, limit).await
+}
+
+async fn answers(
+    db: &mut Connection,
+    study: StudyId,
+    suggestions: bool,
+    after: i64,
+    limit: u32,
+) -> StoreResult<Vec<FeedbackRow>> {
     let rows = sqlx::query(
         "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
          from feedback f left join retractions r on r.feedback_seq = f.seq \
-         where f.study_id = ? and f.seq > ? and f.kind in ('preference', 'tie') order by f.seq limit ?",
+         where f.study_id = ? and f.kind <> 'label' and (f.kind = 'suggestion') = ? and f.seq > ? order by f.seq limit ?",
     )
     .bind(study)
+    .bind(suggestions)
     .bind(after)
     .bind(limit)
     .fetch_all(db)

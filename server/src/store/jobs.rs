@@ -4,8 +4,10 @@
 //! job is still leased, so that whatever arrives late or twice is recorded at most once.
 
 use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
+use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
 
 /// The right to run a job, for as long as the lease is kept alive.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,6 +29,58 @@ pub struct Troubles {
     pub failures: u32,
     /// Workers that were not heard of again.
     pub losses: u32,
+}
+
+/// A job that is not done.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Job {
+    /// Its trial.
+    pub trial_id: TrialId,
+    /// Its study.
+    pub study_id: StudyId,
+    /// `queued`, or `leased` to a worker.
+    pub state: String,
+    /// How often a worker was to start it.
+    pub attempts: u32,
+    /// Of which ended by a panic or an error of the program.
+    pub failures: u32,
+    /// Of which ended by a worker that was not heard of again.
+    pub losses: u32,
+    /// Who has it.
+    pub worker: Option<String>,
+    /// Until when, without a sign of life.
+    pub lease_until: Option<Instant>,
+    /// When it was queued.
+    pub created_at: Instant,
+}
+
+/// At most `limit` jobs that are not done, in the order of queueing.
+///
+/// # Errors
+/// What the database reports.
+pub async fn open(db: &mut Connection, limit: u32) -> StoreResult<Vec<Job>> {
+    let rows = sqlx::query(
+        "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id where j.state <> 'done' \
+         order by j.created_at, j.id limit ?",
+    )
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter()
+        .map(|row| {
+            Ok(Job {
+                trial_id: row.try_get("trial_id")?,
+                study_id: row.try_get("study_id")?,
+                state: row.try_get("state")?,
+                attempts: row.try_get("attempts")?,
+                failures: row.try_get("failures")?,
+                losses: row.try_get("losses")?,
+                worker: row.try_get("worker")?,
+                lease_until: row.try_get("lease_until")?,
+                created_at: row.try_get("created_at")?,
+            })
+        })
+        .collect()
 }
 
 /// Queues the solve of a trial.

@@ -4,10 +4,10 @@ use super::{StoreError, StoreResult, backup, beside};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::{Row, SqlSafeStr, SqlitePool};
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 13] = [
+const FILES: [(i64, &str, &str); 14] = [
     (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
     (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
@@ -18,10 +18,14 @@ const FILES: [(i64, &str, &str); 13] = [
     (8, "certificates", include_str!("../../../migrations/0008_certificates.sql")),
     (9, "comparisons", include_str!("../../../migrations/0009_comparisons.sql")),
     (30, "rater_undo", include_str!("../../../migrations/0030_rater_undo.sql")),
+    (31, "seals", include_str!("../../../migrations/0031_seals.sql")),
     (36, "lab_sessions", include_str!("../../../migrations/0036_lab_sessions.sql")),
     (37, "lab_recordings", include_str!("../../../migrations/0037_lab_recordings.sql")),
     (38, "subject_muscles", include_str!("../../../migrations/0038_subject_muscles.sql")),
 ];
+
+/// Length of the header of an SQLite file.
+const SQLITE_HEADER_BYTES: usize = 100;
 
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
@@ -64,8 +68,7 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
 /// A file that is about to be changed is copied first: `gaitwright.db.v1`. The copy gets its name when it is whole, so
 /// that a process which is killed while it copies leaves nothing that looks like one.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
-    let copy = beside(path, &format!(".v{found}"));
-    if found == 0 || found == FILES[FILES.len() - 1].0 || copy.exists() {
+    if found == 0 || found == FILES[FILES.len() - 1].0 {
         return Ok(());
     }
     let part = beside(path, &format!(".v{found}.part"));
@@ -74,7 +77,29 @@ async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResu
         std::fs::remove_file(&part).map_err(cannot_write)?;
     }
     backup::into_file(pool, &part).await?;
-    std::fs::rename(&part, &copy).map_err(cannot_write)
+    let kept = match free_name(&beside(path, &format!(".v{found}")), &part) {
+        Ok(Some(copy)) => std::fs::rename(&part, &copy),
+        Ok(None) => std::fs::remove_file(&part),
+        Err(error) => Err(error),
+    };
+    kept.map_err(cannot_write)
+}
+
+/// The name itself, or with a number where another record has it; `None`: this very record was copied already.
+fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
+    // The header of an SQLite file counts how often it was written; what it holds comes after.
+    let content =
+        |file: &Path| std::fs::read(file).map(|bytes| bytes.into_iter().skip(SQLITE_HEADER_BYTES).collect::<Vec<u8>>());
+    let mut candidate = name.to_owned();
+    let mut number = 1_u32;
+    while candidate.exists() {
+        if content(&candidate)? == content(part)? {
+            return Ok(None);
+        }
+        number += 1;
+        candidate = beside(name, &format!("-{number}"));
+    }
+    Ok(Some(candidate))
 }
 
 /// The newest migration that was applied; 0 for a fresh file.

@@ -25,8 +25,10 @@ pub mod listing;
 mod migrations;
 pub mod presentations;
 pub mod reference_gaits;
+pub mod restore;
 pub mod results;
 pub mod schema;
+pub mod seals;
 pub mod sessions;
 pub mod studies;
 pub mod subjects;
@@ -99,9 +101,13 @@ impl Store {
             .busy_timeout(Duration::from_secs(10));
         let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
         migrations::apply(&only, path).await?;
-        let writing = Arc::new(Writing::new(only.acquire().await?.detach()));
+        let mut connection = only.acquire().await?.detach();
+        seals::watch(&mut connection).await?;
+        let writing = Arc::new(Writing::new(connection));
         let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
-        Ok(Self { readers, writing, path: path.to_owned(), _owner: Arc::new(owner) })
+        let store = Self { readers, writing, path: path.to_owned(), _owner: Arc::new(owner) };
+        commit(store.write().await?).await?;
+        Ok(store)
     }
 
     /// A connection to read with.
@@ -120,11 +126,6 @@ impl Store {
         self.writing.begin().await
     }
 
-    /// The present second in a form that suits file names.
-    pub fn stamp(&self) -> String {
-        now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect()
-    }
-
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
@@ -141,7 +142,8 @@ impl Store {
 ///
 /// # Errors
 /// When the database cannot; nothing has happened then.
-pub async fn commit(writer: Writer) -> StoreResult<()> {
+pub async fn commit(mut writer: Writer) -> StoreResult<()> {
+    seals::seal(&mut writer).await?;
     writer.commit().await
 }
 
@@ -171,8 +173,31 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// `gaitwright.db.WHAT-20260501T101500`, or with a number where there is one of that second.
+fn free_name(of: &Path, what: &str) -> PathBuf {
+    let stamp: String = now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect();
+    let first = beside(of, &format!(".{what}-{stamp}"));
+    let mut name = first.clone();
+    let mut number = 1_u32;
+    while name.exists() {
+        number += 1;
+        name = beside(&first, &format!("-{number}"));
+    }
+    name
+}
+
+/// SQLite finds its log by the name of the file, and so is our lock found: a file with two names has two of each.
+fn refuse_second_name(path: &Path) -> StoreResult<()> {
+    #[cfg(unix)]
+    if std::fs::metadata(path).is_ok_and(|file| std::os::unix::fs::MetadataExt::nlink(&file) > 1) {
+        return Err(StoreError::SeveralNames { path: path.to_owned() });
+    }
+    Ok(())
+}
+
 /// The locked file, and whether it was made for this.
 fn take_ownership(path: &Path) -> StoreResult<(File, bool)> {
+    refuse_second_name(path)?;
     // One file has one lock, whatever link it is opened through.
     let lock = beside(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
     let made = !lock.exists();

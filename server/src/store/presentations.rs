@@ -43,6 +43,7 @@ impl FromStr for Kind {
 /// What a rater says of two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = RaterSaid)]
 pub enum Said {
     /// The gait shown first is better.
     First,

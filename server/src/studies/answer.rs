@@ -59,24 +59,38 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     }
     comparable(writer, study.id, "trial_a", answer.trial_a).await?;
     comparable(writer, study.id, "trial_b", answer.trial_b).await?;
-    let source = answer.source.unwrap_or_else(|| caller.source());
-    if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
-        return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
-    }
-    let author = printable::name("author", answer.author.as_deref().unwrap_or(&caller.name), 80)?;
-    printable::note("note", &answer.note, 2000)?;
+    let voice = voice(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
     let said = match answer.answer {
         Verdict::A => Said::Preference { winner: a, loser: b },
         Verdict::B => Said::Preference { winner: b, loser: a },
         Verdict::NoDifference => Said::Tie { a, b },
     };
-    let voice = Voice { source, author, note: &answer.note };
     let id = feedback::append(writer, study.id, &said, voice).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
-    let detail = json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": author });
+    let detail =
+        json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": voice.author });
     audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
     Ok(id)
+}
+
+/// Who says something: the caller, or whom the caller names.
+///
+/// # Errors
+/// [`Error::Invalid`] for `source`, `author` or `note`.
+pub fn voice<'a>(
+    caller: &'a Caller,
+    source: Option<Source>,
+    author: Option<&'a str>,
+    note: &'a str,
+) -> Result<Voice<'a>, Error> {
+    let source = source.unwrap_or_else(|| caller.source());
+    if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
+        return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
+    }
+    let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
+    printable::note("note", note, 2000)?;
+    Ok(Voice { source, author, note })
 }
 
 /// So many answers of others are told.
@@ -112,8 +126,8 @@ pub async fn retract(
         return Err(Error::NotFound { what: "in this study, preference".to_owned(), id: id.to_string() });
     }
     consents::may_be_shown(writer, row.study_id).await?;
-    if !matches!(row.said, Said::Preference { .. } | Said::Tie { .. }) {
-        return Err(Error::conflict("only a comparison can be taken back: a label says what the solver did"));
+    if matches!(row.said, Said::Label { .. }) {
+        return Err(Error::conflict("only an answer can be taken back: a label says what the solver did"));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, ": why it is taken back")?;

@@ -30,5 +30,6 @@ pub mod script;
 pub mod search;
 pub mod seed;
 pub mod standing;
+pub mod suggestion;
 pub mod summary;
 pub mod trial_state;

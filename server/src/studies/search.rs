@@ -45,6 +45,16 @@ pub fn bounds_of(space: &SearchSpace, base: TunedBounds, action: ActionIndex) ->
     Ok(bounds)
 }
 
+/// A name that is no bound is a fault of the search space.
+fn in_search_space(error: ModelError) -> ModelError {
+    match error {
+        ModelError::Unknown { value, known, .. } => {
+            ModelError::Unknown { field: "search_space".to_owned(), value, known }
+        }
+        other => other,
+    }
+}
+
 /// Checks that every dimension is a bound and that every combination of values makes valid bounds.
 ///
 /// # Errors
@@ -52,7 +62,7 @@ pub fn bounds_of(space: &SearchSpace, base: TunedBounds, action: ActionIndex) ->
 pub fn validate(space: &SearchSpace, base: TunedBounds) -> Result<(), ModelError> {
     for dimension in space.dimensions() {
         for &value in &dimension.values {
-            base.clone().set(&dimension.name, value)?;
+            base.clone().set(&dimension.name, value).map_err(in_search_space)?;
         }
     }
     // Bounds depend on each other only through a3 < a4: the largest a3 with the smallest a4 decides.

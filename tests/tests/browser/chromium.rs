@@ -4,13 +4,19 @@ use chromiumoxide::Page;
 use chromiumoxide::browser::{Browser, BrowserConfig};
 use chromiumoxide::cdp::browser_protocol::emulation::{
     MediaFeature, SetDeviceMetricsOverrideParams, SetEmulatedMediaParams, SetScriptExecutionDisabledParams,
+    SetTouchEmulationEnabledParams,
 };
-use chromiumoxide::cdp::browser_protocol::input::InsertTextParams;
+use chromiumoxide::cdp::browser_protocol::input::{
+    DispatchTouchEventParams, DispatchTouchEventReturns, DispatchTouchEventType, InsertTextParams, TouchPoint,
+};
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
 use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent, OverrideNetworkStateParams};
 use chromiumoxide::cdp::js_protocol::runtime::EventExceptionThrown;
 use chromiumoxide::page::ScreenshotParams;
+use chromiumoxide::types::MethodId;
+use chromiumoxide::{Command, Method};
 use futures_util::StreamExt;
+use serde::Serialize;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -19,6 +25,25 @@ use tokio::task::JoinHandle;
 /// Where a Chromium may be.
 const PLACES: [&str; 4] =
     ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome", "/snap/bin/chromium"];
+
+/// [`DispatchTouchEventParams`] that says so when no finger is left: theirs leaves an empty list out, and Chromium refuses.
+#[derive(Debug, Serialize)]
+struct Touched {
+    #[serde(rename = "type")]
+    kind: DispatchTouchEventType,
+    #[serde(rename = "touchPoints")]
+    touch_points: Vec<TouchPoint>,
+}
+
+impl Method for Touched {
+    fn identifier(&self) -> MethodId {
+        DispatchTouchEventParams::IDENTIFIER.into()
+    }
+}
+
+impl Command for Touched {
+    type Response = DispatchTouchEventReturns;
+}
 
 /// A running browser.
 pub(crate) struct Chromium {
@@ -183,6 +208,25 @@ impl Tab {
         self.wait_for(selector).await;
         let point = self.page.find_element(selector).await.unwrap().clickable_point().await.unwrap();
         self.page.click(point).await.unwrap();
+    }
+
+    /// From now on the screen is one to touch.
+    pub(crate) async fn become_touch_screen(&self) {
+        self.page.execute(SetTouchEmulationEnabledParams::new(true)).await.unwrap();
+    }
+
+    /// Touches an element with a finger.
+    pub(crate) async fn touch(&self, selector: &str) {
+        self.wait_for(selector).await;
+        let element = self.page.find_element(selector).await.unwrap();
+        element.scroll_into_view().await.unwrap();
+        let at = element.clickable_point().await.unwrap();
+        for (kind, touch_points) in [
+            (DispatchTouchEventType::TouchStart, vec![TouchPoint::new(at.x, at.y)]),
+            (DispatchTouchEventType::TouchEnd, vec![]),
+        ] {
+            self.page.execute(Touched { kind, touch_points }).await.unwrap();
+        }
     }
 
     /// Replaces the text of a field.

@@ -64,9 +64,13 @@ async fn browser_rater_sees_everything_on_a_tablet_either_way_up() {
         let bottom: f64 = page.value(bottom).await.parse().unwrap();
         assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
     }
-    page.click("input[value=no_difference]").await;
+    page.become_touch_screen().await;
+    let touches = "window.touches = 0; document.addEventListener('touchstart', () => { window.touches += 1; });";
+    page.run(touches).await;
+    page.touch("input[value=no_difference]").await;
     page.wait_until("document.querySelector('input:checked')?.value === 'no_difference'").await;
-    page.click("[data-answer] [type=submit]").await;
+    assert_eq!(page.value("window.touches").await, "1", "a finger, and no mouse");
+    page.touch("[data-answer] [type=submit]").await;
     page.wait_for(".notice.good").await;
     assert_eq!(answers(&site, study).await.len(), 1);
     page.is_clean(&site.origin).await;

@@ -129,6 +129,9 @@ async fn browser_checks_a_new_study_while_it_is_typed() {
     let site = Site::start(Analytic::default()).await;
     let page = browser.open(&site.at("/studies/new")).await;
     page.wait_until("document.querySelector('[data-outlook]').textContent.includes('11664')").await;
+    page.wait_for("[data-reference] figure svg").await;
+    let matcher = page.text("[data-reference]").await;
+    assert!(matcher.contains("nearer") || matcher.contains("nearest"), "{matcher}");
     page.fill("#trial_budget", "many").await;
     page.wait_for("#trial_budget[aria-invalid=true]").await;
     page.wait_for("[data-outlook].bad").await;

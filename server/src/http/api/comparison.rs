@@ -21,6 +21,7 @@ const MOST: usize = 20;
 
 /// Which studies.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Which {
     ids: String,
 }

@@ -24,6 +24,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
+use utoipa::ToSchema;
 
 /// Shortest time between two iterations shown of one solve.
 const THROTTLE: Duration = Duration::from_millis(250);
@@ -32,6 +33,7 @@ const BATCH: u32 = 200;
 
 /// Where to begin.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct From {
     after: Option<i64>,
 }
@@ -42,7 +44,7 @@ pub(super) struct From {
     path = "/studies/{id}/events",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Begin after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "The last event that was seen")),
-    responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = String, content_type = "text/event-stream")),
+    responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = ServerSentEvent, content_type = "text/event-stream")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -54,11 +56,9 @@ pub(super) async fn of_study(
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let last_seen = headers.get("last-event-id").and_then(|value| value.to_str().ok()?.parse().ok()).or(from.after);
-    let after = match last_seen {
-        Some(seq) => seq,
-        None => events::last(&mut reader, id).await?,
-    };
+    let last = events::last(&mut reader, id).await?;
+    // What was seen may be of a record in whose place an older copy was put: its numbers come again.
+    let after = last_seen(&headers)?.or(from.after).map_or(last, |seen| seen.min(last));
     drop(reader);
     let (sender, receiver) = mpsc::channel(16);
     let stands = json!({ "state": study.state, "reason": study.state_reason });
@@ -72,6 +72,25 @@ pub(super) async fn of_study(
     });
     let stream = futures_util::StreamExt::map(ReceiverStream::new(receiver), Ok);
     Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))))
+}
+
+fn last_seen(headers: &HeaderMap) -> Result<Option<i64>, Error> {
+    let Some(value) = headers.get("last-event-id") else { return Ok(None) };
+    let text = value.to_str().unwrap_or_default();
+    let malformed = || Error::invalid("Last-Event-ID", text, "the id of an event of this stream");
+    text.parse().map(Some).map_err(|_| malformed())
+}
+
+/// An event as sent.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "describes the stream; events are written by axum")]
+pub(super) struct ServerSentEvent {
+    /// What happened: `study_state`, `progress`, or the kind of an event of the record.
+    event: String,
+    /// Its number, to be given as `Last-Event-ID`; `study_state` and `progress` have none.
+    id: Option<String>,
+    /// JSON.
+    data: String,
 }
 
 /// The listener went away.

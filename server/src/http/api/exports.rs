@@ -16,6 +16,7 @@ use serde::Deserialize;
 
 /// How densely a gait is sampled.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Sampling {
     /// Samples per second.
     #[serde(default = "two_hundred")]

@@ -3,6 +3,7 @@
 
 mod archive;
 mod audit;
+mod backups;
 mod blind;
 mod certificates;
 mod comparison;
@@ -13,6 +14,7 @@ mod figures;
 mod gaits;
 pub mod health;
 mod history;
+mod jobs;
 mod lab_recordings;
 mod lab_sessions;
 mod motion;
@@ -22,6 +24,7 @@ mod reference_gaits;
 mod scripts;
 mod studies;
 mod subjects;
+mod suggestions;
 mod tokens;
 mod trials;
 mod users;
@@ -110,6 +113,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))
+        .routes(routes!(suggestions::of_study, suggestions::create))
         // access
         .routes(routes!(users::me))
         .routes(routes!(users::list, users::create))
@@ -119,6 +123,9 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(tokens::list, tokens::create))
         .routes(routes!(tokens::revoke))
         // operation
+        .routes(routes!(jobs::list))
+        .routes(routes!(jobs::workers))
+        .routes(routes!(backups::create))
         .routes(routes!(audit::list))
         .routes(routes!(health::get))
 }

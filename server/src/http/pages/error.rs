@@ -65,10 +65,15 @@ pub async fn no_such_method(method: Method, uri: Uri) -> Error {
     Error::MethodNotAllowed { method: method.to_string(), path: uri.path().to_owned() }
 }
 
+/// Whether programs ask for what is there: they get problem documents, people get pages.
+pub fn is_for_programs(path: &str) -> bool {
+    ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
+        || ["/health", "/ready", "/metrics"].contains(&path)
+}
+
 /// Shows the problem documents of addresses for people as pages, wherever they come from.
 pub async fn problems_as_pages(request: Request, next: Next) -> Response {
-    let path = request.uri().path();
-    let for_programs = path.starts_with("/api/") || path == "/health" || path.starts_with("/static/");
+    let for_programs = is_for_programs(request.uri().path());
     let mut answer = next.run(request).await;
     if for_programs {
         return answer;

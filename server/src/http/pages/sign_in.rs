@@ -28,6 +28,10 @@ struct LinkPage {
 }
 
 #[derive(Template)]
+#[template(path = "no_account.html")]
+struct NoAccountPage;
+
+#[derive(Template)]
 #[template(path = "account.html")]
 struct AccountPage {
     name: String,
@@ -52,14 +56,12 @@ pub(super) struct Credentials {
 /// `POST /sign-in`.
 pub(super) async fn post(State(app): State<AppState>, Form(form): Form<Credentials>) -> Result<Response, PageError> {
     let name = form.name.trim().to_owned();
-    if let Some(wait) = app.access.back_off.wait(&name, Instant::now()) {
+    if let Err(wait) = app.access.back_off.begin(&name, Instant::now()) {
         return Err(Error::TooManyAttempts(wait.as_secs().max(1)).into());
     }
     let user = users::by_name(&mut *app.read().await?, &name).await?.filter(|user| user.disabled_at.is_none());
     let stored = user.as_ref().and_then(|user| user.password.clone());
-    let right = tokio::task::spawn_blocking(move || secret::is_password(&form.password, stored.as_deref()))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))?;
+    let right = secret::aside(move || secret::is_password(&form.password, stored.as_deref())).await?;
     let mut writer = app.write().await?;
     if let (true, Some(user)) = (right, user) {
         app.access.back_off.succeeded(&name);
@@ -82,7 +84,13 @@ pub(super) async fn link(Path(link): Path<String>) -> Page {
 /// `POST /sign-in/{link}`.
 pub(super) async fn use_link(State(app): State<AppState>, Path(link): Path<String>) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
-    let (user, session) = sign_in::with_link(&mut writer, &link).await?;
+    let (user, session) = match sign_in::with_link(&mut writer, &link).await {
+        Err(Error::NotSignedIn(reason)) => {
+            let refused = page(&SignInPage { refused: Some(reason), name: String::new() })?;
+            return Ok((StatusCode::UNAUTHORIZED, refused).into_response());
+        }
+        found => found?,
+    };
     commit(writer).await?;
     signed_in(&app, &session, user.role)
 }
@@ -107,14 +115,17 @@ pub(super) async fn out(
 }
 
 /// `GET /account`.
-pub(super) async fn account(caller: Option<Caller>) -> Page {
+pub(super) async fn account(State(app): State<AppState>, caller: Option<Caller>) -> Page {
+    if app.access.open && caller.as_ref().is_some_and(|caller| caller.user.is_none()) {
+        return page(&NoAccountPage);
+    }
     page(&account_of(caller)?.0)
 }
 
 fn account_of(caller: Option<Caller>) -> Result<(AccountPage, crate::store::UserId), Error> {
     let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
     let (Some(user), Some(role)) = (caller.user, caller.role) else {
-        return Err(Error::conflict("nobody signs in to this service: there is no account"));
+        return Err(Error::conflict("nobody is signed in here: there is no account"));
     };
     let (name, role) = (caller.name, role.as_str());
     Ok((AccountPage { name, role, shortest: secret::SHORTEST_PASSWORD, refused: None, saved: false }, user))
@@ -134,9 +145,7 @@ pub(super) async fn set_password(
 ) -> Result<Response, PageError> {
     let actor = caller.as_ref().map(|caller| caller.actor.clone());
     let (mut shown, user) = account_of(caller)?;
-    let hashed = tokio::task::spawn_blocking(move || secret::hash_password(&form.password))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))?;
+    let hashed = secret::aside(move || secret::hash_password(&form.password)).await?;
     let hashed = match (hashed, actor) {
         (Ok(hashed), Some(actor)) => (hashed, actor),
         (Err(Error::Invalid(field)), _) => {

@@ -1,7 +1,9 @@
 //! The form for a new study.
 
+mod chosen_reference;
 mod space_editor;
 
+use self::chosen_reference::Choice;
 use self::space_editor::SpaceEditor;
 use super::error::{Page, PageError, page};
 use crate::access::{Caller, Run};
@@ -206,6 +208,9 @@ pub(super) struct Checked {
     field: Option<String>,
     /// Why, or what the study would be.
     text: String,
+    /// The reference gait that is chosen, as a part of the page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<String>,
 }
 
 /// `POST /studies/new/check`: makes the study and takes it back, so that what is said here is what would happen.
@@ -216,14 +221,14 @@ pub(super) async fn check(
 ) -> Result<Json<Checked>, PageError> {
     let editor = SpaceEditor::typed(&fields.space)?;
     let mut writer = app.write().await?;
-    let made = make(&mut writer, &may.caller, &fields, &editor).await;
+    let made = match make(&mut writer, &may.caller, &fields, &editor).await {
+        Ok(study) => Ok((outlook(&mut writer, &study).await?, Choice::read(&mut writer, &study).await?)),
+        Err(error) => Err(as_refusal(error, &fields)?),
+    };
     drop(writer);
     let checked = match made {
-        Ok(study) => Checked { field: None, text: outlook(&mut *app.read().await?, &study).await? },
-        Err(error) => {
-            let refused = as_refusal(error, &fields)?;
-            Checked { field: Some(refused.field), text: refused.message }
-        }
+        Ok((text, choice)) => Checked { field: None, text, reference: Some(choice.shown()?) },
+        Err(refused) => Checked { field: Some(refused.field), text: refused.message, reference: None },
     };
     Ok(Json(checked))
 }

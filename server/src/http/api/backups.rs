@@ -1,0 +1,45 @@
+//! Copies of the record, made by the service that owns it.
+
+use crate::access::Administer;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::once::Once;
+use crate::store::{audit, backup};
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Serialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A copy of the record.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Copy {
+    /// Its name; it lies beside the record.
+    file: String,
+    /// Its size.
+    bytes: u64,
+}
+
+/// `POST`: copies the record to a new file beside it, and checks the copy.
+#[utoipa::path(
+    post,
+    path = "/backups",
+    tag = "operation",
+    responses((status = 201, description = "Copied and checked", body = Copy)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) -> Result<Response, Error> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let (file, bytes) = backup::beside_record(app.store()).await?;
+    let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let detail = json!({ "bytes": bytes });
+    audit::append(&mut writer, &once.actor, "record.backup", &format!("file {file}"), &detail).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &Copy { file, bytes }).await
+}

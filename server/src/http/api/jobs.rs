@@ -1,0 +1,52 @@
+//! What waits to be solved, what is being solved, and by whom.
+
+use crate::access::Read;
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::may::May;
+use crate::store::jobs::{self, Job};
+use axum::Json;
+use axum::extract::State;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// Jobs listed at most.
+const MOST: u32 = 1000;
+
+/// `GET`: the jobs that are not done, in the order of queueing, at most 1000 of them.
+#[utoipa::path(
+    get,
+    path = "/jobs",
+    tag = "operation",
+    responses((status = 200, description = "Those that are not done", body = Vec<Job>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<Job>>, Error> {
+    Ok(Json(jobs::open(&mut *app.read().await?, MOST).await?))
+}
+
+/// Who solves.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Workers {
+    /// How many solves can run at the same time.
+    places: usize,
+    /// Solves by the name of the worker that runs them.
+    at_work: BTreeMap<String, u32>,
+}
+
+/// `GET`: who solves at the moment. A worker behind a broker is known while it has a job.
+#[utoipa::path(
+    get,
+    path = "/workers",
+    tag = "operation",
+    responses((status = 200, description = "Who solves", body = Workers)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn workers(_: May<Read>, State(app): State<AppState>) -> Result<Json<Workers>, Error> {
+    let mut at_work = BTreeMap::new();
+    for worker in jobs::open(&mut *app.read().await?, MOST).await?.into_iter().filter_map(|job| job.worker) {
+        *at_work.entry(worker).or_default() += 1;
+    }
+    Ok(Json(Workers { places: app.director.workers(), at_work }))
+}

@@ -1,0 +1,73 @@
+//! The reference gait that is chosen in the form for a new study: whether another one is nearer to the subject, and what
+//! it looks like.
+
+use super::super::drawn::Drawn;
+use crate::error::Error;
+use crate::plots::{Chart, Stroke};
+use crate::store::reference_gaits::ReferenceGait;
+use crate::store::studies::Study;
+use crate::store::{Connection, ReferenceGaitId, subjects};
+use crate::studies::recording::{self, Match};
+use askama::Template;
+
+/// The angles of a reference gait, by column.
+const ANGLES: [&str; 5] = ["torso lean", "left hip", "left knee", "left ankle", "right hip"];
+
+#[derive(Template)]
+#[template(path = "chosen_reference.html")]
+struct ChosenReference {
+    nearest: String,
+    chart: Drawn,
+}
+
+/// Every reference gait as seen from the subject of a study, and which one the study has.
+pub(super) struct Choice {
+    matches: Vec<Match>,
+    chosen: ReferenceGaitId,
+}
+
+impl Choice {
+    pub(super) async fn read(db: &mut Connection, study: &Study) -> Result<Self, Error> {
+        let subject = subjects::get(db, study.plan.subject_id).await?;
+        let matches = recording::matches(db, &subject.body()).await?;
+        Ok(Self { matches, chosen: study.plan.reference_gait_id })
+    }
+
+    /// As a part of the page.
+    pub(super) fn shown(&self) -> Result<String, Error> {
+        let chosen = self.matches.iter().find(|found| found.reference_gait.id == self.chosen);
+        let Some(chosen) = chosen else { return Ok(String::new()) };
+        let chart = Drawn::new(&chart(&chosen.reference_gait), "");
+        let part = ChosenReference { nearest: nearest(&self.matches, chosen), chart };
+        part.render().map_err(|e| Error::Internal(e.to_string()))
+    }
+}
+
+/// What the matcher says, nearest first.
+fn nearest(matches: &[Match], chosen: &Match) -> String {
+    let known = matches.iter().filter(|found| found.distance.is_some()).count();
+    let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
+    match matches.first() {
+        _ if known == 0 => "No reference gait says whose it is: none is nearer to the subject.".to_owned(),
+        Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
+            format!("The nearest to the subject in height and body mass{}.", away(first))
+        }
+        Some(first) => format!(
+            "Nearer to the subject in height and body mass: {}{}, and not this one{}.",
+            first.reference_gait.name,
+            away(first),
+            away(chosen)
+        ),
+        None => String::new(),
+    }
+}
+
+/// All angles over one stride.
+fn chart(reference: &ReferenceGait) -> Chart {
+    let chart = Chart::new("The reference gait", "gait cycle from right heel strike, %", "angle, °");
+    ANGLES.iter().enumerate().fold(chart, |chart, (column, name)| {
+        let rows = reference.definition.angles_rad.iter().enumerate();
+        let line = rows.map(|(row, angles)| (row as f64, angles[column].to_degrees())).collect();
+        chart.with(name, column, Stroke::Solid, line)
+    })
+}

@@ -1,0 +1,280 @@
+//! Seals: a hash of each row of the record, chained, so that a row that another hand touched is found.
+//!
+//! Triggers of the writing connection note which rows a change writes, and [`seal`] seals them before the change is
+//! made durable: no way in can forget it. The triggers are temporary, so what another program writes is not noted.
+
+use super::audit::ORIGIN;
+use super::{Connection, StoreResult, json};
+use sha2::{Digest, Sha256};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
+
+/// Seals read at a time when the chain is walked.
+const BATCH: i64 = 1000;
+/// Between the columns of a key.
+const JOINT: char = '/';
+
+/// A table whose rows are sealed.
+#[derive(Debug, Clone, Copy)]
+pub struct Sealed {
+    /// Its name.
+    pub table: &'static str,
+    /// Its primary key.
+    pub key: &'static [&'static str],
+}
+
+const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
+    Sealed { table, key }
+}
+
+/// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
+/// the rows that are there, or their seals are renewed by writing them.
+pub const TABLES: [Sealed; 23] = [
+    sealed("subjects", &["id"]),
+    sealed("consents", &["seq"]),
+    sealed("subject_muscles", &["seq"]),
+    sealed("devices", &["id"]),
+    sealed("reference_gaits", &["id"]),
+    sealed("studies", &["id"]),
+    sealed("trials", &["id"]),
+    sealed("gaits", &["trial_id"]),
+    sealed("results", &["trial_id", "attempt"]),
+    sealed("certificates", &["trial_id", "format_version"]),
+    sealed("feedback", &["seq"]),
+    sealed("retractions", &["feedback_seq"]),
+    sealed("presentations", &["id"]),
+    sealed("presentation_answers", &["presentation_id"]),
+    sealed("presentation_retractions", &["presentation_id"]),
+    sealed("unblindings", &["seq"]),
+    sealed("lab_sessions", &["id"]),
+    sealed("lab_acts", &["session_id", "act"]),
+    sealed("lab_recordings", &["id"]),
+    sealed("emg_results", &["id"]),
+    sealed("events", &["seq"]),
+    sealed("users", &["id"]),
+    sealed("tokens", &["id"]),
+];
+
+/// Tables whose rows come and go with the work, or only repeat what others say.
+pub const NOT_SEALED: [&str; 6] = ["audit", "seals", "jobs", "idempotency_keys", "sessions", "sign_in_links"];
+
+impl Sealed {
+    /// The key of a row as text, in SQL; `row` is `new.`, `old.`, or the table and a dot.
+    fn key_of(&self, row: &str) -> String {
+        let columns: Vec<String> = self.key.iter().map(|column| format!("{row}{column}")).collect();
+        columns.join(&format!(" || '{JOINT}' || "))
+    }
+
+    /// Notes the rows that `event` (`after insert`) touches.
+    fn trigger(&self, event: &str, row: &str) -> String {
+        let (table, key) = (self.table, self.key_of(row));
+        let name = format!("{table}_{}", event.replace(' ', "_"));
+        format!(
+            "create temp trigger {name} {event} on main.{table} begin \
+             insert into unsealed (evidence, key) values ('{table}', {key}); end"
+        )
+    }
+
+    /// Hash of a row as it stands; empty when there is none.
+    async fn hash_of(&self, db: &mut Connection, key: &str) -> StoreResult<String> {
+        let columns: Vec<String> = self.key.iter().map(|column| format!("{column} = ?")).collect();
+        let sql = format!("select * from {} where {}", self.table, columns.join(" and "));
+        let query = key
+            .splitn(self.key.len(), JOINT)
+            .fold(sqlx::query(AssertSqlSafe(sql)), |query, part| query.bind(part.to_owned()));
+        query.fetch_optional(db).await?.map_or(Ok(String::new()), |row| hash_of_row(&row))
+    }
+}
+
+/// Makes a connection note what it writes. What was written before there were seals is noted at once.
+pub(super) async fn watch(db: &mut Connection) -> StoreResult<()> {
+    // The order of writing is the order of the seals.
+    let notes = "create temp table unsealed (place integer primary key, evidence text not null, key text not null)";
+    sqlx::query(notes).execute(&mut *db).await?;
+    for sealed in TABLES {
+        for (event, row) in [("after insert", "new."), ("after update", "new."), ("after delete", "old.")] {
+            sqlx::query(AssertSqlSafe(sealed.trigger(event, row))).execute(&mut *db).await?;
+        }
+        let first = format!(
+            "insert into unsealed (evidence, key) select '{table}', {key} from {table} \
+             where not exists (select 1 from seals where evidence = '{table}')",
+            table = sealed.table,
+            key = sealed.key_of(&format!("{}.", sealed.table)),
+        );
+        sqlx::query(AssertSqlSafe(first)).execute(&mut *db).await?;
+    }
+    Ok(())
+}
+
+/// Seals what was written since the last time.
+pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
+    let noted = "select evidence, key from unsealed group by evidence, key order by min(place)";
+    let noted = sqlx::query(noted).fetch_all(&mut *db).await?;
+    if noted.is_empty() {
+        return Ok(());
+    }
+    let last = sqlx::query_scalar("select hash from seals order by seq desc limit 1").fetch_optional(&mut *db).await?;
+    let mut previous: String = last.unwrap_or_else(|| ORIGIN.to_owned());
+    for row in &noted {
+        let (table, key): (&str, &str) = (row.try_get(0)?, row.try_get(1)?);
+        let Some(sealed) = TABLES.iter().find(|sealed| sealed.table == table) else { continue };
+        let sha256 = sealed.hash_of(db, key).await?;
+        let hash = chained(&previous, table, key, &sha256);
+        sqlx::query("insert into seals (evidence, key, sha256, previous, hash) values (?, ?, ?, ?, ?)")
+            .bind(table)
+            .bind(key)
+            .bind(sha256)
+            .bind(previous)
+            .bind(&hash)
+            .execute(&mut *db)
+            .await?;
+        previous = hash;
+    }
+    sqlx::query("delete from unsealed").execute(db).await?;
+    Ok(())
+}
+
+/// What comparing the record with its seals found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// Every row is as it was sealed.
+    Whole {
+        /// How many seals.
+        seals: u64,
+        /// Hash of the last one.
+        last: String,
+    },
+    /// The record is of a version that had no seals.
+    None,
+    /// This seal does not follow from the one before.
+    Broken {
+        /// Its sequence number.
+        seq: i64,
+    },
+    /// This row is not as it was sealed: changed, added or taken away.
+    Touched {
+        /// Its table.
+        table: String,
+        /// Its primary key.
+        key: String,
+    },
+}
+
+/// Walks the whole chain and compares every row with its newest seal.
+///
+/// # Errors
+/// What the database reports.
+pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
+    let table = "select name from sqlite_master where type = 'table' and name = 'seals'";
+    if sqlx::query(table).fetch_optional(&mut *db).await?.is_none() {
+        return Ok(Verdict::None);
+    }
+    let chain = walk(db).await?;
+    if !matches!(chain, Verdict::Whole { .. }) {
+        return Ok(chain);
+    }
+    for sealed in TABLES {
+        if let Some(key) = without_seal(db, sealed).await? {
+            return Ok(Verdict::Touched { table: sealed.table.to_owned(), key });
+        }
+        if let Some(key) = unlike_seal(db, sealed).await? {
+            return Ok(Verdict::Touched { table: sealed.table.to_owned(), key });
+        }
+    }
+    Ok(chain)
+}
+
+async fn walk(db: &mut Connection) -> StoreResult<Verdict> {
+    let (mut last, mut after) = (ORIGIN.to_owned(), 0_i64);
+    loop {
+        let batch = sqlx::query("select * from seals where seq > ? order by seq limit ?")
+            .bind(after)
+            .bind(BATCH)
+            .fetch_all(&mut *db)
+            .await?;
+        if batch.is_empty() {
+            break;
+        }
+        for row in &batch {
+            let seq: i64 = row.try_get("seq")?;
+            let text = |name: &str| row.try_get::<String, _>(name);
+            let (Ok(table), Ok(key), Ok(sha256)) = (text("evidence"), text("key"), text("sha256")) else {
+                return Ok(Verdict::Broken { seq });
+            };
+            let hash = chained(&last, &table, &key, &sha256);
+            if seq != after + 1 || text("previous")? != last || text("hash")? != hash {
+                return Ok(Verdict::Broken { seq });
+            }
+            (last, after) = (hash, seq);
+        }
+    }
+    // The database counts for itself how many there were.
+    if super::audit::last_ever(db, "seals").await? != after {
+        return Ok(Verdict::Broken { seq: after + 1 });
+    }
+    Ok(Verdict::Whole { seals: after.unsigned_abs(), last })
+}
+
+/// The key of a row that nobody sealed.
+async fn without_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<String>> {
+    let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
+    let sql = format!(
+        "select cast({key} as text) as k from {table} \
+         where not exists (select 1 from seals where evidence = '{table}' and key = cast({key} as text)) limit 1"
+    );
+    Ok(sqlx::query_scalar(AssertSqlSafe(sql)).fetch_optional(db).await?)
+}
+
+/// The key of a row that differs from its newest seal.
+async fn unlike_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<String>> {
+    let mut after = 0_i64;
+    loop {
+        let batch = sqlx::query(
+            "select seq, key, sha256 from seals s where evidence = ? and seq > ? and not exists \
+             (select 1 from seals n where n.evidence = s.evidence and n.key = s.key and n.seq > s.seq) \
+             order by seq limit ?",
+        )
+        .bind(sealed.table)
+        .bind(after)
+        .bind(BATCH)
+        .fetch_all(&mut *db)
+        .await?;
+        let Some(last) = batch.last() else { return Ok(None) };
+        after = last.try_get("seq")?;
+        for row in &batch {
+            let key: String = row.try_get("key")?;
+            if sealed.hash_of(db, &key).await? != row.try_get::<&str, _>("sha256")? {
+                return Ok(Some(key));
+            }
+        }
+    }
+}
+
+/// Hash of a seal and the one before.
+fn chained(previous: &str, table: &str, key: &str, sha256: &str) -> String {
+    // None of the parts can hold a line break but the key, which comes last.
+    json::sha256(format!("{previous}\n{sha256}\n{table}\n{key}").as_bytes())
+}
+
+/// Hash of a row: name, kind, length and bytes of each column that is not null, by name.
+fn hash_of_row(row: &SqliteRow) -> StoreResult<String> {
+    let mut columns: Vec<(&str, usize)> = row.columns().iter().map(|c| (c.name(), c.ordinal())).collect();
+    columns.sort_unstable();
+    let mut hash = Sha256::new();
+    for (name, place) in columns {
+        let raw = row.try_get_raw(place)?;
+        if raw.is_null() {
+            continue;
+        }
+        let kind = raw.type_info().name().to_owned();
+        let bytes = match kind.as_str() {
+            "INTEGER" | "BOOLEAN" => row.try_get::<i64, _>(place)?.to_be_bytes().to_vec(),
+            "REAL" => row.try_get::<f64, _>(place)?.to_bits().to_be_bytes().to_vec(),
+            // Also what is no text any more.
+            _ => row.try_get_unchecked::<Vec<u8>, _>(place)?,
+        };
+        hash.update(format!("{name}\n{kind}\n{}\n", bytes.len()));
+        hash.update(bytes);
+    }
+    Ok(json::hexadecimal(&hash.finalize()))
+}

@@ -1,0 +1,103 @@
+//! Suggestions, what waits to be solved, and copies asked for by REST.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gait_learner::{ActionIndex, Feedback};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::{StudyId, backup, studies};
+use gaitwright::studies::standing::Standing;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::Service;
+use serde_json::json;
+use std::time::Duration;
+
+async fn heard(service: &Service, study: StudyId) -> Vec<Feedback> {
+    let mut reader = service.store.read().await.unwrap();
+    let study = studies::get(&mut reader, study).await.unwrap();
+    Standing::read(&mut reader, study).await.unwrap().log().feedback
+}
+
+#[tokio::test]
+async fn the_learner_hears_a_suggestion_until_it_is_taken_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Mixed)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await.into_iter().find(|trial| trial.state.as_str() == "converged").unwrap();
+    let path = format!("/api/v1/studies/{study}/suggestions");
+    let before = heard(&service, study).await;
+
+    let plan = service.get(study).await.plan;
+    let a6 = plan.search_space.values(trial.action_index)[5];
+    let other = if a6 == 0.3 { 0.2 } else { 0.3 };
+    for (body, field) in [
+        (json!({"over": trial.id, "bounds": {"a9": 1.0}}), "bounds"),
+        (json!({"over": trial.id, "bounds": {"a6": 0.31}}), "bounds.a6"),
+        (json!({"over": trial.id, "bounds": {"a6": a6}}), "bounds"),
+        (json!({"over": trial.id, "bounds": {}}), "bounds"),
+        (json!({"over": trial.id, "bounds": {"a6": other}, "source": "gait_rmse"}), "source"),
+    ] {
+        let refused = service.post(&path, &body).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{body}: {}", refused.text);
+        assert_eq!(refused.json()["field"], field, "{body}");
+    }
+    assert_eq!(heard(&service, study).await, before);
+
+    let new = json!({"over": trial.id, "bounds": {"a6": other}, "source": "subject", "author": "S03"});
+    let given = service.post(&path, &new).await;
+    assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
+    let given = given.json();
+    let suggested = ActionIndex(given["suggested"].as_u64().unwrap());
+    let mut expected = plan.search_space.values(trial.action_index);
+    expected[5] = other;
+    assert_eq!(plan.search_space.values(suggested), expected);
+    let after = heard(&service, study).await;
+    assert_eq!(after[before.len()..], [Feedback::Suggestion { suggested, over: trial.action_index }]);
+    assert_eq!(service.fetch(&path).await.json()[0]["id"], given["id"]);
+    let answers = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.text;
+    assert!(!answers.contains("suggestion"), "{answers}");
+
+    let retract = format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap());
+    assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
+    assert_eq!(heard(&service, study).await, before);
+    assert_eq!(service.fetch(&path).await.json()[0]["retraction"]["reason"], "mistyped");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_waits_and_who_solves_is_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let solver = Analytic::slow(Duration::from_millis(50));
+    let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
+    let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (4, 2)).await;
+    let jobs = loop {
+        let jobs = service.fetch("/api/v1/jobs").await.json();
+        let states: Vec<_> = jobs.as_array().unwrap().iter().map(|job| job["state"].as_str().unwrap()).collect();
+        if states.contains(&"leased") && states.contains(&"queued") {
+            break jobs;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    };
+    let leased = jobs.as_array().unwrap().iter().find(|job| job["state"] == "leased").unwrap();
+    assert_eq!((&leased["study_id"], &leased["attempts"]), (&json!(study), &json!(1)));
+    assert!(leased["lease_until"].is_string());
+    let workers = service.fetch("/api/v1/workers").await.json();
+    assert_eq!(workers["places"], 1);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_copy_is_made_and_checked_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let copied = service.post("/api/v1/backups", &json!({})).await;
+    assert_eq!(copied.status, StatusCode::CREATED, "{}", copied.text);
+    let copied = copied.json();
+    let file = folder.path().join(copied["file"].as_str().unwrap());
+    assert_eq!(std::fs::metadata(&file).unwrap().len(), copied["bytes"].as_u64().unwrap());
+    backup::check(&file).await.unwrap();
+    let again = service.post("/api/v1/backups", &json!({})).await.json();
+    assert_ne!(again["file"], copied["file"]);
+    service.stop().await;
+}
