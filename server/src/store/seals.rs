@@ -1,6 +1,6 @@
 //! Seals: a hash of each row of the record, chained, so that a row that another hand touched is found.
 //!
-//! Triggers of the writing connection note which rows a change writes, and [`seal`] seals them before the change is
+//! Triggers of the writing connection note which rows a change writes, and they are sealed before the change is
 //! made durable: no way in can forget it. The triggers are temporary, so what another program writes is not noted.
 
 use super::audit::ORIGIN;
