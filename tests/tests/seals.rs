@@ -41,6 +41,14 @@ async fn filled() -> (TempDir, PathBuf) {
     for sql in [
         "insert into certificates select trial_id, 1, 1, '{}', created_at from gaits limit 1",
         "insert into presentation_retractions select presentation_id, created_at from presentation_answers limit 1",
+        "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, actor, created_at) \
+         select 'L', study_id, 1, min(id), max(id), 1, 'K', '' from trials group by study_id",
+        "insert into lab_acts (session_id, act, actor, created_at) values ('L', 'walk_1', 'K', '')",
+        "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+         values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
+        "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
+        "insert into subject_muscles (subject_id, definition, actor, created_at) \
+         select id, '{}', 'K', '' from subjects limit 1",
     ] {
         sqlx::query(sql).execute(&mut *writer).await.unwrap();
     }
