@@ -46,6 +46,9 @@ pub struct Relaxation {
     pub not_with: f64,
     /// Solves that this took.
     pub solves: usize,
+    /// Where the gait with `to` was found. It came from its neighbours: other starts may not reach it.
+    #[serde(skip)]
+    pub warm_start: Option<WarmStart>,
 }
 
 /// Why no gait was found.
@@ -150,7 +153,7 @@ fn relax(
         solve(&with_bound(problem, bound, value)?, warm, options, &mut |_| {}, cancel)
     };
     let mut last = try_value(loosest(bound), None)?;
-    let (mut not_with, mut to) = (from, None);
+    let (mut not_with, mut to, mut warm_start) = (from, None, None);
     if last.report.status == SolveStatus::Converged {
         let mut nearest = loosest(bound);
         for _ in 0..BISECTIONS {
@@ -165,7 +168,7 @@ fn relax(
                 not_with = value;
             }
         }
-        to = Some(nearest);
+        (to, warm_start) = (Some(nearest), Some(last.warm_start));
     } else {
         not_with = loosest(bound);
     }
@@ -173,7 +176,7 @@ fn relax(
         return Ok(None);
     }
     let (name, meaning) = (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned());
-    Ok(Some(Relaxation { bound: name, meaning, from, to, not_with, solves }))
+    Ok(Some(Relaxation { bound: name, meaning, from, to, not_with, solves, warm_start }))
 }
 
 /// Explains an outcome that did not converge, by relaxing each bound that it runs into alone and solving again.
@@ -248,6 +251,7 @@ mod tests {
             to,
             not_with: from,
             solves: 1,
+            warm_start: None,
         };
         assert!((size(&relaxation("a2", 40.0, Some(80.0))) - 2f64.ln()).abs() < 1e-15);
         assert!((size(&relaxation("a5", 0.0, Some(0.03))) - 0.1).abs() < 1e-15);
