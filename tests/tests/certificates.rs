@@ -78,8 +78,8 @@ fn what_is_no_gait_or_recording_is_refused() {
     std::fs::write(folder.join("list.json"), "[1, 2]").unwrap();
     refused(folder, &["certify", "list.json"], "list.json: not a gait");
     refused(folder, &["convert", "list.json", "--to", "controller"], "list.json: not a gait");
-    let rows: String = (0..30).map(|row| format!("{row}\n")).collect();
-    std::fs::write(folder.join("walk.mot"), format!("walk\nendheader\ntime\n{rows}")).unwrap();
+    let times_s: Vec<String> = (0..30).map(|row| row.to_string()).collect();
+    std::fs::write(folder.join("walk.mot"), format!("walk\nendheader\ntime\n{}\n", times_s.join("\n"))).unwrap();
     let reference = ["reference", "walk.mot", "--name", "x", "--out", "r.json"];
     refused(folder, &reference, "walk.mot, line 2: the header has no inDegrees=yes or no");
     refused(folder, &["solve", "--reference", "list.json"], "list.json: not a reference gait");
