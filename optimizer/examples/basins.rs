@@ -3,18 +3,11 @@
 //! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--grid off]`: the guesses of the
 //! catalogue, or with `--grid on` a grid of routes, timings and knee flexions; one CSV row each.
 
+mod arguments;
+
+use arguments::argument;
 use gait_optimizer::{CancelToken, ColdGuess, ColdRoute, GaitProblem, SolveOptions, Subject, solve_from_guesses};
 use std::error::Error;
-
-fn argument(name: &str, default: &str) -> String {
-    let arguments: Vec<String> = std::env::args().collect();
-    arguments
-        .iter()
-        .position(|a| a == name)
-        .and_then(|i| arguments.get(i + 1))
-        .cloned()
-        .unwrap_or_else(|| default.to_owned())
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let threads: usize = argument("--threads", "2").parse()?;

@@ -4,18 +4,11 @@
 //! [--finest 3]`: CSV, one row a mesh: the default one (intervals 4,4,6,6) and its doublings; differences are to the row
 //! before, at the points that both meshes have.
 
+mod arguments;
+
+use arguments::argument;
 use gait_optimizer::{CancelToken, GaitProblem, Mesh, SolveOptions, SolveOutcome, Subject, solve};
 use std::error::Error;
-
-fn argument(name: &str, default: &str) -> String {
-    let arguments: Vec<String> = std::env::args().collect();
-    arguments
-        .iter()
-        .position(|a| a == name)
-        .and_then(|i| arguments.get(i + 1))
-        .cloned()
-        .unwrap_or_else(|| default.to_owned())
-}
 
 /// Largest and root-mean-square difference of the seven joint angles at the points of the coarser of two meshes, of which
 /// the other is the doubling, rad.

@@ -3,15 +3,12 @@
 //! `cargo run --release -p gait-optimizer --example naturalness -- [--subject 1] [--muscles off]`: one CSV row per set
 //! of settings, each solved cold with the default bounds.
 
+mod arguments;
+
+use arguments::argument;
 use gait_optimizer::gait::{Axis, DomainTrajectory, Side};
 use gait_optimizer::{CancelToken, Gait, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
 use std::error::Error;
-
-fn argument(name: &str, default: &str) -> String {
-    let arguments: Vec<String> = std::env::args().collect();
-    let place = arguments.iter().position(|a| a == name);
-    place.and_then(|i| arguments.get(i + 1)).cloned().unwrap_or_else(|| default.to_owned())
-}
 
 /// Settings by name.
 fn wishes() -> Vec<(&'static str, GaitSettings)> {

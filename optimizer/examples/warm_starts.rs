@@ -4,6 +4,9 @@
 //! [--cold on] [--threads 1]`: solves the default problem, then for each random one-bound change solves warm from it
 //! (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end.
 
+mod arguments;
+
+use arguments::argument;
 use gait_optimizer::{
     CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
@@ -32,16 +35,6 @@ impl SplitMix {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         usize::try_from((z ^ (z >> 31)) % n as u64).unwrap_or(0)
     }
-}
-
-fn argument(name: &str, default: &str) -> String {
-    let arguments: Vec<String> = std::env::args().collect();
-    arguments
-        .iter()
-        .position(|a| a == name)
-        .and_then(|i| arguments.get(i + 1))
-        .cloned()
-        .unwrap_or_else(|| default.to_owned())
 }
 
 fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {

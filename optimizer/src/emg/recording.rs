@@ -88,11 +88,7 @@ impl EmgRecording {
             .into_iter()
             .map(|(channel, column)| Ok((channel.to_owned(), self.column(what, column)?.to_vec())))
             .collect::<Result<_, ModelError>>()?;
-        Ok(Self { channels, ..self.clone_without_channels() })
-    }
-
-    fn clone_without_channels(&self) -> Self {
-        Self { start_s: self.start_s, rate_hz: self.rate_hz, channels: Vec::new() }
+        Ok(Self { start_s: self.start_s, rate_hz: self.rate_hz, channels })
     }
 
     /// Heel strikes, s: where the column of a foot switch or of a vertical force rises above the threshold.

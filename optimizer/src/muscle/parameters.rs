@@ -52,65 +52,70 @@ pub struct MuscleField {
     pub value: fn(&Muscle) -> Option<f64>,
 }
 
+const LEVER_RANGE_M: (f64, f64) = (0.005, 0.2);
+
+const fn field(
+    name: &'static str,
+    meaning: &'static str,
+    (minimum, maximum): (f64, f64),
+    given: fn(&MuscleOverride) -> Option<f64>,
+    value: fn(&Muscle) -> Option<f64>,
+) -> MuscleField {
+    MuscleField { name, meaning, minimum, maximum, given, value }
+}
+
 impl MuscleOverride {
     /// Every number, in order.
     pub const FIELDS: [MuscleField; 7] = [
-        MuscleField {
-            name: "max_force_n",
-            meaning: "maximum isometric force, N",
-            minimum: 50.0,
-            maximum: 20_000.0,
-            given: |given| given.max_force_n,
-            value: |muscle| Some(muscle.max_force_n),
-        },
-        MuscleField {
-            name: "max_speed",
-            meaning: "maximum shortening speed, optimal lengths per second",
-            minimum: 2.0,
-            maximum: 30.0,
-            given: |given| given.max_speed,
-            value: |muscle| Some(muscle.max_speed),
-        },
-        MuscleField {
-            name: "optimal_length_m",
-            meaning: "optimal fibre length, m",
-            minimum: 0.01,
-            maximum: 0.3,
-            given: |given| given.optimal_length_m,
-            value: |muscle| Some(muscle.optimal_length_m),
-        },
-        MuscleField {
-            name: "slack_length_m",
-            meaning: "tendon slack length, m",
-            minimum: 0.02,
-            maximum: 0.8,
-            given: |given| given.slack_length_m,
-            value: |muscle| Some(muscle.slack_length_m),
-        },
-        MuscleField {
-            name: "hip_lever_m",
-            meaning: "largest lever arm at the hip, m",
-            minimum: 0.005,
-            maximum: 0.2,
-            given: |given| given.hip_lever_m,
-            value: |muscle| lever(muscle, Joint::Hip),
-        },
-        MuscleField {
-            name: "knee_lever_m",
-            meaning: "largest lever arm at the knee, m",
-            minimum: 0.005,
-            maximum: 0.2,
-            given: |given| given.knee_lever_m,
-            value: |muscle| lever(muscle, Joint::Knee),
-        },
-        MuscleField {
-            name: "ankle_lever_m",
-            meaning: "largest lever arm at the ankle, m",
-            minimum: 0.005,
-            maximum: 0.2,
-            given: |given| given.ankle_lever_m,
-            value: |muscle| lever(muscle, Joint::Ankle),
-        },
+        field(
+            "max_force_n",
+            "maximum isometric force, N",
+            (50.0, 20_000.0),
+            |g| g.max_force_n,
+            |m| Some(m.max_force_n),
+        ),
+        field(
+            "max_speed",
+            "maximum shortening speed, optimal lengths per second",
+            (2.0, 30.0),
+            |g| g.max_speed,
+            |m| Some(m.max_speed),
+        ),
+        field(
+            "optimal_length_m",
+            "optimal fibre length, m",
+            (0.01, 0.3),
+            |g| g.optimal_length_m,
+            |m| Some(m.optimal_length_m),
+        ),
+        field(
+            "slack_length_m",
+            "tendon slack length, m",
+            (0.02, 0.8),
+            |g| g.slack_length_m,
+            |m| Some(m.slack_length_m),
+        ),
+        field(
+            "hip_lever_m",
+            "largest lever arm at the hip, m",
+            LEVER_RANGE_M,
+            |g| g.hip_lever_m,
+            |m| lever(m, Joint::Hip),
+        ),
+        field(
+            "knee_lever_m",
+            "largest lever arm at the knee, m",
+            LEVER_RANGE_M,
+            |g| g.knee_lever_m,
+            |m| lever(m, Joint::Knee),
+        ),
+        field(
+            "ankle_lever_m",
+            "largest lever arm at the ankle, m",
+            LEVER_RANGE_M,
+            |g| g.ankle_lever_m,
+            |m| lever(m, Joint::Ankle),
+        ),
     ];
 }
 

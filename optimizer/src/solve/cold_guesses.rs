@@ -68,7 +68,7 @@ pub struct ColdGuess {
 }
 
 impl ColdGuess {
-    /// The plainest guess: the basin with the natural swing knee.
+    /// The plainest guess: with muscles mostly the basin with the natural swing knee.
     pub const NATURAL: Self = Self {
         route: ColdRoute::Direct,
         knee_flexion: 1.0,
@@ -79,7 +79,7 @@ impl ColdGuess {
         curvature_from: 0.03,
         adaptive_barrier: false,
     };
-    /// The basin with the lowest objective, mostly: stiff swing knee with muscles.
+    /// With muscles mostly the basin with the lowest objective and a stiff swing knee.
     pub const EARLY_RISE: Self = Self { timing: GuessTiming::EarlyRise, curvature_from: 0.3, ..Self::NATURAL };
 
     /// The guesses of a cold start: the first [`SolveOptions::cold_guesses`](super::SolveOptions) of them are tried, the
