@@ -9,6 +9,7 @@
 //! `filter`, and `feasibility` when the line search fails } -> `status::NlpResult`.
 
 mod barrier;
+mod block_columns;
 mod bunch_kaufman;
 mod dense_kernels;
 mod feasibility;
@@ -30,10 +31,12 @@ mod null_space;
 mod optimality;
 mod ordering;
 mod problem;
+mod schedule;
 mod settings;
 mod solve;
 mod start;
 mod status;
+mod substitution;
 mod supernodal;
 
 pub use problem::{EliminationBlocks, NonlinearProgram, SparsityPattern};

@@ -1,16 +1,21 @@
 //! Bunch-Kaufman factorisation of the leading columns of a symmetric matrix (Golub and Van Loan, section 4.4.4), with the
 //! Schur complement left in the rest: P A P^T = L B L^T, B with blocks of order one and two.
+//!
+//! Columns are brought up to date when they are looked at, panel by panel; all behind a panel in one product at its end,
+//! which stays in the registers.
 
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
 #![allow(clippy::inline_always)]
 
 use pulp::Simd;
 
-use super::dense_kernels::{LANES, subtract, subtract_two};
+use super::dense_kernels::{LANES, subtract_columns_within, subtract_product};
 use super::kkt_solver::Inertia;
 
 /// (1 + sqrt 17) / 8.
 const ALPHA: f64 = 0.640_388_203_202_208;
+/// Columns of a panel, one more where it ends with a block of order two.
+const PANEL: usize = 32;
 
 /// The columns to eliminate within a matrix of `size` rows, stored with `stride`.
 #[derive(Debug, Clone, Copy)]
@@ -21,8 +26,11 @@ pub(super) struct Pivots {
     pub stride: usize,
 }
 
+/// Columns of work space that [`eliminate`] needs.
+pub(super) const WORK_COLUMNS: usize = PANEL + 2;
+
 /// Eliminates in place (lower triangle). `off_diagonal[j]` becomes the subdiagonal of a block of order two that begins
-/// at j, else zero; `order[j]` the row that was moved to j. False when a column vanishes. `work`: two columns.
+/// at j, else zero; `order[j]` the row that was moved to j. False when a column vanishes. `work`: [`WORK_COLUMNS`] columns.
 #[inline(always)]
 pub(super) fn eliminate<S: Simd>(
     simd: S,
@@ -33,102 +41,142 @@ pub(super) fn eliminate<S: Simd>(
     inertia: &mut Inertia,
     work: &mut [f64],
 ) -> bool {
-    let Pivots { first, end, size, stride } = pivots;
     off_diagonal.fill(0.0);
     for (j, p) in order.iter_mut().enumerate() {
         *p = j;
     }
-    let mut j = first;
-    while j < end {
-        let Some((row, pair)) = choose(a, pivots, j) else { return false };
-        let target = if pair { j + 1 } else { j };
-        if row != target {
-            exchange(a, pivots, target, row);
-            order.swap(target, row);
+    let mut j = pivots.first;
+    while j < pivots.end {
+        let Some(next) = eliminate_panel(simd, a, pivots, j, off_diagonal, order, inertia, work) else { return false };
+        let (panel, rest) = a.split_at_mut(next * pivots.stride);
+        subtract_product(simd, rest, &panel[j * pivots.stride..], work, pivots.stride, next - j, next..pivots.size);
+        j = next;
+    }
+    true
+}
+
+/// Eliminates the panel that begins at column `start`; the columns behind it stay as they are. `work` becomes W = L B of
+/// the panel. Gives the column after the panel.
+#[allow(clippy::too_many_arguments)] // a kernel
+#[inline(always)]
+fn eliminate_panel<S: Simd>(
+    simd: S,
+    a: &mut [f64],
+    pivots: Pivots,
+    start: usize,
+    off_diagonal: &mut [f64],
+    order: &mut [usize],
+    inertia: &mut Inertia,
+    work: &mut [f64],
+) -> Option<usize> {
+    let Pivots { end, size, stride, .. } = pivots;
+    // While the panel lasts its columns of L have zeros down to their diagonals: nothing may leak in from there.
+    let mut diagonals = [0.0; PANEL + 1];
+    let mut j = start;
+    while j < end && j < start + PANEL {
+        let (done, own) = work.split_at_mut((j - start) * stride);
+        let (w1, w2) = own[..2 * stride].split_at_mut(stride);
+        w1[j..].copy_from_slice(&a[j * stride + j..(j + 1) * stride]);
+        bring_up_to_date(simd, a, pivots, start, j, j, done, w1);
+        let (largest, row) = largest_entry(&w1[..end], j + 1);
+        let diagonal = w1[j].abs();
+        // Not a number: neither comparison holds.
+        if !(diagonal > 0.0 || largest > 0.0) {
+            return None;
         }
-        let (w1, w2) = work[..2 * stride].split_at_mut(stride);
+        let mut pair = false;
+        let mut pivot = j;
+        if diagonal < ALPHA * largest || diagonal.is_nan() {
+            for i in j..row {
+                w2[i] = a[i * stride + row];
+            }
+            w2[row..].copy_from_slice(&a[row * stride + row..(row + 1) * stride]);
+            bring_up_to_date(simd, a, pivots, start, j, row, done, w2);
+            let in_row = largest_entry(&w2[..row], j).0.max(largest_entry(&w2[..end], row + 1).0);
+            if diagonal * in_row < ALPHA * largest * largest {
+                pivot = row;
+                pair = w2[row].abs() < ALPHA * in_row;
+                if !pair {
+                    w1.copy_from_slice(w2);
+                }
+            }
+        }
+        let target = if pair { j + 1 } else { j };
+        if pivot > target {
+            exchange(a, pivots, target, pivot);
+            order.swap(target, pivot);
+            for w in work.chunks_exact_mut(stride).take(target + 1 - start) {
+                w.swap(target, pivot);
+            }
+        }
+        let (w1, w2) = work[(j - start) * stride..][..2 * stride].split_at(stride);
+        let (l1, l2) = a[j * stride..].split_at_mut(stride);
         if pair {
-            let (d1, e, d2) = (a[j * stride + j], a[j * stride + j + 1], a[(j + 1) * stride + j + 1]);
+            let (d1, e, d2) = (w1[j], w1[j + 1], w2[j + 1]);
             off_diagonal[j] = e;
             inertia.count_pair(d1, e, d2);
             let (inverse_1, inverse_e, inverse_2) = inverse_pair(d1, e, d2);
-            let (left, right) = a.split_at_mut((j + 2) * stride);
-            let (l1, l2) = left[j * stride..].split_at_mut(stride);
-            w1.copy_from_slice(l1);
-            w2.copy_from_slice(l2);
-            // Whole vectors are updated below: nothing above the diagonal may leak in.
             l1[..j + 2].fill(0.0);
             l2[..j + 2].fill(0.0);
             for i in j + 2..size {
                 l1[i] = inverse_1 * w1[i] + inverse_e * w2[i];
                 l2[i] = inverse_e * w1[i] + inverse_2 * w2[i];
             }
-            for (c, y) in (j + 2..size).zip(right.chunks_exact_mut(stride)) {
-                if w1[c] != 0.0 || w2[c] != 0.0 {
-                    let from = c / LANES * LANES;
-                    subtract_two(simd, &mut y[from..], &l1[from..], w1[c], &l2[from..], w2[c]);
-                }
-            }
-            l1[j] = d1;
-            l2[j + 1] = d2;
+            (diagonals[j - start], diagonals[j + 1 - start]) = (d1, d2);
             j += 2;
         } else {
-            let d = a[j * stride + j];
+            let d = w1[j];
             inertia.count(d);
-            let (left, right) = a.split_at_mut((j + 1) * stride);
-            let l = &mut left[j * stride..];
-            w1.copy_from_slice(l);
-            l[..=j].fill(0.0);
             let inverse = 1.0 / d;
-            for v in &mut l[j + 1..size] {
-                *v *= inverse;
+            l1[..=j].fill(0.0);
+            for (l, w) in l1[j + 1..size].iter_mut().zip(&w1[j + 1..size]) {
+                *l = w * inverse;
             }
-            for (c, y) in (j + 1..size).zip(right.chunks_exact_mut(stride)) {
-                if w1[c] != 0.0 {
-                    let from = c / LANES * LANES;
-                    subtract(simd, &mut y[from..], &l[from..], w1[c]);
-                }
-            }
-            l[j] = d;
+            diagonals[j - start] = d;
             j += 1;
         }
     }
-    true
+    for (column, d) in (start..j).zip(diagonals) {
+        a[column * stride + column] = d;
+    }
+    Some(j)
 }
 
-/// Row to bring to the pivot position, and whether the pivot has order two; `None` when column j vanishes.
+/// Takes from w, a column of which row `row` is the diagonal, what the panel's finished columns up to `j` contribute.
+#[allow(clippy::too_many_arguments)] // a kernel
 #[inline(always)]
-fn choose(a: &[f64], pivots: Pivots, j: usize) -> Option<(usize, bool)> {
-    let Pivots { end, stride, .. } = pivots;
-    let column = &a[j * stride..j * stride + end];
-    let diagonal = column[j].abs();
-    let (mut largest, mut row) = (0.0, j);
-    for (i, v) in column.iter().enumerate().skip(j + 1) {
+fn bring_up_to_date<S: Simd>(
+    simd: S,
+    a: &[f64],
+    pivots: Pivots,
+    start: usize,
+    j: usize,
+    row: usize,
+    done: &[f64],
+    w: &mut [f64],
+) {
+    let Pivots { stride, .. } = pivots;
+    let mut terms = [(0, 0.0); PANEL + 1];
+    let count = j - start;
+    for (k, (term, column)) in terms.iter_mut().zip(done.chunks_exact(stride)).enumerate() {
+        *term = (k, column[row]);
+    }
+    let from = j / LANES * LANES;
+    // Rows before j are not in use: whatever they hold is finite.
+    w[from..j].fill(0.0);
+    subtract_columns_within(simd, w, &a[start * stride..], stride, &terms[..count], from, stride);
+}
+
+/// Largest |v_i| from `first` on, and where; numbers that are none do not count.
+#[inline(always)]
+fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
+    let (mut largest, mut at) = (0.0, first);
+    for (i, v) in values.iter().enumerate().skip(first) {
         if v.abs() > largest {
-            (largest, row) = (v.abs(), i);
+            (largest, at) = (v.abs(), i);
         }
     }
-    // Not a number: neither comparison holds.
-    if !(diagonal > 0.0 || largest > 0.0) {
-        return None;
-    }
-    if diagonal >= ALPHA * largest {
-        return Some((j, false));
-    }
-    let mut in_row = 0.0f64;
-    for i in j..row {
-        in_row = in_row.max(a[i * stride + row].abs());
-    }
-    for v in &a[row * stride + row + 1..row * stride + end] {
-        in_row = in_row.max(v.abs());
-    }
-    if diagonal * in_row >= ALPHA * largest * largest {
-        Some((j, false))
-    } else if a[row * stride + row].abs() >= ALPHA * in_row {
-        Some((row, false))
-    } else {
-        Some((row, true))
-    }
+    (largest, at)
 }
 
 /// Exchanges rows and columns p < s, the rows in the finished columns included.

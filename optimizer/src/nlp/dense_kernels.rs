@@ -6,6 +6,8 @@
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
 #![allow(clippy::inline_always)]
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 /// Column strides are multiples of this, the widest vector of f64 in use.
@@ -52,23 +54,7 @@ pub(super) fn subtract_range<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64,
     subtract(simd, &mut y[inner..end], &a[inner..end], f);
 }
 
-/// y -= f a + g b.
-#[inline(always)]
-pub(super) fn subtract_two<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64, b: &[f64], g: f64) {
-    let (f, g) = (simd.splat_f64s(-f), simd.splat_f64s(-g));
-    for ((y, a), b) in vectors_mut::<S>(y).iter_mut().zip(vectors::<S>(a)).zip(vectors::<S>(b)) {
-        *y = simd.mul_add_f64s(*b, g, simd.mul_add_f64s(*a, f, *y));
-    }
-}
-
-/// y -= sum of f x_k over the terms (k, f), x_k being columns of x.
-#[inline(always)]
-pub(super) fn subtract_columns<S: Simd>(simd: S, y: &mut [f64], x: &[f64], stride: usize, terms: &[(usize, f64)]) {
-    let length = y.len();
-    subtract_columns_within(simd, y, x, stride, terms, 0, length);
-}
-
-/// The same in the entries [from, to), multiples of [`LANES`], only.
+/// y -= sum of f x_k over the terms (k, f), x_k being columns of x; in the entries [from, to), multiples of [`LANES`], only.
 #[inline(always)]
 pub(super) fn subtract_columns_within<S: Simd>(
     simd: S,
@@ -105,12 +91,24 @@ pub(super) fn subtract_columns_within<S: Simd>(
 /// Dot product of vectors of padded length, in [`LANES`] partial sums.
 #[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0f64; LANES];
+    let mut sums = [0.0; LANES];
+    add_to_lanes(&mut sums, a, b);
+    sum_of_lanes(&sums)
+}
+
+/// Adds the products of vectors of padded length to [`LANES`] partial sums.
+#[inline(always)]
+pub(super) fn add_to_lanes(sums: &mut [f64; LANES], a: &[f64], b: &[f64]) {
     for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
         for k in 0..LANES {
             sums[k] = a[k].mul_add(b[k], sums[k]);
         }
     }
+}
+
+/// The sum of partial sums.
+#[inline(always)]
+pub(super) fn sum_of_lanes(sums: &[f64; LANES]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
@@ -251,6 +249,93 @@ fn subtract_outer<S: Simd>(
             for (out, row) in vectors_mut::<S>(column)[from..to].iter_mut().zip(rows) {
                 *out = simd.mul_add_f64s(*row, f, *out);
             }
+        }
+    }
+}
+
+/// Lower triangle (and what shares a tile with it) of the columns `range` of S -= L W^T over the first `count` columns of L
+/// and W; `s` begins with the first of these columns.
+#[inline(always)]
+pub(super) fn subtract_product<S: Simd>(
+    simd: S,
+    s: &mut [f64],
+    l: &[f64],
+    w: &[f64],
+    stride: usize,
+    count: usize,
+    range: Range<usize>,
+) {
+    let to = stride / S::F64_LANES;
+    let mut j = range.start;
+    for group in s.chunks_mut(4 * stride) {
+        if j >= range.end {
+            break;
+        }
+        let from = j / LANES * (LANES / S::F64_LANES);
+        if range.end - j >= 4 {
+            one_product_tiles::<S, 4>(simd, group, l, w, stride, count, from, to, j);
+        } else {
+            for (column, k) in group.chunks_exact_mut(stride).zip(j..range.end) {
+                one_product_tiles::<S, 1>(simd, column, l, w, stride, count, from, to, k);
+            }
+        }
+        j += 4;
+    }
+}
+
+/// Vectors [from, to) by W columns of L W^T, from column j on.
+#[allow(clippy::too_many_arguments)] // a kernel
+#[inline(always)]
+fn one_product_tiles<S: Simd, const W: usize>(
+    simd: S,
+    s: &mut [f64],
+    l: &[f64],
+    w: &[f64],
+    stride: usize,
+    count: usize,
+    from: usize,
+    to: usize,
+    j: usize,
+) {
+    let mut i = from;
+    while i + 3 <= to {
+        one_product_tile::<S, 3, W>(simd, s, l, w, stride, count, i, j);
+        i += 3;
+    }
+    while i < to {
+        one_product_tile::<S, 1, W>(simd, s, l, w, stride, count, i, j);
+        i += 1;
+    }
+}
+
+/// V vectors by W columns of L W^T.
+#[allow(clippy::too_many_arguments)] // a kernel
+#[inline(always)]
+fn one_product_tile<S: Simd, const V: usize, const W: usize>(
+    simd: S,
+    s: &mut [f64],
+    l: &[f64],
+    w: &[f64],
+    stride: usize,
+    count: usize,
+    i: usize,
+    j: usize,
+) {
+    let mut sum = [[simd.splat_f64s(0.0); V]; W];
+    for (l, w) in l.chunks_exact(stride).zip(w.chunks_exact(stride)).take(count) {
+        let (Some(rows), Some(factors)) = (vectors::<S>(l)[i..].first_chunk::<V>(), w[j..].first_chunk::<W>()) else {
+            return;
+        };
+        for c in 0..W {
+            let factor = simd.splat_f64s(factors[c]);
+            for v in 0..V {
+                sum[c][v] = simd.mul_add_f64s(rows[v], factor, sum[c][v]);
+            }
+        }
+    }
+    for (column, sum) in s.chunks_exact_mut(stride).zip(&sum) {
+        for (out, sum) in vectors_mut::<S>(column)[i..].iter_mut().zip(sum) {
+            *out = simd.sub_f64s(*out, *sum);
         }
     }
 }

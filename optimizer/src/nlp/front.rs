@@ -10,6 +10,10 @@
 //! All numbers of a front lie in one array; the *slots* of its reduced matrix are, in this order: spare slots for
 //! deferred rows, free variables, other pivots, border.
 
+// Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
+#![allow(clippy::inline_always)]
+
+use super::block_columns::BlockColumns;
 use super::dense_kernels::{LANES, padded};
 
 /// What an index of the matrix is to the factorisation.
@@ -62,8 +66,33 @@ pub(super) struct Front {
     pub reduced: usize,
     /// Length of the numbers while it is factorised.
     pub length: usize,
-    /// Length of those that solves need: all before the Schur complement.
-    pub kept: usize,
+    /// What solves need of them.
+    pub kept: Kept,
+}
+
+/// The numbers that solves need, one part after the other: L and U of stage 1; X, couplings and Hessian of its variables
+/// without the blocks that are always zero; columns of the pivots of stage 2.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    /// By position of the null space.
+    pub row_coupling: BlockColumns,
+    /// By variable.
+    pub coupling: BlockColumns,
+    pub hessian: BlockColumns,
+    /// Where the parts begin, and where the last one ends.
+    starts: [usize; 6],
+}
+
+impl Kept {
+    /// The parts, in order: L and U, X, couplings, Hessian, columns of the pivots.
+    #[inline]
+    pub(super) fn parts<'a>(&self, numbers: &'a [f64]) -> [&'a [f64]; 5] {
+        std::array::from_fn(|k| &numbers[self.starts[k]..self.starts[k + 1]])
+    }
+
+    pub(super) fn length(&self) -> usize {
+        self.starts[5]
+    }
 }
 
 /// Place of an index in a front.
@@ -94,6 +123,11 @@ impl ChildMap {
         }
         Some(map)
     }
+
+    fn places(&self) -> impl Iterator<Item = Place> + '_ {
+        let variables = self.variables.iter().map(|&variable| Place::Variable(variable));
+        variables.chain(self.slots.iter().map(|&slot| Place::Slot(slot)))
+    }
 }
 
 impl Front {
@@ -119,7 +153,6 @@ impl Front {
         front.row_coupling = front.coupling + front.wide * variables;
         front.row_diagonal = front.row_coupling + front.wide * rows;
         front.reduced = front.row_diagonal + padded(rows);
-        front.kept = front.reduced + front.wide * front.pivot_slots();
         front.length = front.reduced + front.wide * size;
         let square = |k: usize| (k * k) as f64;
         front.flops = 2.0 * (square(rows) * (variables + 2 * size) as f64 + rows as f64 * square(size))
@@ -199,6 +232,56 @@ impl Front {
             }
         }
         self.coupled = blocks;
+    }
+
+    /// Notes what solves need; sources and children must be complete.
+    pub(super) fn note_kept(&mut self) {
+        let (variables, rows) = (self.variables.len(), self.rows.len());
+        let mut offsets: Vec<usize> = self.sources.iter().map(|source| source.1 as usize).collect();
+        for (_, map) in &self.children {
+            let places: Vec<Place> = map.places().collect();
+            for (k, &a) in places.iter().enumerate().take(map.variables.len()) {
+                offsets.extend(places[k..].iter().map(|&b| self.offset(a, b)));
+            }
+        }
+        let tall = self.tall;
+        let mirrored = |offset: usize| [offset, offset % tall * tall + offset / tall];
+        let hessian = offsets.iter().copied().filter(|&offset| offset < self.jacobian).flat_map(mirrored);
+        // Free variables and deferred rows couple with any variable.
+        let deferred = (0..variables).flat_map(|v| (0..self.first_other()).map(move |slot| (v, slot)));
+        let own = offsets.iter().filter(|&&offset| (self.coupling..self.row_coupling).contains(&offset));
+        let coupling = own.map(|offset| offset - self.coupling).chain(deferred.map(|(v, slot)| v * self.wide + slot));
+        let blocks = (0..rows * self.wide).step_by(LANES);
+        let row_coupling = blocks.filter(|offset| self.coupled[offset % self.wide / LANES]);
+        let kept = Kept {
+            row_coupling: BlockColumns::new(rows, self.wide, row_coupling),
+            coupling: BlockColumns::new(variables, self.wide, coupling),
+            hessian: BlockColumns::new(variables, tall, hessian),
+            starts: [0; 6],
+        };
+        let lengths = [
+            tall * rows,
+            kept.row_coupling.length(),
+            kept.coupling.length(),
+            kept.hessian.length(),
+            self.wide * self.pivot_slots(),
+        ];
+        self.kept = kept;
+        for (k, length) in lengths.into_iter().enumerate() {
+            self.kept.starts[k + 1] = self.kept.starts[k] + length;
+        }
+    }
+
+    /// Copies what solves need; `first`: the first slot in use.
+    #[inline(always)]
+    pub(super) fn keep(&self, numbers: &[f64], first: usize, kept: &mut [f64]) {
+        let Kept { row_coupling, coupling, hessian, starts } = &self.kept;
+        kept[..starts[1]].copy_from_slice(&numbers[self.jacobian..self.coupling]);
+        row_coupling.pack(&numbers[self.row_coupling..self.row_diagonal], &mut kept[starts[1]..starts[2]]);
+        coupling.pack(&numbers[self.coupling..self.row_coupling], &mut kept[starts[2]..starts[3]]);
+        hessian.pack(&numbers[..self.jacobian], &mut kept[starts[3]..starts[4]]);
+        let pivots = first * self.wide..self.pivot_slots() * self.wide;
+        kept[starts[4]..][pivots.clone()].copy_from_slice(&numbers[self.reduced..][pivots]);
     }
 
     /// Positions in the matrix values of the diagonals of the rows of stage 1.

@@ -6,7 +6,7 @@
 //! singular breaks the factorisation down (`None`), one that is nearly so shows in the residual, and either way the
 //! caller regularises or changes the method.
 //!
-//! Independent subtrees are factorised by several threads. Each front is computed by one thread, from its own entries
+//! Independent subtrees are factorised by several threads ([`super::schedule`]). Each front is computed by one thread, from its own entries
 //! and then its children in fixed order, so the result is bit for bit that of one thread.
 
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
@@ -14,27 +14,29 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::bunch_kaufman::{self, Pivots, inverse_pair};
-use super::dense_kernels::{LANES, all_finite, dot, padded, subtract_columns, subtract_range};
+use super::bunch_kaufman::{self, Pivots};
+use super::dense_kernels::all_finite;
 use super::front::{ChildMap, Front, PivotKind, Place};
 use super::kkt_solver::{Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
+use super::schedule::{Piece, Schedule};
 use super::status::NlpError;
+use super::substitution::Substitution;
 
 /// Operations below which starting threads costs more than it saves.
 const WORTH_A_THREAD: f64 = 8e6;
 
 /// Numbers of a front.
 #[derive(Debug, Default)]
-struct Factor {
+pub(super) struct Factor {
     /// What solves need.
-    numbers: Vec<f64>,
+    pub numbers: Vec<f64>,
     /// The Schur complement, where its parent is done by another piece of the schedule; the others wait on a stack.
     schur: Vec<f64>,
-    null_space: NullSpace,
+    pub null_space: NullSpace,
     /// Subdiagonal of B and order of the slots, of stage 2.
-    off_diagonal: Vec<f64>,
-    order: Vec<usize>,
+    pub off_diagonal: Vec<f64>,
+    pub order: Vec<usize>,
     inertia: Inertia,
     broke_down: bool,
 }
@@ -48,7 +50,7 @@ impl Factor {
             rank: front.rows.len(),
         };
         Self {
-            numbers: vec![0.0; front.kept],
+            numbers: vec![0.0; front.kept.length()],
             null_space,
             off_diagonal: vec![0.0; pivots],
             order: (0..pivots).collect(),
@@ -57,27 +59,17 @@ impl Factor {
     }
 }
 
-/// Something a thread can do independently, or the sequential top of the forest.
-#[derive(Debug, Clone, Copy)]
-struct Piece {
-    /// Range of fronts.
-    start: usize,
-    end: usize,
-    /// Thread that does it; `None`: after all the others.
-    thread: Option<usize>,
-}
-
 /// Analysis, factor and workspace.
 pub(super) struct Multifrontal {
     order: usize,
     architecture: Arch,
     fronts: Vec<Front>,
     factors: Vec<Factor>,
-    pieces: Vec<Piece>,
+    schedule: Schedule,
     /// Positions of the diagonals that stage 1 neglects.
     neglected: Vec<u32>,
     workspaces: Vec<Workspace>,
-    solution: SolveSpace,
+    substitution: Substitution,
 }
 
 impl Multifrontal {
@@ -98,18 +90,18 @@ impl Multifrontal {
         let mut factors: Vec<Factor> = fronts.iter().map(Factor::new).collect();
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
         let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
-        let pieces = schedule(&fronts, threads);
-        for root in pieces.iter().map(|piece| piece.end - 1) {
+        let schedule = Schedule::new(&fronts, threads);
+        for root in schedule.pieces.iter().map(|piece| piece.end - 1) {
             factors[root].schur = vec![0.0; fronts[root].schur_length()];
         }
         Ok(Self {
             order,
             architecture: Arch::new(),
-            pieces,
+            substitution: Substitution::new(&fronts, threads),
+            schedule,
             neglected: fronts.iter().flat_map(Front::neglected).collect(),
             factors,
             workspaces: (0..threads).map(|_| Workspace::new(&fronts)).collect(),
-            solution: SolveSpace::new(&fronts),
             fronts,
         })
     }
@@ -228,50 +220,10 @@ fn analyse(
         for &child in &children[f] {
             front.children.push((child, ChildMap::new(fronts[child].border.iter().map(|&i| places[i]))?));
         }
+        front.note_kept();
         fronts.push(front);
     }
     Some(fronts)
-}
-
-/// Cuts the forest into subtrees for the threads and a sequential top: the heaviest subtree is split until no subtree
-/// is larger than a quarter of a thread's share; subtrees go to the least loaded thread, heaviest first.
-fn schedule(fronts: &[Front], threads: usize) -> Vec<Piece> {
-    let count = fronts.len();
-    let (mut weight, mut start): (Vec<f64>, Vec<usize>) = (vec![0.0; count], (0..count).collect());
-    let mut has_parent = vec![false; count];
-    for f in 0..count {
-        weight[f] = fronts[f].flops;
-        for (child, _) in &fronts[f].children {
-            weight[f] += weight[*child];
-            start[f] = start[f].min(start[*child]);
-            has_parent[*child] = true;
-        }
-    }
-    let mut subtrees: Vec<usize> = (0..count).filter(|&f| !has_parent[f]).collect();
-    let mut top = Vec::new();
-    if threads > 1 {
-        let limit = subtrees.iter().map(|&f| weight[f]).sum::<f64>() / (4 * threads) as f64;
-        while let Some(k) = subtrees.iter().position(|&f| weight[f] > limit && !fronts[f].children.is_empty()) {
-            let f = subtrees.swap_remove(k);
-            top.push(f);
-            subtrees.extend(fronts[f].children.iter().map(|c| c.0));
-        }
-    }
-    subtrees.sort_unstable_by(|a, b| weight[*b].total_cmp(&weight[*a]).then(a.cmp(b)));
-    let mut load = vec![0.0; threads];
-    let mut pieces: Vec<Piece> = top.iter().map(|&f| Piece { start: f, end: f + 1, thread: None }).collect();
-    for f in subtrees {
-        let mut thread = 0;
-        for t in 1..threads {
-            if load[t] < load[thread] {
-                thread = t;
-            }
-        }
-        load[thread] += weight[f];
-        pieces.push(Piece { start: start[f], end: f + 1, thread: Some(thread) });
-    }
-    pieces.sort_unstable_by_key(|p| p.start);
-    pieces
 }
 
 /// Factorises a piece: a subtree, or one front whose children are done.
@@ -305,7 +257,7 @@ impl WithSimd for FactorPiece<'_> {
             own.broke_down = !add_children(fronts, f, scratch, before, base, &mut work.stack)
                 || !factor_front(simd, front, scratch, own, work);
             if !own.broke_down {
-                own.numbers.copy_from_slice(&scratch[..front.kept]);
+                front.keep(scratch, front.first_slot(own.null_space.rank), &mut own.numbers);
                 if f + 1 == piece.end {
                     let mut at = 0;
                     for column in schur_columns(front, scratch) {
@@ -420,38 +372,12 @@ impl KktSolver for Multifrontal {
 
     fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
         let (fronts, architecture) = (&self.fronts, self.architecture);
-        let threads = self.workspaces.len();
-        // Disjoint slices of the factors, one per piece, dealt to the threads.
-        let mut hands: Vec<Vec<(Piece, &mut [Factor])>> = (0..threads).map(|_| Vec::new()).collect();
-        let mut rest = self.factors.as_mut_slice();
-        let mut at = 0;
-        for piece in &self.pieces {
-            let (_, tail) = rest.split_at_mut(piece.start - at);
-            let (own, tail) = tail.split_at_mut(piece.end - piece.start);
-            if let Some(thread) = piece.thread {
-                hands[thread].push((*piece, own));
-            }
-            rest = tail;
-            at = piece.end;
-        }
-        let play = |hand: Vec<(Piece, &mut [Factor])>, work: &mut Workspace| {
-            for (piece, factors) in hand {
-                architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: piece.start, work });
-            }
-        };
-        std::thread::scope(|scope| {
-            let mut players = hands.into_iter().zip(&mut self.workspaces);
-            let first = players.next();
-            for (hand, work) in players.filter(|(hand, _)| !hand.is_empty()) {
-                scope.spawn(move || play(hand, work));
-            }
-            if let Some((hand, work)) = first {
-                play(hand, work);
-            }
+        self.schedule.subtrees(&mut self.factors, &mut self.workspaces, |piece, factors, work| {
+            architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: piece.start, work });
         });
         if let Some(work) = self.workspaces.first_mut() {
-            for piece in self.pieces.iter().filter(|p| p.thread.is_none()) {
-                let (piece, factors) = (*piece, &mut self.factors);
+            for piece in self.schedule.top() {
+                let factors = &mut self.factors;
                 architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: 0, work });
             }
         }
@@ -469,8 +395,7 @@ impl KktSolver for Multifrontal {
 
     fn solve(&mut self, x: &mut [f64]) {
         debug_assert_eq!(x.len(), self.order);
-        let (fronts, factors, space) = (&self.fronts, &self.factors, &mut self.solution);
-        self.architecture.dispatch(Solve { fronts, factors, space, x });
+        self.substitution.solve(self.architecture, &self.schedule, &self.fronts, &self.factors, x);
     }
 
     fn mark_neglected(&self, neglected: &mut [bool]) {
@@ -482,216 +407,6 @@ impl KktSolver for Multifrontal {
     }
 
     fn factor_entries(&self) -> usize {
-        self.fronts.iter().map(|front| front.kept).sum()
+        self.fronts.iter().map(|front| front.kept.length()).sum()
     }
-}
-
-/// Work vectors of a solve, long enough for every front.
-#[derive(Debug)]
-struct SolveSpace {
-    /// One value per slot.
-    slots: Vec<f64>,
-    /// One value per pivot slot, in the order of the pivots.
-    ordered: Vec<f64>,
-    /// One value per position of the null space.
-    first: Vec<f64>,
-    second: Vec<f64>,
-    terms: Vec<(usize, f64)>,
-}
-
-impl SolveSpace {
-    fn new(fronts: &[Front]) -> Self {
-        let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
-        let (slots, positions) = (largest(&|f| f.wide), largest(&|f| f.tall));
-        Self {
-            slots: vec![0.0; slots],
-            ordered: vec![0.0; slots],
-            first: vec![0.0; positions],
-            second: vec![0.0; positions],
-            terms: Vec::with_capacity(positions),
-        }
-    }
-}
-
-/// Overwrites x by the solution.
-struct Solve<'a> {
-    fronts: &'a [Front],
-    factors: &'a [Factor],
-    space: &'a mut SolveSpace,
-    x: &'a mut [f64],
-}
-
-impl WithSimd for Solve<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        for (front, factor) in self.fronts.iter().zip(self.factors) {
-            forward(simd, front, factor, self.space, self.x);
-        }
-        for (front, factor) in self.fronts.iter().zip(self.factors).rev() {
-            backward(simd, front, factor, self.space, self.x);
-        }
-    }
-}
-
-/// Forward: with right-hand sides c of the rows, g of the variables, b of the slots,
-/// v0 = S^-1 c, h = g - H v0, and b - C^T v0 - X h goes through stage 2 and on to the border.
-#[inline(always)]
-fn forward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveSpace, x: &mut [f64]) {
-    let (tall, wide) = (front.tall, front.wide);
-    let slots = &mut space.slots[..wide];
-    slots.fill(0.0);
-    let NullSpace { variables, rows, rank } = &factor.null_space;
-    let rank = *rank;
-    if rank > 0 {
-        let lu = &factor.numbers[front.jacobian..front.coupling];
-        let (v0, h) = (&mut space.first[..tall], &mut space.second[..tall]);
-        v0.fill(0.0);
-        for e in 0..rank {
-            let column = &lu[e * tall..(e + 1) * tall];
-            let end = padded(e);
-            v0[e] = (x[front.rows[rows[e]]] - dot(&column[..end], &v0[..end])) / column[e];
-        }
-        // The second solve reads only what it has written: positions above e of a cleared vector.
-        h.fill(0.0);
-        for e in (0..rank).rev() {
-            let from = (e + 1) / LANES * LANES;
-            h[e] = v0[e] - dot(&lu[e * tall + from..(e + 1) * tall], &h[from..]);
-        }
-        v0.copy_from_slice(h);
-        // Hessian products run over the variables in their own order.
-        space.terms.clear();
-        space.terms.extend(variables[..rank].iter().copied().zip(v0.iter().copied()));
-        h.fill(0.0);
-        subtract_columns(simd, h, &factor.numbers[..front.jacobian], tall, &space.terms);
-        let coupling = &factor.numbers[front.coupling..front.row_coupling];
-        subtract_columns(simd, slots, coupling, wide, &space.terms);
-        space.terms.clear();
-        for e in 0..rank {
-            let variable = variables[e];
-            let value = x[front.variables[variable]] + h[variable];
-            space.terms.push((e, value));
-            x[front.rows[rows[e]]] = v0[e];
-            x[front.variables[variable]] = value;
-        }
-        let row_coupling = &factor.numbers[front.row_coupling..front.row_diagonal];
-        subtract_columns(simd, slots, row_coupling, wide, &space.terms);
-    }
-    let first = front.first_slot(rank);
-    let pivots = front.pivot_slots();
-    for (slot, i) in pivot_indices(front, factor) {
-        slots[slot] += x[i];
-    }
-    let ordered = &mut space.ordered[..pivots];
-    for (value, &slot) in ordered.iter_mut().zip(&factor.order) {
-        *value = slots[slot];
-    }
-    slots[first..pivots].copy_from_slice(&ordered[first..]);
-    let reduced = &factor.numbers[front.reduced..];
-    for j in first..pivots {
-        let begin = if factor.off_diagonal[j] == 0.0 { j + 1 } else { j + 2 };
-        let value = slots[j];
-        subtract_range(simd, slots, &reduced[j * wide..(j + 1) * wide], value, begin, wide);
-    }
-    let mut j = first;
-    while j < pivots {
-        let (e, d) = (factor.off_diagonal[j], reduced[j * wide + j]);
-        if e == 0.0 {
-            slots[j] /= d;
-            j += 1;
-        } else {
-            let (a, c, b) = inverse_pair(d, e, reduced[(j + 1) * wide + j + 1]);
-            let (u, v) = (slots[j], slots[j + 1]);
-            slots[j] = a * u + c * v;
-            slots[j + 1] = c * u + b * v;
-            j += 2;
-        }
-    }
-    for (value, &i) in slots[pivots..].iter().zip(&front.border) {
-        x[i] += value;
-    }
-    // Intermediate results stay at the indices of the pivots, in the order of the slots.
-    for (slot, i) in pivot_indices(front, factor) {
-        x[i] = slots[slot];
-    }
-}
-
-/// Backward: stage 2, then v = v0 - X^T s and S^T y = h - C s - H (v - v0) with s the values of the slots.
-#[inline(always)]
-fn backward<S: Simd>(simd: S, front: &Front, factor: &Factor, space: &mut SolveSpace, x: &mut [f64]) {
-    let (tall, wide) = (front.tall, front.wide);
-    let NullSpace { variables, rows, rank } = &factor.null_space;
-    let rank = *rank;
-    let first = front.first_slot(rank);
-    let pivots = front.pivot_slots();
-    let slots = &mut space.slots[..wide];
-    slots.fill(0.0);
-    for (value, &i) in slots[pivots..].iter_mut().zip(&front.border) {
-        *value = x[i];
-    }
-    let reduced = &factor.numbers[front.reduced..];
-    for (slot, i) in pivot_indices(front, factor) {
-        space.ordered[slot] = x[i];
-    }
-    for j in (first..pivots).rev() {
-        let begin = if factor.off_diagonal[j] == 0.0 { j + 1 } else { j + 2 };
-        let column = &reduced[j * wide..(j + 1) * wide];
-        // Slots before `begin` are still zero or excluded.
-        let from = begin / LANES * LANES;
-        let mut sum = dot(&column[from..], &slots[from..]);
-        for k in from..begin {
-            sum -= column[k] * slots[k];
-        }
-        slots[j] = space.ordered[j] - sum;
-    }
-    let ordered = &mut space.ordered[..pivots];
-    ordered[first..].copy_from_slice(&slots[first..pivots]);
-    for (value, &slot) in ordered.iter().zip(&factor.order).skip(first) {
-        slots[slot] = *value;
-    }
-    for (slot, i) in pivot_indices(front, factor) {
-        x[i] = slots[slot];
-    }
-    if rank == 0 {
-        return;
-    }
-    let (lambda, product) = (&mut space.first[..tall], &mut space.second[..tall]);
-    lambda.fill(0.0);
-    space.terms.clear();
-    for e in 0..rank {
-        let variable = variables[e];
-        let coupling = &factor.numbers[front.coupling + variable * wide..][..wide];
-        let row_coupling = &factor.numbers[front.row_coupling + e * wide..][..wide];
-        let change = -dot(row_coupling, slots);
-        lambda[e] = x[front.variables[variable]] - dot(coupling, slots);
-        space.terms.push((variable, change));
-        x[front.variables[variable]] = x[front.rows[rows[e]]] + change;
-    }
-    product.fill(0.0);
-    subtract_columns(simd, product, &factor.numbers[..front.jacobian], tall, &space.terms);
-    let lu = &factor.numbers[front.jacobian..front.coupling];
-    for e in 0..rank {
-        lambda[e] += product[variables[e]];
-    }
-    for e in 0..rank {
-        let value = lambda[e];
-        subtract_range(simd, lambda, &lu[e * tall..(e + 1) * tall], value, e + 1, rank);
-    }
-    for e in (0..rank).rev() {
-        lambda[e] /= lu[e * tall + e];
-        let value = lambda[e];
-        subtract_range(simd, lambda, &lu[e * tall..(e + 1) * tall], value, 0, e);
-        x[front.rows[rows[e]]] = value;
-    }
-}
-
-/// Slot and index of every pivot of stage 2.
-#[inline(always)]
-fn pivot_indices<'a>(front: &'a Front, factor: &'a Factor) -> impl Iterator<Item = (usize, usize)> + 'a {
-    let NullSpace { variables, rows, rank } = &factor.null_space;
-    let deferred = rows[*rank..].iter().map(|&e| front.rows[e]);
-    let free = variables[*rank..].iter().map(|&v| front.variables[v]);
-    let others = front.others.iter().copied();
-    (front.first_slot(*rank)..).zip(deferred.chain(free).chain(others))
 }

@@ -57,7 +57,21 @@ impl PrimalDual {
 
 /// Largest absolute entry; NaN counts as infinite.
 pub(super) fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |a: f64, v| if v.is_nan() { f64::INFINITY } else { a.max(v.abs()) })
+    const LANES: usize = 8;
+    let (mut largest, mut zeros) = ([0.0f64; LANES], [0.0f64; LANES]);
+    let (blocks, rest) = values.as_chunks::<LANES>();
+    let mut take = |k: usize, value: f64| {
+        largest[k] = if value.abs() > largest[k] { value.abs() } else { largest[k] };
+        // Not a number unless the value is finite.
+        zeros[k] += value * 0.0;
+    };
+    for block in blocks {
+        for (k, value) in block.iter().enumerate() {
+            take(k, *value);
+        }
+    }
+    rest.iter().for_each(|value| take(0, *value));
+    if zeros.iter().any(|zero| zero.is_nan()) { f64::INFINITY } else { largest.into_iter().fold(0.0, f64::max) }
 }
 
 /// Derivatives and slacks at the current point.

@@ -17,6 +17,7 @@
 
 use pulp::Simd;
 
+use super::bunch_kaufman::WORK_COLUMNS;
 use super::dense_kernels::{LANES, subtract, subtract_columns_within, subtract_symmetric_product};
 use super::front::{Front, MOST_DEFERRED};
 
@@ -58,7 +59,7 @@ impl Workspace {
         Self {
             numbers: vec![0.0; largest(&|f| f.length)],
             stack: Vec::with_capacity(highest_stack(fronts)),
-            columns: vec![0.0; largest(&|f| f.wide * f.rows.len().max(2))],
+            columns: vec![0.0; largest(&|f| f.wide * f.rows.len().max(WORK_COLUMNS))],
             jacobian: vec![0.0; largest(&|f| f.tall * f.rows.len())],
             pivot: vec![0.0; largest(&|f| f.tall)],
             terms: Vec::with_capacity(largest(&|f| f.variables.len())),

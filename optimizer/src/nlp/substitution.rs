@@ -1,0 +1,314 @@
+//! Forward and backward substitution over the fronts of a factorisation.
+//!
+//! Forward, each front takes its own right-hand sides and what its children pass on and passes on to its parent what
+//! its border is left with; backward, each front gives its children the values at their borders. Subtrees are independent
+//! of each other, so several threads share them; sums run over the children in fixed order, so the result is bit for bit
+//! that of one thread.
+
+// Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
+#![allow(clippy::inline_always)]
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::bunch_kaufman::inverse_pair;
+use super::dense_kernels::{LANES, dot, padded, subtract_range};
+use super::front::Front;
+use super::multifrontal::Factor;
+use super::null_space::NullSpace;
+use super::schedule::{Piece, Schedule};
+
+/// Values at a front: half-way between the two substitutions first, the solution then.
+#[derive(Debug)]
+struct Values {
+    /// By variable.
+    variables: Vec<f64>,
+    /// By row; half-way v0, by position in the null space.
+    rows: Vec<f64>,
+    /// By slot. Those of the border are for the parent after the forward, from the parent before the backward
+    /// substitution.
+    slots: Vec<f64>,
+}
+
+/// Work vectors of a thread, long enough for every front.
+#[derive(Debug)]
+struct Space {
+    /// One value per pivot slot, in the order of the pivots.
+    ordered: Vec<f64>,
+    /// One value per position of the null space.
+    positions: Vec<f64>,
+    products: Vec<f64>,
+    terms: Vec<(usize, f64)>,
+}
+
+impl Space {
+    fn new(fronts: &[Front]) -> Self {
+        let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
+        let (slots, positions) = (largest(&|f| f.wide), largest(&|f| f.tall));
+        Self {
+            ordered: vec![0.0; slots],
+            positions: vec![0.0; positions],
+            products: vec![0.0; positions],
+            terms: Vec::with_capacity(positions),
+        }
+    }
+}
+
+/// Work space of the substitutions.
+pub(super) struct Substitution {
+    values: Vec<Values>,
+    spaces: Vec<Space>,
+}
+
+impl Substitution {
+    pub(super) fn new(fronts: &[Front], threads: usize) -> Self {
+        let values = |front: &Front| Values {
+            variables: vec![0.0; front.tall],
+            rows: vec![0.0; front.tall],
+            slots: vec![0.0; front.wide],
+        };
+        Self { values: fronts.iter().map(values).collect(), spaces: (0..threads).map(|_| Space::new(fronts)).collect() }
+    }
+
+    /// Overwrites x by the solution.
+    pub(super) fn solve(
+        &mut self,
+        architecture: Arch,
+        schedule: &Schedule,
+        fronts: &[Front],
+        factors: &[Factor],
+        x: &mut [f64],
+    ) {
+        let rhs = &*x;
+        let run = |piece: Piece, values: &mut [Values], base: usize, space: &mut Space, forward: bool| {
+            architecture.dispatch(Sweep { fronts, factors, piece, values, base, rhs, space, forward });
+        };
+        let Self { values, spaces } = self;
+        schedule.subtrees(values, spaces, |piece, values, space| run(piece, values, piece.start, space, true));
+        if let Some(space) = spaces.first_mut() {
+            schedule.top().for_each(|piece| run(piece, values, 0, space, true));
+            schedule.top().rev().for_each(|piece| run(piece, values, 0, space, false));
+        }
+        schedule.subtrees(values, spaces, |piece, values, space| run(piece, values, piece.start, space, false));
+        for (front, values) in fronts.iter().zip(values) {
+            let scatter = |x: &mut [f64], indices: &[usize], from: &[f64]| {
+                for (&i, value) in indices.iter().zip(from) {
+                    x[i] = *value;
+                }
+            };
+            scatter(x, &front.variables, &values.variables);
+            scatter(x, &front.rows, &values.rows);
+            scatter(x, &front.others, &values.slots[front.first_other()..]);
+        }
+    }
+}
+
+/// One substitution over a piece: a subtree, or one front whose children are done.
+struct Sweep<'a> {
+    fronts: &'a [Front],
+    factors: &'a [Factor],
+    piece: Piece,
+    /// From front number `base` to the end of the piece at least.
+    values: &'a mut [Values],
+    base: usize,
+    rhs: &'a [f64],
+    space: &'a mut Space,
+    forward: bool,
+}
+
+impl WithSimd for Sweep<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { fronts, factors, piece, values, base, rhs, space, forward } = self;
+        if forward {
+            for f in piece.start..piece.end {
+                let (children, rest) = values.split_at_mut(f - base);
+                let Some(own) = rest.first_mut() else { continue };
+                collect(fronts, f, rhs, children, base, own);
+                eliminate(simd, &fronts[f], &factors[f], rhs, own, space);
+            }
+        } else {
+            for f in (piece.start..piece.end).rev() {
+                let (children, rest) = values.split_at_mut(f - base);
+                let Some(own) = rest.first_mut() else { continue };
+                substitute(simd, &fronts[f], &factors[f], own, space);
+                distribute(fronts, f, own, children, base);
+            }
+        }
+    }
+}
+
+/// Right-hand sides of the variables and of the other pivots, with what the children pass on.
+#[inline(always)]
+fn collect(fronts: &[Front], f: usize, rhs: &[f64], children: &[Values], base: usize, own: &mut Values) {
+    let front = &fronts[f];
+    for (value, &i) in own.variables.iter_mut().zip(&front.variables) {
+        *value = rhs[i];
+    }
+    own.slots.fill(0.0);
+    for (value, &i) in own.slots[front.first_other()..].iter_mut().zip(&front.others) {
+        *value = rhs[i];
+    }
+    for (child, map) in &front.children {
+        let border = &children[child - base].slots[fronts[*child].pivot_slots()..];
+        let (to_variables, to_slots) = border.split_at(map.variables.len());
+        for (value, &variable) in to_variables.iter().zip(&map.variables) {
+            own.variables[variable as usize] += value;
+        }
+        for (value, &slot) in to_slots.iter().zip(&map.slots) {
+            own.slots[slot as usize] += value;
+        }
+    }
+}
+
+/// Gives the children the values at their borders.
+#[inline(always)]
+fn distribute(fronts: &[Front], f: usize, own: &Values, children: &mut [Values], base: usize) {
+    for (child, map) in &fronts[f].children {
+        let border = &mut children[child - base].slots[fronts[*child].pivot_slots()..];
+        let (from_variables, from_slots) = border.split_at_mut(map.variables.len());
+        for (value, &variable) in from_variables.iter_mut().zip(&map.variables) {
+            *value = own.variables[variable as usize];
+        }
+        for (value, &slot) in from_slots.iter_mut().zip(&map.slots) {
+            *value = own.slots[slot as usize];
+        }
+    }
+}
+
+/// Forward: with right-hand sides c of the rows, g of the variables, b of the slots,
+/// v0 = S^-1 c, h = g - H v0, and b - C^T v0 - X h goes through stage 2 and on to the border.
+#[inline(always)]
+fn eliminate<S: Simd>(simd: S, front: &Front, factor: &Factor, rhs: &[f64], own: &mut Values, space: &mut Space) {
+    let (tall, wide) = (front.tall, front.wide);
+    let [lu, row_coupling, coupling, hessian, reduced] = front.kept.parts(&factor.numbers);
+    let slots = own.slots.as_mut_slice();
+    let NullSpace { variables, rows, rank } = &factor.null_space;
+    let rank = *rank;
+    if rank > 0 {
+        let (v0, h) = (own.rows.as_mut_slice(), &mut space.positions[..tall]);
+        h.fill(0.0);
+        for e in 0..rank {
+            let column = &lu[e * tall..(e + 1) * tall];
+            let end = padded(e);
+            h[e] = (rhs[front.rows[rows[e]]] - dot(&column[..end], &h[..end])) / column[e];
+        }
+        // The second solve reads only what it has written: positions above e of a cleared vector.
+        v0.fill(0.0);
+        for e in (0..rank).rev() {
+            let from = (e + 1) / LANES * LANES;
+            v0[e] = h[e] - dot(&lu[e * tall + from..(e + 1) * tall], &v0[from..]);
+        }
+        // Hessian products run over the variables in their own order.
+        space.terms.clear();
+        space.terms.extend(variables[..rank].iter().copied().zip(v0.iter().copied()));
+        let product = &mut space.products[..tall];
+        product.fill(0.0);
+        front.kept.hessian.subtract(simd, product, hessian, &space.terms);
+        front.kept.coupling.subtract(simd, slots, coupling, &space.terms);
+        space.terms.clear();
+        for (e, &variable) in variables[..rank].iter().enumerate() {
+            own.variables[variable] += product[variable];
+            space.terms.push((e, own.variables[variable]));
+        }
+        front.kept.row_coupling.subtract(simd, slots, row_coupling, &space.terms);
+    }
+    let first = front.first_slot(rank);
+    let pivots = front.pivot_slots();
+    for (slot, &row) in slots[first..].iter_mut().zip(&rows[rank..]) {
+        *slot += rhs[front.rows[row]];
+    }
+    for (slot, &variable) in slots[front.first_free(rank)..].iter_mut().zip(&variables[rank..]) {
+        *slot += own.variables[variable];
+    }
+    let ordered = &mut space.ordered[..pivots];
+    for (value, &slot) in ordered.iter_mut().zip(&factor.order) {
+        *value = slots[slot];
+    }
+    slots[first..pivots].copy_from_slice(&ordered[first..]);
+    for j in first..pivots {
+        let begin = if factor.off_diagonal[j] == 0.0 { j + 1 } else { j + 2 };
+        let value = slots[j];
+        subtract_range(simd, slots, &reduced[j * wide..(j + 1) * wide], value, begin, wide);
+    }
+    let mut j = first;
+    while j < pivots {
+        let (e, d) = (factor.off_diagonal[j], reduced[j * wide + j]);
+        if e == 0.0 {
+            slots[j] /= d;
+            j += 1;
+        } else {
+            let (a, c, b) = inverse_pair(d, e, reduced[(j + 1) * wide + j + 1]);
+            let (u, v) = (slots[j], slots[j + 1]);
+            slots[j] = a * u + c * v;
+            slots[j + 1] = c * u + b * v;
+            j += 2;
+        }
+    }
+}
+
+/// Backward: stage 2, then v = v0 - X^T s and S^T y = h - C s - H (v - v0) with s the values of the slots.
+#[inline(always)]
+fn substitute<S: Simd>(simd: S, front: &Front, factor: &Factor, own: &mut Values, space: &mut Space) {
+    let (tall, wide) = (front.tall, front.wide);
+    let [lu, row_coupling, coupling, hessian, reduced] = front.kept.parts(&factor.numbers);
+    let NullSpace { variables, rows, rank } = &factor.null_space;
+    let rank = *rank;
+    let first = front.first_slot(rank);
+    let pivots = front.pivot_slots();
+    let slots = own.slots.as_mut_slice();
+    let ordered = &mut space.ordered[..pivots];
+    ordered[first..].copy_from_slice(&slots[first..pivots]);
+    slots[..pivots].fill(0.0);
+    for j in (first..pivots).rev() {
+        let begin = if factor.off_diagonal[j] == 0.0 { j + 1 } else { j + 2 };
+        let column = &reduced[j * wide..(j + 1) * wide];
+        // Slots before `begin` are still zero or excluded.
+        let from = begin / LANES * LANES;
+        let mut sum = dot(&column[from..], &slots[from..]);
+        for k in from..begin {
+            sum -= column[k] * slots[k];
+        }
+        slots[j] = ordered[j] - sum;
+    }
+    ordered[first..].copy_from_slice(&slots[first..pivots]);
+    for (value, &slot) in ordered.iter().zip(&factor.order).skip(first) {
+        slots[slot] = *value;
+    }
+    if rank == 0 {
+        return;
+    }
+    let (lambda, product) = (&mut space.positions[..tall], &mut space.products[..tall]);
+    lambda.fill(0.0);
+    space.terms.clear();
+    for (e, &variable) in variables[..rank].iter().enumerate() {
+        let change = -front.kept.row_coupling.dot(row_coupling, e, slots);
+        lambda[e] = own.variables[variable] - front.kept.coupling.dot(coupling, variable, slots);
+        space.terms.push((variable, change));
+        own.variables[variable] = own.rows[e] + change;
+    }
+    for (&variable, slot) in variables[rank..].iter().zip(&slots[front.first_free(rank)..]) {
+        own.variables[variable] = *slot;
+    }
+    product.fill(0.0);
+    front.kept.hessian.subtract(simd, product, hessian, &space.terms);
+    for e in 0..rank {
+        lambda[e] += product[variables[e]];
+    }
+    for e in 0..rank {
+        let value = lambda[e];
+        subtract_range(simd, lambda, &lu[e * tall..(e + 1) * tall], value, e + 1, rank);
+    }
+    for e in (0..rank).rev() {
+        lambda[e] /= lu[e * tall + e];
+        let value = lambda[e];
+        subtract_range(simd, lambda, &lu[e * tall..(e + 1) * tall], value, 0, e);
+    }
+    for (&row, value) in rows[..rank].iter().zip(&*lambda) {
+        own.rows[row] = *value;
+    }
+    for (&row, slot) in rows[rank..].iter().zip(&slots[first..]) {
+        own.rows[row] = *slot;
+    }
+}
