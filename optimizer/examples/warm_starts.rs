@@ -5,11 +5,13 @@
 //! (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end.
 
 mod arguments;
+mod splitmix;
 
 use arguments::argument;
 use gait_optimizer::{
     CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
+use splitmix::SplitMix;
 use std::error::Error;
 
 /// Levels of Table I (Li et al. 2022).
@@ -23,19 +25,6 @@ const LEVELS: [&[f64]; 8] = [
     &[20.0, 35.0, 50.0],
     &[20.0, 30.0, 40.0],
 ];
-
-/// splitmix64 (Steele, Lea & Flood 2014).
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        usize::try_from((z ^ (z >> 31)) % n as u64).unwrap_or(0)
-    }
-}
 
 fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {
     let options = SolveOptions { threads, ..SolveOptions::default() };

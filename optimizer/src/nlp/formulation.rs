@@ -254,7 +254,7 @@ impl<'p> Formulation<'p> {
         self.tally.seconds += clock.elapsed().as_secs_f64();
     }
 
-    /// Hessian of F + y^T c, of F alone without y; without the diagonal of [`curvature`](Self::curvature).
+    /// Hessian of F + y^T c, of F alone without y; without the diagonal of [`add_curvature`](Self::add_curvature).
     pub(super) fn hessian(&mut self, w: &[f64], y: Option<&[f64]>, values: &mut [f64]) {
         let clock = Instant::now();
         self.scaled_multipliers.fill(0.0);
@@ -274,11 +274,21 @@ impl<'p> Formulation<'p> {
         self.tally.seconds += clock.elapsed().as_secs_f64();
     }
 
-    /// Diagonal of the Hessian of F that is not in the pattern.
-    pub(super) fn curvature(&self, j: usize) -> f64 {
-        match &self.goal {
-            Goal::Feasibility { zeta, weight, .. } if j < self.n => zeta * weight[j] * weight[j],
-            _ => 0.0,
+    /// Adds the diagonal of the Hessian of F that is not in the pattern.
+    pub(super) fn add_curvature(&self, diagonal: &mut [f64]) {
+        if let Goal::Feasibility { zeta, weight, .. } = &self.goal {
+            for (d, weight) in diagonal[..self.n].iter_mut().zip(weight) {
+                *d += zeta * weight * weight;
+            }
+        }
+    }
+
+    /// out += that diagonal times d.
+    pub(super) fn add_curvature_product(&self, d: &[f64], out: &mut [f64]) {
+        if let Goal::Feasibility { zeta, weight, .. } = &self.goal {
+            for ((out, d), weight) in out[..self.n].iter_mut().zip(d).zip(weight) {
+                *out += zeta * weight * weight * d;
+            }
         }
     }
 
@@ -307,17 +317,28 @@ impl<'p> Formulation<'p> {
         }
     }
 
-    /// out += A d.
-    pub(super) fn add_product(&self, jacobian: &[f64], d: &[f64], out: &mut [f64]) {
+    /// out_w += A^T y and out_y += A w, in one pass over A.
+    pub(super) fn add_both_products(
+        &self,
+        jacobian: &[f64],
+        y: &[f64],
+        out_w: &mut [f64],
+        w: &[f64],
+        out_y: &mut [f64],
+    ) {
         let pattern = self.program.jacobian_pattern();
         for j in 0..self.n {
             let range = pattern.column_starts[j]..pattern.column_starts[j + 1];
+            let (mut sum, own) = (0.0, w[j]);
             for (v, &i) in jacobian[range.clone()].iter().zip(&pattern.row_indices[range]) {
-                out[i] += v * d[j];
+                sum += v * y[i];
+                out_y[i] += v * own;
             }
+            out_w[j] += sum;
         }
-        for (a, t) in self.attached.iter().zip(&d[self.n..]) {
-            out[a.row] += a.sign * t;
+        for (k, a) in self.attached.iter().enumerate() {
+            out_w[self.n + k] += a.sign * y[a.row];
+            out_y[a.row] += a.sign * w[self.n + k];
         }
     }
 

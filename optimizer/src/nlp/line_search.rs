@@ -8,8 +8,10 @@ use super::newton::PrimalDual;
 
 /// Work vectors of the search.
 pub(super) struct Search {
+    /// The last point tried, its rows and its objective.
     trial: Vec<f64>,
     trial_c: Vec<f64>,
+    trial_objective: f64,
     corrected_c: Vec<f64>,
     correction: PrimalDual,
     /// Shortened steps in a row.
@@ -31,6 +33,7 @@ impl Search {
         Self {
             trial: vec![0.0; form.length()],
             trial_c: vec![0.0; form.m],
+            trial_objective: f64::NAN,
             corrected_c: vec![0.0; form.m],
             correction: PrimalDual::zeros(form),
             shortened: 0,
@@ -216,8 +219,8 @@ impl Run<'_> {
         if !theta.is_finite() {
             return (theta, f64::NAN, false);
         }
-        let phi =
-            self.form.objective(&self.search.trial) + barrier::barrier_term(&self.form, &self.search.trial, self.mu);
+        self.search.trial_objective = self.form.objective(&self.search.trial);
+        let phi = self.search.trial_objective + barrier::barrier_term(&self.form, &self.search.trial, self.mu);
         (theta, phi, phi.is_finite())
     }
 
@@ -312,7 +315,8 @@ impl Run<'_> {
         self.accept(session, alpha, tau, trials);
     }
 
-    /// Moves to w + alpha dw, y + alpha dy, z + alpha_z dz and evaluates there.
+    /// Moves to the point last tried, w + alpha dw, and to y + alpha dy, z + alpha_z dz, and evaluates there what the trial
+    /// did not.
     fn accept(&mut self, session: &mut Session, alpha: f64, tau: f64, trials: usize) {
         let alpha_dual = barrier::fraction_to_zero(&self.point.zl, &self.direction.zl, tau)
             .min(barrier::fraction_to_zero(&self.point.zu, &self.direction.zu, tau));
@@ -321,7 +325,7 @@ impl Run<'_> {
                 *a += alpha * d;
             }
         };
-        add(&mut self.point.w, &self.direction.w, alpha);
+        self.point.w.copy_from_slice(&self.search.trial);
         add(&mut self.point.y, &self.direction.y, alpha);
         add(&mut self.point.zl, &self.direction.zl, alpha_dual);
         add(&mut self.point.zu, &self.direction.zu, alpha_dual);
@@ -332,7 +336,10 @@ impl Run<'_> {
             delta_c: self.correction.delta_c,
             trials,
         };
-        self.evaluate();
+        self.c.copy_from_slice(&self.search.trial_c);
+        self.objective = self.search.trial_objective;
+        self.measure_slacks();
+        self.linearise();
         barrier::keep_near_centre(&mut self.point, &self.at, self.mu);
     }
 }

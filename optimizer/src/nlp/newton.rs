@@ -156,10 +156,12 @@ impl NewtonSystem {
         delta_w: f64,
         delta_c: f64,
     ) -> Option<Inertia> {
-        for j in 0..form.length() {
-            let sigma = point.zl[j] / at.slack_lower[j] + point.zu[j] / at.slack_upper[j];
-            self.diagonal[j] = sigma + form.curvature(j) + delta_w;
+        let lower = point.zl.iter().zip(&at.slack_lower);
+        let upper = point.zu.iter().zip(&at.slack_upper);
+        for ((d, (zl, sl)), (zu, su)) in self.diagonal.iter_mut().zip(lower).zip(upper) {
+            *d = zl / sl + zu / su + delta_w;
         }
+        form.add_curvature(&mut self.diagonal);
         self.delta_w = delta_w;
         self.delta_c = delta_c;
         self.factor_with(form, Some(&at.hessian), &at.jacobian)
@@ -233,14 +235,20 @@ impl NewtonSystem {
     ) {
         // out.zl serves as scratch for the eliminated right-hand side
         let mut b = std::mem::take(&mut out.zl);
-        for j in 0..form.length() {
-            b[j] = rhs.w[j] + rhs.zl[j] / at.slack_lower[j] - rhs.zu[j] / at.slack_upper[j];
+        let lower = rhs.zl.iter().zip(&at.slack_lower);
+        let upper = rhs.zu.iter().zip(&at.slack_upper);
+        for (((b, w), (rl, sl)), (ru, su)) in b.iter_mut().zip(&rhs.w).zip(lower).zip(upper) {
+            *b = w + rl / sl - ru / su;
         }
         self.reduced_solve(form, &b, &rhs.y, &mut out.w, &mut out.y);
         out.zl = b;
-        for j in 0..form.length() {
-            out.zl[j] = (rhs.zl[j] - point.zl[j] * out.w[j]) / at.slack_lower[j];
-            out.zu[j] = (rhs.zu[j] + point.zu[j] * out.w[j]) / at.slack_upper[j];
+        let lower = rhs.zl.iter().zip(&point.zl).zip(&at.slack_lower);
+        for ((out, dw), ((r, z), s)) in out.zl.iter_mut().zip(&out.w).zip(lower) {
+            *out = (r - z * dw) / s;
+        }
+        let upper = rhs.zu.iter().zip(&point.zu).zip(&at.slack_upper);
+        for ((out, dw), ((r, z), s)) in out.zu.iter_mut().zip(&out.w).zip(upper) {
+            *out = (r + z * dw) / s;
         }
     }
 
@@ -255,27 +263,27 @@ impl NewtonSystem {
     ) {
         let r = &mut self.residual;
         r.w.fill(0.0);
-        form.add_hessian_product(&at.hessian, &d.w, &mut r.w);
-        form.add_transpose(&at.jacobian, &d.y, &mut r.w);
-        for j in 0..form.length() {
-            let own = (form.curvature(j) + self.delta_w) * d.w[j];
-            r.w[j] = rhs.w[j] - (r.w[j] + own - d.zl[j] + d.zu[j]);
-            r.zl[j] = if at.slack_lower[j].is_finite() {
-                rhs.zl[j] - (point.zl[j] * d.w[j] + at.slack_lower[j] * d.zl[j])
-            } else {
-                0.0
-            };
-            r.zu[j] = if at.slack_upper[j].is_finite() {
-                rhs.zu[j] - (at.slack_upper[j] * d.zu[j] - point.zu[j] * d.w[j])
-            } else {
-                0.0
-            };
-            if j < form.n && form.fixed[j].is_some() {
-                r.w[j] = 0.0;
-            }
-        }
         r.y.fill(0.0);
-        form.add_product(&at.jacobian, &d.w, &mut r.y);
+        form.add_hessian_product(&at.hessian, &d.w, &mut r.w);
+        form.add_both_products(&at.jacobian, &d.y, &mut r.w, &d.w, &mut r.y);
+        form.add_curvature_product(&d.w, &mut r.w);
+        let bounds = d.zl.iter().zip(&d.zu);
+        for (((r, rhs), dw), (dzl, dzu)) in r.w.iter_mut().zip(&rhs.w).zip(&d.w).zip(bounds) {
+            *r = rhs - (*r + self.delta_w * dw - dzl + dzu);
+        }
+        for (r, _) in r.w.iter_mut().zip(&form.fixed).filter(|(_, fixed)| fixed.is_some()) {
+            *r = 0.0;
+        }
+        // Without the bound everything here is zero but the slack.
+        let finite = |slack: f64| if slack < f64::INFINITY { slack } else { 0.0 };
+        let lower = point.zl.iter().zip(&at.slack_lower);
+        for ((((r, rhs), dw), dz), (z, s)) in r.zl.iter_mut().zip(&rhs.zl).zip(&d.w).zip(&d.zl).zip(lower) {
+            *r = rhs - (z * dw + finite(*s) * dz);
+        }
+        let upper = point.zu.iter().zip(&at.slack_upper);
+        for ((((r, rhs), dw), dz), (z, s)) in r.zu.iter_mut().zip(&rhs.zu).zip(&d.w).zip(&d.zu).zip(upper) {
+            *r = rhs - (finite(*s) * dz - z * dw);
+        }
         for i in 0..form.m {
             r.y[i] = if form.rows[i] == super::formulation::RowKind::Free {
                 0.0
