@@ -74,8 +74,9 @@ enum Rows {
     Soft,
 }
 
-/// Coordinates of every point of every domain: `result[d][k]`. As near to the contacts and ranges as the bounds allow.
-pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Vec<Vec<[f64; 9]>> {
+/// Coordinates of every point of every domain: `result[d][k]`. As near to the contacts and ranges as the bounds allow, and
+/// as the passes before `cancel` says that nobody waits for it.
+pub fn solve(programme: &GaitProgramme, guess: &GuessSettings, cancel: &dyn Fn() -> bool) -> Vec<Vec<[f64; 9]>> {
     let instants = instants(programme);
     let stride = guess.stride_length_m;
     let speed = stride / guess.stride_time_s;
@@ -102,6 +103,9 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings) -> Vec<Vec<[f64; 
     let torso = programme.variable_range(programme.layout.domains[0].point(0) + 2);
     let mut rows = Rows::Hard;
     for pass in 0..PASSES {
+        if cancel() {
+            break;
+        }
         let step_with = |rows| linearised_step(programme, &instants, &targets, &q, right_step, stride, torso, rows);
         let mut step = step_with(rows);
         if step.is_none() && rows == Rows::Hard {

@@ -119,14 +119,18 @@ impl ColdGuess {
     /// # Errors
     /// [`ModelError`] when the problem is invalid.
     pub fn first_point(&self, problem: &GaitProblem) -> Result<Vec<f64>, ModelError> {
-        Ok(self.begin(&self.tracked(problem))?.1)
+        Ok(self.begin(&self.tracked(problem), &|| false)?.1)
     }
 
     /// The programme without muscles of the first phase, and its first point.
-    pub(super) fn begin(&self, tracked: &GaitProblem) -> Result<(GaitProgramme, Vec<f64>), ModelError> {
+    pub(super) fn begin(
+        &self,
+        tracked: &GaitProblem,
+        cancel: &dyn Fn() -> bool,
+    ) -> Result<(GaitProgramme, Vec<f64>), ModelError> {
         let settings = self.settings();
         let plain = tracked.programme(false)?.with_timing(&self.timing.fractions());
-        let postures = cold_start::posture::solve(&plain, &settings);
+        let postures = cold_start::posture::solve(&plain, &settings, cancel);
         let first = cold_start::motion::guess(&plain, &postures, &settings);
         Ok((plain, first))
     }

@@ -130,7 +130,7 @@ impl<'a> Run<'a> {
     pub(super) fn cold(&mut self, guess: &ColdGuess) -> Result<NlpResult, SolveError> {
         let (problem, programme) = (self.context.problem, self.context.programme);
         let tracked_problem = guess.tracked(problem);
-        let (plain, first) = guess.begin(&tracked_problem)?;
+        let (plain, first) = guess.begin(&tracked_problem, &|| self.context.cancel.is_cancelled())?;
         let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..NlpSettings::default() };
         let tracking_settings =
             NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..every_phase.clone() };
