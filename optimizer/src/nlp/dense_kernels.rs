@@ -152,8 +152,12 @@ pub(super) fn subtract_symmetric_product<S: Simd>(
             let end = (block..coupled.len()).find(|&b| coupled[b] != kind).unwrap_or(coupled.len());
             let (from, to) = (block * per_block, end * per_block);
             match (coupled[own], kind) {
-                (true, true) if width == 4 => product_tiles::<S, 4>(simd, s, x, g, stride, count, from, to, j),
-                (true, true) => product_tiles::<S, 1>(simd, s, x, g, stride, count, from, to, j),
+                (true, true) if width == 4 => {
+                    product_tiles::<S, 4, true>(simd, &mut s[j * stride..], x, g, stride, count, from, to, j)
+                }
+                (true, true) => {
+                    product_tiles::<S, 1, true>(simd, &mut s[j * stride..], x, g, stride, count, from, to, j)
+                }
                 (false, true) => subtract_outer(simd, s, x, g, stride, count, from, to, j, width),
                 (true, false) => subtract_outer(simd, s, g, x, stride, count, from, to, j, width),
                 (false, false) => {}
@@ -164,10 +168,11 @@ pub(super) fn subtract_symmetric_product<S: Simd>(
     }
 }
 
-/// Vectors [from, to) by W columns of the product, from column j on.
+/// Vectors [from, to) by W columns of S -= X G^T, with G X^T added to the product for `BOTH`; `s` begins with the first of
+/// these columns, number j.
 #[allow(clippy::too_many_arguments)] // a kernel
 #[inline(always)]
-fn product_tiles<S: Simd, const W: usize>(
+fn product_tiles<S: Simd, const W: usize, const BOTH: bool>(
     simd: S,
     s: &mut [f64],
     x: &[f64],
@@ -180,18 +185,18 @@ fn product_tiles<S: Simd, const W: usize>(
 ) {
     let mut i = from;
     while i + 2 <= to {
-        product_tile::<S, 2, W>(simd, s, x, g, stride, count, i, j);
+        product_tile::<S, 2, W, BOTH>(simd, s, x, g, stride, count, i, j);
         i += 2;
     }
     if i < to {
-        product_tile::<S, 1, W>(simd, s, x, g, stride, count, i, j);
+        product_tile::<S, 1, W, BOTH>(simd, s, x, g, stride, count, i, j);
     }
 }
 
-/// V vectors by W columns of X G^T + G X^T.
+/// V vectors of them.
 #[allow(clippy::too_many_arguments)] // a kernel
 #[inline(always)]
-fn product_tile<S: Simd, const V: usize, const W: usize>(
+fn product_tile<S: Simd, const V: usize, const W: usize, const BOTH: bool>(
     simd: S,
     s: &mut [f64],
     x: &[f64],
@@ -210,13 +215,14 @@ fn product_tile<S: Simd, const V: usize, const W: usize>(
             let (from_g, from_x) = (simd.splat_f64s(gj[c]), simd.splat_f64s(xj[c]));
             for v in 0..V {
                 sum[c][v] = simd.mul_add_f64s(xi[v], from_g, sum[c][v]);
-                sum[c][v] = simd.mul_add_f64s(gi[v], from_x, sum[c][v]);
+                if BOTH {
+                    sum[c][v] = simd.mul_add_f64s(gi[v], from_x, sum[c][v]);
+                }
             }
         }
     }
-    for c in 0..W {
-        let column = &mut s[(j + c) * stride..(j + c + 1) * stride];
-        for (out, sum) in vectors_mut::<S>(column)[i..].iter_mut().zip(&sum[c]) {
+    for (column, sum) in s.chunks_exact_mut(stride).zip(&sum) {
+        for (out, sum) in vectors_mut::<S>(column)[i..].iter_mut().zip(sum) {
             *out = simd.sub_f64s(*out, *sum);
         }
     }
@@ -273,69 +279,12 @@ pub(super) fn subtract_product<S: Simd>(
         }
         let from = j / LANES * (LANES / S::F64_LANES);
         if range.end - j >= 4 {
-            one_product_tiles::<S, 4>(simd, group, l, w, stride, count, from, to, j);
+            product_tiles::<S, 4, false>(simd, group, l, w, stride, count, from, to, j);
         } else {
             for (column, k) in group.chunks_exact_mut(stride).zip(j..range.end) {
-                one_product_tiles::<S, 1>(simd, column, l, w, stride, count, from, to, k);
+                product_tiles::<S, 1, false>(simd, column, l, w, stride, count, from, to, k);
             }
         }
         j += 4;
-    }
-}
-
-/// Vectors [from, to) by W columns of L W^T, from column j on.
-#[allow(clippy::too_many_arguments)] // a kernel
-#[inline(always)]
-fn one_product_tiles<S: Simd, const W: usize>(
-    simd: S,
-    s: &mut [f64],
-    l: &[f64],
-    w: &[f64],
-    stride: usize,
-    count: usize,
-    from: usize,
-    to: usize,
-    j: usize,
-) {
-    let mut i = from;
-    while i + 3 <= to {
-        one_product_tile::<S, 3, W>(simd, s, l, w, stride, count, i, j);
-        i += 3;
-    }
-    while i < to {
-        one_product_tile::<S, 1, W>(simd, s, l, w, stride, count, i, j);
-        i += 1;
-    }
-}
-
-/// V vectors by W columns of L W^T.
-#[allow(clippy::too_many_arguments)] // a kernel
-#[inline(always)]
-fn one_product_tile<S: Simd, const V: usize, const W: usize>(
-    simd: S,
-    s: &mut [f64],
-    l: &[f64],
-    w: &[f64],
-    stride: usize,
-    count: usize,
-    i: usize,
-    j: usize,
-) {
-    let mut sum = [[simd.splat_f64s(0.0); V]; W];
-    for (l, w) in l.chunks_exact(stride).zip(w.chunks_exact(stride)).take(count) {
-        let (Some(rows), Some(factors)) = (vectors::<S>(l)[i..].first_chunk::<V>(), w[j..].first_chunk::<W>()) else {
-            return;
-        };
-        for c in 0..W {
-            let factor = simd.splat_f64s(factors[c]);
-            for v in 0..V {
-                sum[c][v] = simd.mul_add_f64s(rows[v], factor, sum[c][v]);
-            }
-        }
-    }
-    for (column, sum) in s.chunks_exact_mut(stride).zip(&sum) {
-        for (out, sum) in vectors_mut::<S>(column)[i..].iter_mut().zip(sum) {
-            *out = simd.sub_f64s(*out, *sum);
-        }
     }
 }
