@@ -52,6 +52,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         drawn += 1;
         let problem = GaitProblem { bounds, ..base.clone() };
         let outcome = run(&problem, None)?;
+        let report = &outcome.report;
+        eprintln!("{bounds:?}: {:?}, {} iterations, {:.0} s", report.status, report.iterations, report.seconds_total);
         let Some(explanation) = explain(&problem, &outcome, &options, &mut |_| {}, &CancelToken::new())? else {
             continue;
         };
