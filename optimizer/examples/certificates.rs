@@ -45,9 +45,10 @@ fn print(certificate: &Certificate, all: bool) {
     }
     if let Some(map) = &certificate.return_map {
         println!(
-            "   multipliers: largest {:.5e} (variational), {:.5e} (differences), relative difference {:.1e}",
+            "   multipliers: largest {:.5e} (variational), {:.5e} (differences, which resolve {:.1e}), relative difference {:.1e}",
             map.largest,
             map.largest_by_differences,
+            map.differences_resolve,
             map.disagreement()
         );
         println!("   zero dynamics: {:.3e} (leak {:.1e})", map.zero_dynamics, map.zero_dynamics_leak);

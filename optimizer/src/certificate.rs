@@ -16,6 +16,7 @@ mod check;
 mod closed_loop;
 mod contact;
 mod control;
+mod domain_differences;
 mod dormand_prince;
 mod guard;
 mod hybrid_walker;
@@ -46,7 +47,7 @@ use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 
 /// Version of [`Certificate`]'s layout and of what it examines.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,11 +70,6 @@ pub struct Certificate {
     /// Pushes that are recovered; only of a stable gait.
     pub pushes: Option<Pushes>,
 }
-
-/// Both methods must agree on the largest multiplier to this, relative, or absolute below [`RESOLVED_MULTIPLIER`].
-const AGREEMENT: f64 = 1e-3;
-/// Below this size central differences cannot tell multipliers apart: noise of the integration over their step.
-const RESOLVED_MULTIPLIER: f64 = 1e-3;
 
 /// Examines a gait. Deterministic; takes some seconds.
 ///
@@ -133,11 +129,10 @@ fn objections(certificate: &Certificate) -> Vec<String> {
         objections.push(format!("the gait is unstable: its largest multiplier is {:.4}", map.largest));
     }
     for map in [&certificate.return_map, &certificate.free_hip_return_map].into_iter().flatten() {
-        let difference = (map.largest - map.largest_by_differences).abs();
-        if difference > AGREEMENT * map.largest.max(RESOLVED_MULTIPLIER) {
+        if !map.methods_agree() {
             objections.push(format!(
-                "a largest multiplier is {:.6e} by variational equations and {:.6e} by differences",
-                map.largest, map.largest_by_differences
+                "a largest multiplier is {:.6e} by variational equations and {:.6e} by differences, which resolve {:.1e}",
+                map.largest, map.largest_by_differences, map.differences_resolve
             ));
         }
     }

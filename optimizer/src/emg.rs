@@ -4,10 +4,12 @@
 //! cut at heel strikes, mean of strides at 101 points, division by the peak of normal walking ([`CycleActivity`]);
 //! distance of two gaits ([`emg_rmse`]).
 
+mod activity;
 mod cycle;
 mod model;
 mod recording;
 
+pub use activity::Activity;
 pub use cycle::{CycleActivity, EmgRmse, emg_rmse};
 pub use model::{ModelActivity, model_activity};
 pub use recording::EmgRecording;

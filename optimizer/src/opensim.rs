@@ -28,8 +28,8 @@ pub(crate) struct StorageFile {
     pub(crate) table: Table,
     /// What the header says of the unit of angles.
     unit: Option<AngleUnit>,
-    /// Line of the column names.
-    first_line: usize,
+    /// Line that ends the header.
+    header_end: usize,
 }
 
 impl StorageFile {
@@ -42,7 +42,8 @@ impl StorageFile {
             .ok_or_else(|| malformed(what, lines.len().max(1), None, "there is no line \"endheader\"".to_owned()))?;
         let setting = |name: &str| {
             lines[..end].iter().enumerate().find_map(|(index, line)| {
-                let (key, value) = line.split_once('=')?;
+                // `nRows=220`, and `datarows 220` as SIMM wrote it.
+                let (key, value) = line.split_once('=').or_else(|| line.trim().split_once(char::is_whitespace))?;
                 key.trim().eq_ignore_ascii_case(name).then(|| (index + 1, value.trim().to_owned()))
             })
         };
@@ -54,8 +55,10 @@ impl StorageFile {
             }
             None => None,
         };
-        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, Clock::Column("time"))?;
-        for (name, found) in [("nRows", table.len()), ("nColumns", table.width())] {
+        let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, Clock::Column("time"))?
+            .with_names(coordinate_name);
+        let (rows, columns) = (table.len(), table.width());
+        for (name, found) in [("nRows", rows), ("nColumns", columns), ("datarows", rows), ("datacolumns", columns)] {
             if let Some((line, value)) = setting(name)
                 && value.parse::<usize>() != Ok(found)
             {
@@ -63,17 +66,17 @@ impl StorageFile {
                 return Err(malformed(what, line, None, reason));
             }
         }
-        Ok(Self { table, unit, first_line: end + 2 })
+        Ok(Self { table, unit, header_end: end + 1 })
     }
 
     /// The unit of angles: what the header says, else `unit`.
     pub(crate) fn angle_unit(&self, what: &str, unit: Option<AngleUnit>) -> Result<AngleUnit, ModelError> {
-        let silent = || malformed(what, self.first_line - 1, None, "the header has no inDegrees=yes or no".to_owned());
+        let silent = || malformed(what, self.header_end, None, "the header has no inDegrees=yes or no".to_owned());
         self.unit.or(unit).ok_or_else(silent)
     }
+}
 
-    /// Line of the column names.
-    pub(crate) fn first_line(&self) -> usize {
-        self.first_line
-    }
+/// OpenSim 4 writes states by their paths: `/jointset/hip_r/hip_flexion_r/value` is the coordinate `hip_flexion_r`.
+fn coordinate_name(name: &str) -> &str {
+    name.strip_suffix("/value").and_then(|path| path.rsplit('/').next()).unwrap_or(name)
 }

@@ -6,7 +6,7 @@
 use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, malformed};
+use crate::table::{Clock, Separator, Table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -60,10 +60,9 @@ impl JointRecording {
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
         let lines: Vec<&str> = text.lines().collect();
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
-        let first_line = comments + 1;
-        let table = Table::read(what, &lines[comments..], first_line, Separator::Comma, Clock::Column("time_s"))?;
+        let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
         let joints = JOINTS.into_iter().filter_map(|joint| Some((joint, table.find(&format!("{joint}_rad"))?)));
-        Self::whole(what, &table, first_line, joints.collect())
+        Self::whole(&table, joints.collect())
     }
 
     /// An OpenSim motion or storage file of a gait model, with the joints whose columns it has.
@@ -88,29 +87,24 @@ impl JointRecording {
             }
             Some((joint, angles))
         };
-        Self::whole(what, &file.table, file.first_line(), OPENSIM.into_iter().filter_map(joint).collect())
+        Self::whole(&file.table, OPENSIM.into_iter().filter_map(joint).collect())
     }
 
-    fn whole(
-        what: &str,
-        table: &Table,
-        first_line: usize,
-        joints: Vec<(&'static str, Vec<f64>)>,
-    ) -> Result<Self, ModelError> {
+    fn whole(table: &Table, joints: Vec<(&'static str, Vec<f64>)>) -> Result<Self, ModelError> {
         if joints.is_empty() {
             let reason = format!("no column is a joint's; there are {}", table.names().join(", "));
-            return Err(malformed(what, first_line, None, reason));
+            return Err(table.malformed_names(reason));
         }
         for (joint, angles) in &joints {
             if let Some(row) = angles.iter().position(|angle| angle.abs() > LARGEST_ANGLE_RAD) {
                 let reason = format!("{joint} is {:.1} rad: is the unit right?", angles[row]);
-                return Err(malformed(what, first_line + 1 + row, None, reason));
+                return Err(table.malformed_row(row, None, reason));
             }
         }
         let times = table.times();
         if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S) {
             let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
-            return Err(malformed(what, first_line + 2 + row, Some(1), reason));
+            return Err(table.malformed_row(row + 1, Some(1), reason));
         }
         let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
         let joints = joints.into_iter().map(|(joint, angles)| (joint, evenly(&times, &angles))).collect();

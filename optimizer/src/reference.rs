@@ -9,7 +9,7 @@ mod strides;
 
 pub use crate::opensim::AngleUnit;
 pub use matching::{distance, nearest};
-pub use recording::Recording;
+pub use recording::{Recording, VerticalForce};
 pub use strides::{HeelStrikes, STRIDE_RANGE_S, Walker};
 pub(crate) use strides::{contacts, given};
 

@@ -6,6 +6,8 @@ use crate::subject::ModelError;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Table {
     what: String,
+    /// Line of the column names in the file.
+    first_line: usize,
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
     /// Rows per second, where no column has the time.
@@ -74,7 +76,7 @@ impl Table {
         let body = &lines[1..];
         let filled = body.iter().rposition(|line| !line.trim().is_empty()).map_or(0, |last| last + 1);
         let rate_hz = if let Clock::Rate(rate_hz) = clock { Some(rate_hz) } else { None };
-        let mut table = Self { what: what.to_owned(), names, rows: Vec::with_capacity(filled), rate_hz };
+        let mut table = Self { what: what.to_owned(), first_line, names, rows: Vec::with_capacity(filled), rate_hz };
         for (index, line) in body[..filled].iter().enumerate() {
             table.add_row(first_line + 1 + index, &separator.split(line))?;
         }
@@ -108,6 +110,14 @@ impl Table {
         Ok(())
     }
 
+    /// The same table with other names of its columns.
+    pub(crate) fn with_names(mut self, other: impl Fn(&str) -> &str) -> Self {
+        for name in &mut self.names {
+            *name = other(name).to_owned();
+        }
+        self
+    }
+
     /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
@@ -131,19 +141,40 @@ impl Table {
         }
     }
 
-    /// Samples per second of an evenly sampled table; `first_line` is the line of its names.
-    pub(crate) fn even_rate_hz(&self, first_line: usize) -> Result<f64, ModelError> {
+    /// An error in a row, counted from 0.
+    pub(crate) fn malformed_row(&self, row: usize, column: Option<usize>, reason: String) -> ModelError {
+        malformed(&self.what, self.first_line + 1 + row, column, reason)
+    }
+
+    /// An error in the line of column names.
+    pub(crate) fn malformed_names(&self, reason: String) -> ModelError {
+        malformed(&self.what, self.first_line, None, reason)
+    }
+
+    /// Samples per second of an evenly sampled table.
+    pub(crate) fn even_rate_hz(&self) -> Result<f64, ModelError> {
         let times = self.times();
         let start_s = times[0];
         let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - start_s);
         let uneven = |(k, time): (usize, &f64)| ((time - start_s) * rate_hz - k as f64).abs() > UNEVENNESS;
-        match times.iter().enumerate().position(uneven) {
-            None => Ok(rate_hz),
-            Some(k) => {
-                let reason = format!("{} s is not on an even grid of {rate_hz:.3} samples per second", times[k]);
-                Err(malformed(&self.what, first_line + 1 + k, Some(1), reason))
-            }
-        }
+        if times.iter().enumerate().any(uneven) { Err(self.oddest_step(&times)) } else { Ok(rate_hz) }
+    }
+
+    /// The row whose distance to the row before is least like the others.
+    fn oddest_step(&self, times: &[f64]) -> ModelError {
+        let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut sorted = steps.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted[sorted.len() / 2];
+        let odd = |k: &usize| (steps[*k] - usual).abs();
+        let row = 1 + (0..steps.len()).max_by(|a, b| odd(a).total_cmp(&odd(b))).unwrap_or(0);
+        let reason = format!(
+            "the time {} follows {} by {:.6} s, where rows are {usual:.6} s apart: the rows must be evenly spaced",
+            times[row],
+            times[row - 1],
+            steps[row - 1]
+        );
+        self.malformed_row(row, Some(1), reason)
     }
 
     /// A column by name, if it is there.
@@ -154,10 +185,8 @@ impl Table {
 
     /// A column by name.
     pub(crate) fn column(&self, name: &str) -> Result<Vec<f64>, ModelError> {
-        self.find(name).ok_or_else(|| ModelError::Malformed {
-            what: self.what.clone(),
-            reason: format!("column {name:?} is missing; there are {}", self.names.join(", ")),
-        })
+        let missing = || format!("column {name:?} is missing; there are {}", self.names.join(", "));
+        self.find(name).ok_or_else(|| self.malformed_names(missing()))
     }
 }
 

@@ -116,7 +116,7 @@ fn tables_are_read_strictly() {
     assert!(whole.channels.iter().map(|(name, samples)| (name.as_str(), samples.len())).eq([("TA", 60), ("BF", 60)]));
     for (from, to, expected) in [
         ("\n0.01,0.10,1", "\n0.01,x,1", "emg.csv, line 13, column 2"),
-        ("\n0.03,0.30,1\n", "\n0.0301,0.30,1\n0.0302,0,0\n", "is not on an even grid"),
+        ("\n0.03,0.30,1\n", "\n0.0301,0.30,1\n0.0302,0,0\n", "rows must be evenly spaced"),
         ("time_s,", "time,", "expected \"time_s\""),
         ("TA,BF", "TA,TA", "is there twice"),
     ] {

@@ -3,33 +3,15 @@
 #![allow(clippy::unwrap_used)]
 
 mod golden_gaits;
+mod synthetic_recordings;
 
 use gait_optimizer::export::motion_file;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, Walker, distance, nearest};
 use gait_optimizer::{ModelError, ReferenceGait, Subject};
 use golden_gaits::golden_gait;
 use std::f64::consts::TAU;
-
-/// A recording of `strides` strides of 1.1 s at 100 Hz as an OpenSim file, knee and hip in antiphase left and right.
-fn opensim(strides: usize) -> String {
-    let rows = 110 * strides + 1;
-    let mut text = format!(
-        "synthetic\nversion=1\nnRows={rows}\nnColumns=10\ninDegrees=yes\nendheader\ntime\tpelvis_tilt\thip_flexion_r\t\
-         knee_angle_r\tankle_angle_r\thip_flexion_l\tknee_angle_l\tankle_angle_l\tlumbar_extension\tright_vy\n"
-    );
-    for k in 0..rows {
-        let time = k as f64 / 100.0;
-        let phase = TAU * time / 1.1;
-        let leg = |phase: f64| (10.0 + 25.0 * phase.cos(), -(25.0 - 20.0 * phase.cos()), 5.0 * phase.sin());
-        let (hip_r, knee_r, ankle_r) = leg(phase);
-        let (hip_l, knee_l, ankle_l) = leg(phase + 0.5 * TAU);
-        let force = if (phase / TAU).fract() < 0.6 { 700.0 } else { 0.0 };
-        text.extend([format!(
-            "{time:.4}\t-3.0\t{hip_r:.6}\t{knee_r:.6}\t{ankle_r:.6}\t{hip_l:.6}\t{knee_l:.6}\t{ankle_l:.6}\t-4.0\t{force:.1}\n"
-        )]);
-    }
-    text
-}
+use std::fmt::Write;
+use synthetic_recordings::{opensim, opensim_rows};
 
 fn read(text: &str) -> Result<Recording, ModelError> {
     Recording::from_opensim("walk.mot", text, None, Some("right_vy"))
@@ -63,6 +45,85 @@ fn three_ways_of_finding_heel_strikes_agree() {
     }
     let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2]);
     assert_eq!(recording.heel_strikes(&given).unwrap(), [0.0, 1.1, 2.2]);
+}
+
+/// The forms in which OpenSim and its users write the same two strides, and the forces beside them.
+#[test]
+fn every_form_of_opensims_files_is_read() {
+    let names = "time\tpelvis_tilt\thip_flexion_r\tknee_angle_r\tankle_angle_r\thip_flexion_l\tknee_angle_l\tankle_angle_l\t\
+                 lumbar_extension\tright_vy";
+    let rows = opensim_rows(2, 1.0);
+    let whole = read(&opensim(2)).unwrap();
+    let same = |form: &str, text: &str, unit: Option<AngleUnit>| {
+        let found = Recording::from_opensim(form, text, unit, Some("right_vy")).unwrap();
+        for (ours, theirs) in found.angles_rad.iter().flatten().zip(whole.angles_rad.iter().flatten()) {
+            assert!((ours - theirs).abs() < 1e-7, "{form}: {ours} {theirs}");
+        }
+        assert_eq!(found.right_force, whole.right_force, "{form}");
+    };
+    // Inverse kinematics of OpenSim 3 and 4, with the sentence that explains inDegrees.
+    let explained = "Units are S.I. units (second, meters, Newtons, ...)\nIf the header above contains a line with \
+                     'inDegrees', this indicates whether rotational values are in degrees (yes) or radians (no).\n";
+    let ik = format!(
+        "Coordinates\nversion=1\nnRows=221\nnColumns=10\ninDegrees=yes\n\n{explained}\nendheader\n{names}\n{rows}"
+    );
+    same("inverse kinematics", &ik, None);
+    same("lines as Windows ends them", &ik.replace('\n', "\r\n"), None);
+    let padded = ik.replace('\n', "\t\n");
+    same("a tab at the end of each line", &padded, None);
+    let spaced = format!(
+        "walk\nnRows = 221\nnColumns = 10\ninDegrees = yes\nendheader\n{}\n{}",
+        names.replace('\t', "  "),
+        rows.replace('\t', "   ")
+    );
+    same("blanks in place of tabs", &spaced, None);
+    // What OpenSim 4 writes from a table, in radians: no numbers of rows.
+    let radians = opensim_rows(2, std::f64::consts::PI / 180.0);
+    let table = format!(
+        "inDegrees=no\nDataType=double\nversion=3\nOpenSimVersion=4.5-2024-01-10\nendheader\n{names}\n{radians}"
+    );
+    same("storage file of OpenSim 4", &table, None);
+    // States of OpenSim Moco, by their paths.
+    let path = |name: &str| match name {
+        "time" | "right_vy" => name.to_owned(),
+        other => format!("/jointset/somewhere/{other}/value"),
+    };
+    let paths: Vec<String> = names.split('\t').map(path).collect();
+    same("states by path", &table.replace(names, &paths.join("\t")), None);
+    // SIMM, before OpenSim: the header does not say the unit.
+    let simm = format!("name walk.mot\ndatacolumns 10\ndatarows 221\nrange 0 2.2\nendheader\n{names}\n{rows}");
+    assert!(Recording::from_opensim("walk.mot", &simm, None, None).is_err());
+    same("motion file of SIMM", &simm, Some(AngleUnit::Degrees));
+    let half = simm.replace("datarows 221", "datarows 220");
+    let refused = Recording::from_opensim("walk.mot", &half, Some(AngleUnit::Degrees), None).unwrap_err().to_string();
+    assert!(refused.contains("line 3: datarows=220, but there are 221"), "{refused}");
+}
+
+#[test]
+fn forces_may_be_in_a_file_of_their_own_at_their_own_rate() {
+    // As OpenSim's examples have them: both plates, ten times as many samples, from before the motion on.
+    let mut forces =
+        "walk_grf.mot\nversion=1\nnRows=6001\nnColumns=4\ninDegrees=yes\nendheader\ntime\tground_force_vx\t\
+                      ground_force_vy\t1_ground_force_vy\n"
+            .to_owned();
+    for k in 0..6001 {
+        let time = f64::from(k) / 1000.0 - 0.3;
+        let force = if (time / 1.1).rem_euclid(1.0) < 0.6 { 700.0 } else { 0.0 };
+        writeln!(forces, "{time:.3}\t0\t{force}\t{}", 700.0 - force).unwrap();
+    }
+    let motion = Recording::from_opensim("walk.mot", &opensim(5), None, None).unwrap();
+    let recording = motion.clone().with_force_file("walk_grf.mot", &forces, "ground_force_vy").unwrap();
+    let strikes = recording.heel_strikes(&HeelStrikes::Force).unwrap();
+    assert_eq!(strikes.len(), 5, "those within the motion: {strikes:?}");
+    for (k, strike) in strikes.iter().enumerate() {
+        assert!((strike - 1.1 * k as f64).abs() < 2e-3 || (strike - 1.1 * (k + 1) as f64).abs() < 2e-3, "{strikes:?}");
+    }
+    let reference = recording.reference("x", &HeelStrikes::Force, Walker::default()).unwrap();
+    assert!(
+        reference.provenance.contains("walk_grf.mot: 6001 rows, ground_force_vy is the force under the right foot")
+    );
+    let refused = motion.with_force_file("walk_grf.mot", &forces, "fy").unwrap_err().to_string();
+    assert!(refused.starts_with("walk_grf.mot, line 7: column \"fy\" is missing; there are time, "), "{refused}");
 }
 
 #[test]
@@ -165,59 +226,6 @@ fn the_nearest_reference_in_height_and_mass_is_found() {
     assert!((away - 0.3_f64.hypot(2.0 / 15.0)).abs() < 1e-12);
     assert_eq!(distance(&subject, &all[0]), None);
     assert!(nearest(&subject, &all[..1]).is_none());
-}
-
-/// A whole file with the first `from` replaced by `to`.
-fn changed(from: &str, to: &str) -> String {
-    let whole = opensim(2);
-    assert!(whole.contains(from));
-    whole.replacen(from, to, 1)
-}
-
-#[test]
-fn malformed_files_get_line_column_and_reason() {
-    let whole = opensim(2);
-    let half = whole[..whole.len() / 2].to_owned();
-    let row = |k: usize| whole.lines().nth(k - 1).unwrap().to_owned();
-    let cases: [(&str, String, &str); 20] = [
-        ("empty", String::new(), "line 1: there is no line \"endheader\""),
-        ("no endheader", changed("endheader\n", ""), "there is no line \"endheader\""),
-        ("binary", "\u{0}\u{1}\u{2}PNG".to_owned(), "there is no line \"endheader\""),
-        ("no unit", changed("inDegrees=yes\n", ""), "line 5: the header has no inDegrees=yes or no"),
-        ("odd unit", changed("inDegrees=yes", "inDegrees=grad"), "line 5: inDegrees=grad: expected yes or no"),
-        ("wrong unit", changed("inDegrees=yes", "inDegrees=no"), "is the unit right?"),
-        ("cut in half", half, "line 117: 4 cells, but 10 columns"),
-        ("rows missing", changed(&format!("{}\n", row(50)), ""), "line 3: nRows=221, but there are 220"),
-        ("columns disagree", changed("nColumns=10", "nColumns=9"), "line 4: nColumns=9, but there are 10"),
-        ("rows not a number", changed("nRows=221", "nRows=many"), "line 3: nRows=many"),
-        ("no names", changed(&row(7), ""), "line 7: the first column is \"\", expected \"time\""),
-        ("time is not first", changed("time\t", "frame\t"), "line 7: the first column is \"frame\""),
-        (
-            "a name twice",
-            changed("hip_flexion_l", "hip_flexion_r"),
-            "line 7, column 6: \"hip_flexion_r\" is there twice",
-        ),
-        ("knee missing", changed("knee_angle_l", "knee_l"), "column \"knee_angle_l\" is missing; there are time, "),
-        ("pelvis missing", changed("pelvis_tilt", "pelvis"), "column \"pelvis_tilt\" is missing"),
-        ("force missing", changed("right_vy", "vy"), "column \"right_vy\" is missing"),
-        (
-            "a word",
-            changed("\n0.0300\t-3.0", "\n0.0300\tabc"),
-            "line 11, column 2: pelvis_tilt = \"abc\" is not a number",
-        ),
-        ("not a number", changed("\n0.0300\t-3.0", "\n0.0300\tNaN"), "line 11, column 2: pelvis_tilt = \"NaN\""),
-        ("a cell missing", changed("\n0.0300\t-3.0", "\n0.0300"), "line 11: 9 cells, but 10 columns"),
-        (
-            "time stands still",
-            changed("\n0.0300\t", "\n0.0200\t"),
-            "line 11, column 1: the time 0.02 does not follow 0.02",
-        ),
-    ];
-    for (name, text, expected) in cases {
-        let message = read(&text).unwrap_err().to_string();
-        assert!(message.starts_with("walk.mot") && message.contains(expected), "{name}: {message}");
-    }
-    assert!(Recording::from_opensim("x", &changed("inDegrees=yes\n", ""), Some(AngleUnit::Degrees), None).is_ok());
 }
 
 #[test]

@@ -6,6 +6,7 @@
 pub mod analytic;
 pub mod away;
 pub mod broker;
+pub mod callers;
 pub mod cli;
 pub mod client;
 pub mod large;

@@ -29,3 +29,16 @@ pub fn motion() -> String {
     }
     text
 }
+
+/// Four strides of 1.1 s as a table for a reference gait, each a little higher than the one before.
+pub fn four_strides(per_second: u32) -> String {
+    let mut text = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
+    for k in 0..=(44 * per_second / 10) {
+        let time = f64::from(k) / f64::from(per_second);
+        let phase = TAU * time / 1.1;
+        let (hip, knee) = (0.2 + 0.4 * phase.cos(), 0.4 - 0.35 * phase.cos());
+        let (opposite, ankle) = (0.2 - 0.4 * phase.cos(), 0.05 + 0.02 * time);
+        writeln!(text, "{time},0.1,{opposite:.6},0.4,{ankle:.6},{hip:.6},{knee:.6}").unwrap();
+    }
+    text
+}

@@ -5,73 +5,16 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use futures_util::future::join_all;
-use gaitwright::access::people::{self, NewUser};
-use gaitwright::access::tokens::{self, NewToken};
-use gaitwright::access::{Right, Role, secret, sign_in};
+use gaitwright::access::{Right, Role, people, secret};
 use gaitwright::http::{Access, openapi};
 use gaitwright::store::audit::{self, Actor};
-use gaitwright::store::{UserId, commit};
-use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::service::{Answer, Service};
+use gaitwright::store::commit;
+use gaitwright_tests::callers::{As, FORM, send, service, session_of, signed_in, token, user};
+use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::sync::Arc;
-use tempfile::TempDir;
 
 const UNKNOWN: &str = "01890000-0000-7000-8000-000000000000";
-const FORM: &str = "application/x-www-form-urlencoded";
-
-/// A service where everybody signs in.
-async fn service() -> (TempDir, Service) {
-    let folder = tempfile::tempdir().unwrap();
-    let mut service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    service.access = Arc::new(Access::by_sign_in(3600.0));
-    (folder, service)
-}
-
-/// How a request says who sends it.
-#[derive(Debug, Clone)]
-enum As {
-    Nobody,
-    Session(String),
-    Token(String),
-}
-
-async fn user(service: &Service, name: &str, role: Role) -> (UserId, String) {
-    let mut writer = service.store.write().await.unwrap();
-    let new = NewUser { name: name.to_owned(), role };
-    let user = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
-    let link = people::link(&mut writer, &Actor::program(), user.id).await.unwrap();
-    commit(writer).await.unwrap();
-    (user.id, link)
-}
-
-async fn signed_in(service: &Service, role: Role) -> As {
-    let (_, link) = user(service, &format!("a {}", role.as_str()), role).await;
-    let mut writer = service.store.write().await.unwrap();
-    let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
-    commit(writer).await.unwrap();
-    As::Session(session)
-}
-
-async fn token(service: &Service, scopes: &[Right]) -> As {
-    let mut writer = service.store.write().await.unwrap();
-    let new = NewToken { name: format!("{scopes:?}"), scopes: scopes.to_vec(), days: Some(1) };
-    let (_, secret) = tokens::make(&mut writer, &Actor::program(), &new).await.unwrap();
-    commit(writer).await.unwrap();
-    As::Token(secret)
-}
-
-async fn send(service: &Service, who: &As, method: &Method, path: &str, kind: &str, body: &str) -> Answer {
-    let mut request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, kind);
-    request = match who {
-        As::Nobody => request,
-        As::Session(secret) => request
-            .header(header::COOKIE, format!("gaitwright_session={secret}"))
-            .header("sec-fetch-site", "same-origin"),
-        As::Token(secret) => request.header(header::AUTHORIZATION, format!("Bearer {secret}")),
-    };
-    service.send(request.body(Body::from(body.to_owned())).unwrap()).await
-}
 
 /// Everybody there is, with their rights.
 async fn everybody(service: &Service) -> Vec<(As, Vec<Right>)> {
@@ -213,12 +156,6 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
     service.stop().await;
 }
 
-fn session_of(answer: &Answer) -> As {
-    let cookie = answer.headers["set-cookie"].to_str().unwrap();
-    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Lax"), "{cookie}");
-    As::Session(cookie.split(';').next().unwrap().split_once('=').unwrap().1.to_owned())
-}
-
 #[tokio::test]
 async fn a_link_signs_in_once_and_a_password_after_that() {
     let (_folder, service) = service().await;
@@ -253,6 +190,52 @@ async fn a_link_signs_in_once_and_a_password_after_that() {
     for secret in [link.as_str(), "correct horse"] {
         assert!(!bytes.windows(secret.len()).any(|window| window == secret.as_bytes()), "{secret}");
     }
+}
+
+#[tokio::test]
+async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
+    let (_folder, service) = service().await;
+    let (id, link) = user(&service, "Ada", Role::Clinician).await;
+    let come = |link: &str| {
+        let (service, path) = (&service, format!("/sign-in/{link}"));
+        async move { session_of(&send(service, &As::Nobody, &Method::POST, &path, FORM, "").await) }
+    };
+    let change = |who: &As, body: &str| {
+        let (service, who, body) = (&service, who.clone(), body.to_owned());
+        async move { send(service, &who, &Method::POST, "/account", FORM, &body).await }
+    };
+    // Nothing to know yet; and then, whoever has the session alone does not take the account.
+    let first = session_of(&change(&come(&link).await, "password=correct+horse").await);
+    for body in ["password=battery+staple", "password=battery+staple&present=", "password=battery+staple&present=wrong"]
+    {
+        let refused = change(&first, body).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{body}");
+        assert!(refused.text.contains("the present password is not right"), "{}", refused.text);
+    }
+    let page = send(&service, &first, &Method::GET, "/account", FORM, "").await;
+    assert!(page.text.contains("name=\"present\""), "{}", page.text);
+    let second = session_of(&change(&first, "password=battery+staple&present=correct+horse").await);
+    // Guesses wait here as at the door.
+    let mut statuses = Vec::new();
+    for _ in 0..6 {
+        statuses.push(change(&second, "password=another+horse&present=guess").await.status);
+    }
+    assert_eq!(statuses.last(), Some(&StatusCode::TOO_MANY_REQUESTS), "{statuses:?}");
+
+    // Who forgot it gets a link, and is not asked for an hour.
+    let mut writer = service.store.write().await.unwrap();
+    let link = people::link(&mut writer, &Actor::program(), id).await.unwrap();
+    commit(writer).await.unwrap();
+    let fresh = come(&link).await;
+    let page = send(&service, &fresh, &Method::GET, "/account", FORM, "").await;
+    assert!(!page.text.contains("name=\"present\""), "{}", page.text);
+    let mut writer = service.store.write().await.unwrap();
+    let age = "update sessions set created_at = '2026-01-01T00:00:00.000000Z' where ended_at is null";
+    sqlx::query(age).execute(&mut *writer).await.unwrap();
+    commit(writer).await.unwrap();
+    let page = send(&service, &fresh, &Method::GET, "/account", FORM, "").await;
+    assert!(page.text.contains("name=\"present\""), "{}", page.text);
+    service.stop().await;
 }
 
 #[tokio::test]

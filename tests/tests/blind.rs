@@ -226,20 +226,3 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
     }
     service.stop().await;
 }
-
-#[tokio::test]
-async fn a_rater_is_told_that_another_has_answered_the_same() {
-    let (_folder, service, study) = waiting(4).await;
-    let pair = next(&service, study).await;
-    let shown = shown(&service, study).await;
-    let answer = json!({
-        "trial_a": shown[0].shown_first, "trial_b": shown[0].shown_second, "answer": "a", "author": "K",
-    });
-    let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
-    assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
-    let path = format!("/rate/pair/{}", pair["token"].as_str().unwrap());
-    let answered = service.post_text(&path, "application/x-www-form-urlencoded", "answer=second").await;
-    let page = service.fetch(answered.headers["location"].to_str().unwrap()).await.text;
-    assert!(page.contains("Somebody else has answered this comparison too"), "{page}");
-    service.stop().await;
-}

@@ -9,6 +9,7 @@ use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::{archive, audit};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
+use gaitwright_tests::measured::motion;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -41,6 +42,10 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
     let session = service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap().to_owned();
+    service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": 1})).await;
+    let measured = json!({"walk": 1, "recording": motion()});
+    let recording = service.post(&format!("/api/v1/lab-sessions/{session}/motions"), &measured).await;
+    assert_eq!(recording.status, StatusCode::CREATED, "{}", recording.text);
     let before = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap().len();
     let withdraw = json!({"reason": "moved away"});
     let withdrawn = service.post(&format!("{of_subject}/withdraw"), &withdraw).await;
@@ -71,7 +76,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
         (format!("{of_subject}/muscles"), json!({})),
         (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
-        (format!("/api/v1/lab/{session}/walks"), json!({"walk": 1})),
+        (format!("/api/v1/lab/{session}/walks"), json!({"walk": 2})),
         (format!("/api/v1/lab-sessions/{session}/close"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/emg-results"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/unblind"), json!({"reason": "r"})),
@@ -100,6 +105,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         ("/blind/{token}", token.clone()),
         ("/lab/{id}", session.clone()),
         ("/lab-sessions/{id}", session.clone()),
+        ("/lab-recordings/{id}", recording.json()["id"].as_str().unwrap().to_owned()),
     ];
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
     let mut closed = 0;

@@ -7,7 +7,7 @@ use axum::http::{Request, StatusCode};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::measured::{electromyogram, four_strides, motion};
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
 use serde_json::json;
@@ -100,5 +100,40 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
     }
     let nonsense = service.fetch(&format!("/studies/{}/figures?other=x", studies[0])).await;
     assert!(nonsense.status == StatusCode::UNPROCESSABLE_ENTITY && nonsense.text.contains("a study of the list"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_reference_of_several_strides_has_its_band_and_one_without_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let recording = json!({"name": "S03, level", "form": "csv", "recording": four_strides(100)});
+    let imported = service.post("/api/v1/reference-gaits", &recording).await;
+    assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
+    let deviation = imported.json()["definition"]["standard_deviation_rad"][50][3].as_f64().unwrap();
+    let imported = imported.json()["id"].as_str().unwrap().parse().unwrap();
+    for (reference, band) in [(None, false), (Some(imported), true)] {
+        let study = service.study(|new| (new.trial_budget, new.reference_gait_id) = (2, reference)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        let trial = service.trials(study).await.into_iter().find(|t| t.state == TrialState::Converged).unwrap().id;
+        for page in [format!("/studies/{study}/figures"), format!("/trials/{trial}")] {
+            let page = service.fetch(&page).await.text;
+            assert_eq!(page.contains("The band is one standard deviation of the reference over its strides."), band);
+            assert_eq!(page.contains("without a standard deviation: there is no band to draw"), !band);
+            assert_eq!(page.matches("</i>one standard deviation").count(), if band { 5 } else { 0 }, "{page}");
+        }
+        let ankle = linked(&service.fetch(&format!("/studies/{study}/figures")).await.text, "left-ankle.csv").remove(0);
+        let (_, csv) = file(&service, &ankle).await;
+        let csv = String::from_utf8(csv).unwrap();
+        let at_half: Vec<f64> = csv
+            .lines()
+            .filter_map(|line| line.strip_prefix("one standard deviation,50,"))
+            .map(|cell| cell.parse().unwrap())
+            .collect();
+        assert_eq!(at_half.len(), if band { 2 } else { 0 }, "{csv}");
+        if let [low, high] = at_half[..] {
+            assert!((high - low - 2.0 * deviation.to_degrees()).abs() < 1e-6, "{low} {high} {deviation}");
+        }
+    }
     service.stop().await;
 }

@@ -288,6 +288,30 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
 }
 
 #[tokio::test]
+async fn a_recording_is_given_out_as_it_was_brought() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let api = format!("/api/v1/lab-sessions/{}", id(&session));
+    service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    // What reading drops is kept: comments, ends of lines, blank lines at the end.
+    let file = format!("# Größe 1,8 m\r\n{}\r\n\r\n", electromyogram(1.0).trim_end().replace('\n', "\r\n"));
+    let kept = service.post(&format!("{api}/electromyograms"), &with_heel(1, &file)).await;
+    assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
+    let kept = kept.json();
+    let path = format!("/api/v1/lab-recordings/{}/file", id(&kept));
+    let answer = service.fetch(&path).await;
+    assert_eq!((answer.status, answer.text.as_bytes()), (StatusCode::OK, file.as_bytes()));
+    assert_eq!(answer.headers["etag"], format!("\"{}\"", kept["raw_sha256"].as_str().unwrap()));
+    assert_eq!(answer.content_type(), "text/csv; charset=utf-8");
+    let name = answer.headers["content-disposition"].to_str().unwrap();
+    assert!(name.starts_with("attachment; filename=\"walk-1-electromyogram-"), "{name}");
+    assert!(service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text.contains(&format!("href=\"{path}\"")));
+    let unknown = service.fetch(&format!("/api/v1/lab-recordings/{study}/file")).await;
+    assert_eq!(unknown.status, StatusCode::NOT_FOUND, "{}", unknown.text);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;

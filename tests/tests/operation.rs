@@ -4,14 +4,16 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
+use gait_optimizer::certificate::Certificate;
 use gaitwright::cli::study::{import, prune};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, archive, backup, gaits, studies};
+use gaitwright::store::{Store, archive, backup, certificates, commit, gaits, studies};
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
-use serde_json::json;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 use sqlx::sqlite::SqliteConnectOptions;
 use std::path::Path;
 use std::process::Command;
@@ -44,6 +46,10 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
         json!({"trial_a": converged[2].id, "trial_b": converged[0].id, "answer": "no_difference", "author": "K"});
     service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
     let expected = posterior(&service, study).await;
+    let examined = (converged[0].id, certificate());
+    let mut writer = service.store.write().await.unwrap();
+    assert!(certificates::keep(&mut writer, examined.0, &examined.1).await.unwrap());
+    commit(writer).await.unwrap();
     let file = archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
 
     // Another record, with rows of its own.
@@ -68,14 +74,45 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     drop(fresh);
     let again = Service::start_as_is(&folder.path().join("c.db"), Analytic::default(), 1).await;
     assert_eq!(posterior(&again, study).await, expected);
-    let strip = |text: String| text;
     for path in ["trials", "preferences", "history"] {
         let path = format!("/api/v1/studies/{study}/{path}");
-        let (a, b) = (service.fetch(&path).await.text, again.fetch(&path).await.text);
-        assert_eq!(strip(a), strip(b), "{path}");
+        assert_eq!(service.fetch(&path).await.text, again.fetch(&path).await.text, "{path}");
     }
+    let found = certificates::find(&mut again.store.read().await.unwrap(), examined.0).await.unwrap();
+    assert_eq!(found, Some(examined.1));
     again.stop().await;
     service.stop().await;
+
+    // An archive of the time before certificates were in it.
+    let older = Store::open(&folder.path().join("d.db")).await.unwrap();
+    assert_eq!(import(&older, &archive::open(&as_before_certificates(&file)).unwrap()).await.unwrap(), study);
+    assert_eq!(certificates::find(&mut older.read().await.unwrap(), examined.0).await.unwrap(), None);
+    older.close().await;
+}
+
+/// What an examination that found a fault leaves.
+fn certificate() -> Certificate {
+    Certificate {
+        format_version: gait_optimizer::certificate::FORMAT_VERSION,
+        passed: false,
+        objections: vec!["the simulated walker falls".to_owned()],
+        checks: Vec::new(),
+        fall: Some("the simulated walker falls".to_owned()),
+        return_map: None,
+        free_hip_return_map: None,
+        pushes: None,
+    }
+}
+
+/// The archive as the program wrote it before: without the table, and with the format of then.
+fn as_before_certificates(file: &[u8]) -> Vec<u8> {
+    let end = file.iter().position(|byte| *byte == b'\n').unwrap();
+    let mut tables: Value = serde_json::from_slice(&zstd::decode_all(&file[end + 1..]).unwrap()).unwrap();
+    let certificates = tables.as_object_mut().unwrap().remove("certificates").unwrap();
+    assert_eq!(certificates.as_array().unwrap().len(), 1);
+    let body = zstd::encode_all(tables.to_string().as_bytes(), 3).unwrap();
+    let head = json!({"format": "gaitwright study 1", "sha256": hex::encode(Sha256::digest(&body))});
+    [format!("{head}\n").as_bytes(), &body].concat()
 }
 
 #[tokio::test]

@@ -5,26 +5,12 @@
 use axum::http::StatusCode;
 use gaitwright::store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::measured::four_strides;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
-use std::f64::consts::TAU;
-use std::fmt::Write;
 
-/// Four strides of 1.1 s as our own table.
 fn recording() -> String {
-    sampled(100)
-}
-
-fn sampled(per_second: u32) -> String {
-    let mut text = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
-    for k in 0..=(44 * per_second / 10) {
-        let time = f64::from(k) / f64::from(per_second);
-        let phase = TAU * time / 1.1;
-        let (hip, knee) = (0.2 + 0.4 * phase.cos(), 0.4 - 0.35 * phase.cos());
-        let opposite = 0.2 - 0.4 * phase.cos();
-        writeln!(text, "{time},0.1,{opposite:.6},0.4,0.05,{hip:.6},{knee:.6}").unwrap();
-    }
-    text
+    four_strides(100)
 }
 
 fn new(name: &str, height_m: f64) -> Value {
@@ -115,14 +101,14 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
     let refused = service.post_text("/references", kind, &form(&recording(), "tall")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
     assert!(refused.text.contains("height_m: &#34;tall&#34;") || refused.text.contains("tall"), "{}", refused.text);
-    assert!(refused.text.contains("value=\"S03, level\"") && refused.text.contains("0.05,0.6"), "as it was typed");
+    assert!(refused.text.contains("value=\"S03, level\"") && refused.text.contains("0.050000,0.6"), "as it was typed");
     let imported = service.post_text("/references", kind, &form(&recording(), "")).await;
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await;
     assert!(page.status == StatusCode::OK && page.text.contains("S03, level"), "{}", page.text);
     // More than the usual limit of a body is accepted here, and only here.
     let mut body = new("long", 1.7);
-    body["recording"] = json!(sampled(10_000));
+    body["recording"] = json!(four_strides(10_000));
     assert_eq!(service.post("/api/v1/reference-gaits", &body).await.status, StatusCode::CREATED);
     assert_eq!(service.post("/api/v1/subjects", &body).await.status, StatusCode::PAYLOAD_TOO_LARGE);
     service.stop().await;

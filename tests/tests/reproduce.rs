@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gait_optimizer::ReferenceGait;
 use gaitwright::store::studies::StudyState;
+use gaitwright::store::{commit, reference_gaits};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
@@ -47,6 +49,40 @@ async fn trials_that_failed_are_told_and_end_with_a_code_of_their_own() {
         assert!(text.contains(&told), "{text}");
     }
     assert!(out.join("report.html").exists());
+}
+
+#[tokio::test]
+async fn the_report_draws_the_band_of_a_reference_that_has_one_and_says_where_there_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut with_band = ReferenceGait::builtin().unwrap();
+    with_band.standard_deviation_rad = Some(vec![[0.1; 5]; 101]);
+    std::fs::write(folder.path().join("band.json"), serde_json::to_string(&with_band).unwrap()).unwrap();
+    for (out, reference) in [("plain", None), ("band", Some(&with_band))] {
+        std::fs::create_dir(folder.path().join(out)).unwrap();
+        let service = Service::start(&folder.path().join(out).join("studies.db"), Analytic::default(), 1).await;
+        let mut id = None;
+        if let Some(reference) = reference {
+            let mut writer = service.store.write().await.unwrap();
+            id = Some(reference_gaits::ensure(&mut writer, reference).await.unwrap().0.id);
+            commit(writer).await.unwrap();
+        }
+        for muscles in [false, true] {
+            let study =
+                service.study(|new| (new.trial_budget, new.muscles, new.reference_gait_id) = (3, muscles, id)).await;
+            service.wait_for(study, &[StudyState::Finished]).await;
+        }
+        service.stop().await;
+        let arguments = ["reproduce", "--subject", "1", "--trials", "3", "--seeds", "1", "--folder", out];
+        let given: &[&str] = if id.is_some() { &["--reference", "band.json"] } else { &[] };
+        let output = cli::run(BINARY, folder.path(), &[&arguments[..], given].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(out).join(name)).unwrap();
+        let (report, angles) = (read("report.html"), read("angles.csv"));
+        assert_eq!(report.matches("</i>one standard deviation").count(), if id.is_some() { 5 } else { 0 });
+        assert_eq!(report.contains("there is no band to draw"), id.is_none());
+        assert!(report.contains("measured by the reference gait Falisse 2019, subject 1"), "{report}");
+        assert_eq!(angles.matches("reference standard deviation,,,").count(), if id.is_some() { 101 } else { 0 });
+    }
 }
 
 #[test]

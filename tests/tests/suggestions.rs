@@ -101,3 +101,19 @@ async fn a_copy_is_made_and_checked_on_request() {
     assert_ne!(again["file"], copied["file"]);
     service.stop().await;
 }
+
+#[tokio::test]
+async fn copies_that_are_asked_for_together_are_made_one_after_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let nothing = json!({});
+    let asked = (0..6).map(|_| service.post("/api/v1/backups", &nothing));
+    let mut names = std::collections::BTreeSet::new();
+    for answer in futures_util::future::join_all(asked).await {
+        assert_eq!(answer.status, StatusCode::CREATED, "{}", answer.text);
+        let file = answer.json()["file"].as_str().unwrap().to_owned();
+        backup::check(&folder.path().join(&file)).await.unwrap();
+        assert!(names.insert(file), "two copies have one name");
+    }
+    service.stop().await;
+}

@@ -1,24 +1,27 @@
 //! The stride-to-stride map at right heel strike: its fixed point, its multipliers, and a second opinion on them.
 //!
 //! The section is the state after right heel strike without px, on which nothing depends: 17 numbers. Contacts make
-//! many of its directions impossible; those have multiplier 0.
+//! many of its directions impossible; those have multiplier 0 and are left out.
 
 use super::control::{State, StateMatrix, split};
+use super::domain_differences::{ByDifferences, by_differences, possible_directions};
 use super::hybrid_walker::{Fall, HybridWalker};
 use nalgebra::linalg::Schur;
 use nalgebra::{DMatrix, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
+/// Numbers of the section.
+pub(super) const SECTION: usize = 17;
 /// State without px.
-type Section = SVector<f64, 17>;
+pub(super) type Section = SVector<f64, SECTION>;
 /// Derivative of the map.
-type SectionMatrix = SMatrix<f64, 17, 17>;
+type SectionMatrix = SMatrix<f64, SECTION, SECTION>;
 
 /// Newton steps to the fixed point, and the change (rad, rad/s) at which it is reached.
 const NEWTON_STEPS: usize = 8;
 const FIXED_POINT: f64 = 1e-8;
-/// Perturbation of the central differences, rad and rad/s: its third-order error and the integrator's noise are alike.
-const DIFFERENCE: f64 = 1e-5;
+/// Both methods must agree on the largest multiplier to this, relative.
+const AGREEMENT: f64 = 1e-3;
 /// Most iterations of the eigenvalue iteration.
 const SCHUR_ITERATIONS: usize = 10_000;
 
@@ -51,8 +54,10 @@ pub struct ReturnMap {
     pub multipliers: Vec<Multiplier>,
     /// Largest modulus of them.
     pub largest: f64,
-    /// Largest modulus of the multipliers from central differences of simulated strides.
+    /// Largest modulus of the multipliers from differences of simulated domains.
     pub largest_by_differences: f64,
+    /// What the last extrapolation of the differences changed in it: what they resolve.
+    pub differences_resolve: f64,
     /// Multiplier of a change of the walking speed that keeps all virtual constraints: the zero dynamics.
     pub zero_dynamics: f64,
     /// What the stride turns such a change into outside the zero dynamics, over its size: 0 for invariance.
@@ -65,22 +70,30 @@ impl ReturnMap {
         (self.largest - self.largest_by_differences).abs() / self.largest.max(f64::MIN_POSITIVE)
     }
 
+    /// Whether both methods agree: to a thousandth, or as far as differences resolve where that is more, and they resolve
+    /// what matters.
+    pub fn methods_agree(&self) -> bool {
+        let difference = (self.largest - self.largest_by_differences).abs();
+        difference <= (AGREEMENT * self.largest).max(self.differences_resolve)
+            && self.differences_resolve <= AGREEMENT * self.largest.max(AGREEMENT)
+    }
+
     /// Whether every multiplier is inside the unit circle.
     pub fn is_stable(&self) -> bool {
         self.largest < 1.0
     }
 }
 
-fn section(x: &State) -> Section {
+pub(super) fn section(x: &State) -> Section {
     Section::from_column_slice(&x.as_slice()[1..])
 }
 
-fn with_section(x: &State, section: &Section) -> State {
+pub(super) fn with_section(x: &State, section: &Section) -> State {
     State::from_fn(|i, _| if i == 0 { x[0] } else { section[i - 1] })
 }
 
 fn section_matrix(derivative: &StateMatrix) -> SectionMatrix {
-    derivative.fixed_view::<17, 17>(1, 1).into_owned()
+    derivative.fixed_view::<SECTION, SECTION>(1, 1).into_owned()
 }
 
 /// Fixed point of the map near a state, by Newton's method (so that an unstable one is found too); the state itself
@@ -107,24 +120,9 @@ fn fixed_point(walker: &HybridWalker<'_>, start: &State) -> Result<State, Fall> 
     if smallest.is_finite() { Ok(best) } else { walker.after_stride(start).map(|_| best) }
 }
 
-/// Derivative of the map by central differences of simulated strides.
-fn by_differences(walker: &HybridWalker<'_>, x: &State) -> Result<SectionMatrix, Fall> {
-    let mut result = SectionMatrix::zeros();
-    for column in 0..17 {
-        let moved = |sign: f64| {
-            let mut from = *x;
-            from[column + 1] += sign * DIFFERENCE;
-            walker.after_stride(&from).map(|after| section(&after))
-        };
-        result.set_column(column, &((moved(1.0)? - moved(-1.0)?) / (2.0 * DIFFERENCE)));
-    }
-    Ok(result)
-}
-
 /// Eigenvalues, largest modulus first; `None` when the iteration does not end.
-fn multipliers(matrix: &SectionMatrix) -> Option<Vec<Multiplier>> {
-    let dynamic = DMatrix::from_column_slice(17, 17, matrix.as_slice());
-    let schur = Schur::try_new(dynamic, f64::EPSILON, SCHUR_ITERATIONS)?;
+fn multipliers(matrix: DMatrix<f64>) -> Option<Vec<Multiplier>> {
+    let schur = Schur::try_new(matrix, f64::EPSILON, SCHUR_ITERATIONS)?;
     let mut values: Vec<Multiplier> =
         schur.complex_eigenvalues().iter().map(|v| Multiplier { real: v.re, imaginary: v.im }).collect();
     values.sort_by(|a, b| b.modulus().total_cmp(&a.modulus()));
@@ -141,8 +139,13 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
         domain: "stride",
         reason: "the eigenvalues of the stride-to-stride map cannot be found".to_owned(),
     };
-    let multipliers_found = multipliers(&derivative).ok_or_else(no_eigenvalues)?;
-    let differences = multipliers(&by_differences(walker, &fixed)?).ok_or_else(no_eigenvalues)?;
+    let possible = possible_directions(&walker.controls[0], &fixed);
+    let on_possible = possible.transpose() * derivative * &possible;
+    let multipliers_found = multipliers(on_possible).ok_or_else(no_eigenvalues)?;
+    let ByDifferences { finest, coarser } = by_differences(walker, &fixed)?;
+    let largest = |matrix| multipliers(matrix).map(|found| found.first().map_or(0.0, Multiplier::modulus));
+    let by_differences = largest(finest).ok_or_else(no_eigenvalues)?;
+    let less_fine = largest(coarser).ok_or_else(no_eigenvalues)?;
     // Velocities in proportion keep contacts and virtual constraints: the direction of the zero dynamics.
     let (_, qd) = split(&fixed);
     let faster = Section::from_fn(|i, _| if i < 8 { 0.0 } else { qd[i - 8] });
@@ -155,7 +158,8 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
             fixed_point_residual: residual(&fixed)?,
             fixed_point_distance: (section(&fixed) - section(start)).amax(),
             largest: multipliers_found.first().map_or(0.0, Multiplier::modulus),
-            largest_by_differences: differences.first().map_or(0.0, Multiplier::modulus),
+            largest_by_differences: by_differences,
+            differences_resolve: (by_differences - less_fine).abs(),
             multipliers: multipliers_found,
             zero_dynamics,
             zero_dynamics_leak: (carried - faster * zero_dynamics).norm() / faster.norm(),

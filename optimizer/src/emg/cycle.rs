@@ -72,6 +72,16 @@ impl CycleActivity {
         Ok(Self { mean: divided(&self.mean), standard_deviation: divided(&self.standard_deviation), ..self.clone() })
     }
 
+    /// The same channel of another gait.
+    pub(super) fn same_channel<'a>(&self, gait: &'a [Self]) -> Result<&'a Self, ModelError> {
+        let same = gait.iter().find(|activity| activity.channel == self.channel);
+        same.ok_or_else(|| ModelError::Unknown {
+            field: "channel".to_owned(),
+            value: self.channel.clone(),
+            known: gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
     /// Mean over the cycle.
     pub fn average(&self) -> f64 {
         self.mean.iter().sum::<f64>() / self.mean.len() as f64
@@ -96,12 +106,7 @@ pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Res
     let parts: Vec<f64> = normal_walking
         .iter()
         .map(|normal| {
-            let same = gait.iter().find(|activity| activity.channel == normal.channel);
-            let activity = same.ok_or_else(|| ModelError::Unknown {
-                field: "channel".to_owned(),
-                value: normal.channel.clone(),
-                known: gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", "),
-            })?;
+            let activity = normal.same_channel(gait)?;
             let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
             Ok((squares / normal.mean.len() as f64).sqrt())
         })

@@ -1,11 +1,11 @@
 //! Raw signals as recorded.
 
-use super::{EmgSettings, Envelope};
+use super::{CycleActivity, EmgSettings, Envelope};
 use crate::filter::{self, band_pass, low_pass};
 use crate::opensim::StorageFile;
 use crate::reference::{contacts, given};
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, malformed};
+use crate::table::{Clock, Separator, Table};
 
 /// Sampling rates that are accepted where a file has no time, Hz.
 const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
@@ -35,7 +35,7 @@ impl EmgRecording {
         let lines: Vec<&str> = text.lines().collect();
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, clock)?;
-        Self::from_table(what, &table, comments + 1)
+        Self::from_table(&table)
     }
 
     /// Columns of an OpenSim motion or storage file (.mot, .sto), evenly sampled.
@@ -43,16 +43,15 @@ impl EmgRecording {
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_opensim(what: &str, text: &str) -> Result<Self, ModelError> {
-        let file = StorageFile::read(what, text)?;
-        Self::from_table(what, &file.table, file.first_line())
+        Self::from_table(&StorageFile::read(what, text)?.table)
     }
 
-    fn from_table(what: &str, table: &Table, first_line: usize) -> Result<Self, ModelError> {
-        let rate_hz = table.even_rate_hz(first_line)?;
+    fn from_table(table: &Table) -> Result<Self, ModelError> {
+        let rate_hz = table.even_rate_hz()?;
         let channels: Vec<(String, Vec<f64>)> =
             table.names().iter().filter_map(|name| Some((name.clone(), table.find(name)?))).collect();
         if channels.is_empty() {
-            return Err(malformed(what, first_line, None, "there is no channel beside the time".to_owned()));
+            return Err(table.malformed_names("there is no channel beside the time".to_owned()));
         }
         Ok(Self { start_s: table.times()[0], rate_hz, channels })
     }
@@ -113,6 +112,14 @@ impl EmgRecording {
     /// [`ModelError`] when they are not in order or not within the recording.
     pub fn check_strikes(&self, what: &str, heel_strikes_s: &[f64]) -> Result<(), ModelError> {
         given(what, heel_strikes_s, self.start_s, self.end_s())
+    }
+
+    /// The mean cycle of every channel, cut at heel strikes (s).
+    ///
+    /// # Errors
+    /// As [`Self::envelopes`] and [`CycleActivity::cut`].
+    pub fn cycles(&self, heel_strikes_s: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
+        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::cut(envelope, heel_strikes_s)).collect()
     }
 
     /// The envelope of every channel.

@@ -19,10 +19,25 @@ pub struct Recording {
     pub angles_rad: Vec<[f64; 5]>,
     /// Right knee, where it was recorded, rad: for finding heel strikes.
     pub knee_r_rad: Option<Vec<f64>>,
-    /// Vertical force under the right foot, where it was recorded, N.
-    pub right_force_n: Option<Vec<f64>>,
+    /// Vertical force under the right foot, where it was recorded.
+    pub right_force: Option<VerticalForce>,
     /// What was done, step by step.
     pub steps: Vec<String>,
+}
+
+/// A vertical force over its own times: force plates are often sampled more densely than markers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VerticalForce {
+    /// s.
+    pub time_s: Vec<f64>,
+    /// N.
+    pub force_n: Vec<f64>,
+}
+
+impl VerticalForce {
+    fn of(table: &Table, column: &str) -> Result<Self, ModelError> {
+        Ok(Self { time_s: table.times(), force_n: table.column(column)? })
+    }
 }
 
 impl Recording {
@@ -42,6 +57,18 @@ impl Recording {
         let table = file.table;
         let mut steps = vec![format!("{what}: OpenSim motion file, {} rows, angles in {unit:?}", table.len())];
         Self::from_opensim_columns(what, &table, unit.in_radians(), force_column, &mut steps)
+    }
+
+    /// The recording with the vertical force under the right foot from an OpenSim file of its own, as `subject01_grf.mot`;
+    /// both files have one clock.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn with_force_file(mut self, what: &str, text: &str, column: &str) -> Result<Self, ModelError> {
+        let table = StorageFile::read(what, text)?.table;
+        self.right_force = Some(VerticalForce::of(&table, column)?);
+        self.steps.push(format!("{what}: {} rows, {column} is the force under the right foot", table.len()));
+        Ok(self)
     }
 
     /// A table exported from the data set of Camargo et al. 2021 (J Biomech 119:110320): the `data` table of a trial's
@@ -76,8 +103,8 @@ impl Recording {
         for column in columns {
             angles.push(column?);
         }
-        let (knee, force) = (table.find("knee_R_rad"), table.find("right_force_n"));
-        Self::whole(what, &table, &angles, knee, force, steps)
+        let force = table.find("right_force_n").map(|force_n| VerticalForce { time_s: table.times(), force_n });
+        Self::whole(what, &table, &angles, table.find("knee_R_rad"), force, steps)
     }
 
     /// OpenSim's gait models: pelvis_tilt and lumbar_extension backward, knee_angle negative in flexion, hips from the
@@ -111,7 +138,7 @@ impl Recording {
             from_trunk(&angle("hip_flexion_r")?),
         ];
         let knee = table.find("knee_angle_r").map(|c| c.into_iter().map(|v| -v * scale).collect());
-        let force = force_column.map(|name| table.column(name)).transpose()?;
+        let force = force_column.map(|name| VerticalForce::of(table, name)).transpose()?;
         Self::whole(what, table, &angles, knee, force, std::mem::take(steps))
     }
 
@@ -120,20 +147,17 @@ impl Recording {
         table: &Table,
         angles: &[Vec<f64>],
         knee_r_rad: Option<Vec<f64>>,
-        right_force_n: Option<Vec<f64>>,
+        right_force: Option<VerticalForce>,
         steps: Vec<String>,
     ) -> Result<Self, ModelError> {
         for (column, name) in angles.iter().zip(super::REFERENCE_COLUMNS) {
             if let Some(row) = column.iter().position(|a| a.abs() > LARGEST_ANGLE_RAD) {
-                let reason = format!(
-                    "{name} is {:.1} rad in row {}: beyond {LARGEST_ANGLE_RAD:.2} rad; is the unit right?",
-                    column[row],
-                    row + 1
-                );
-                return Err(ModelError::Malformed { what: what.to_owned(), reason });
+                let angle = column[row];
+                let reason = format!("{name} is {angle:.1} rad, beyond {LARGEST_ANGLE_RAD:.2} rad; is the unit right?");
+                return Err(table.malformed_row(row, None, reason));
             }
         }
         let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
-        Ok(Self { what: what.to_owned(), time_s: table.times(), angles_rad, knee_r_rad, right_force_n, steps })
+        Ok(Self { what: what.to_owned(), time_s: table.times(), angles_rad, knee_r_rad, right_force, steps })
     }
 }

@@ -93,12 +93,12 @@ impl Recording {
                 times.clone()
             }
             HeelStrikes::Force => {
-                let force = self.right_force_n.as_ref();
-                contacts(
-                    &self.time_s,
-                    force.ok_or_else(|| malformed("no force under the right foot was recorded".to_owned()))?,
-                    CONTACT_FORCE_N,
-                )
+                let none = || malformed("no force under the right foot was recorded".to_owned());
+                let force = self.right_force.as_ref().ok_or_else(none)?;
+                let mut strikes = contacts(&force.time_s, &force.force_n, CONTACT_FORCE_N);
+                let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
+                strikes.retain(|time| (first..=last).contains(time));
+                strikes
             }
             HeelStrikes::Kinematics => {
                 let knee = self.knee_r_rad.as_ref();

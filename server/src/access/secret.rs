@@ -5,7 +5,6 @@ use argon2::Argon2;
 use argon2::password_hash::phc::PasswordHash;
 use argon2::password_hash::{PasswordHasher as _, PasswordVerifier as _};
 use sha2::{Digest, Sha256};
-use std::fmt::Write;
 use tokio::sync::Semaphore;
 
 /// Shortest password.
@@ -18,12 +17,12 @@ pub const SHORTEST_PASSWORD: usize = 10;
 pub fn fresh() -> Result<String, Error> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes).map_err(|e| Error::Internal(format!("no random numbers: {e}")))?;
-    Ok(hexadecimal(&bytes))
+    Ok(hex::encode(bytes))
 }
 
 /// What is stored of a random secret. It has too many bits to be guessed, so a fast hash is enough.
 pub fn hash(secret: &str) -> String {
-    hexadecimal(&Sha256::digest(secret.as_bytes()))
+    hex::encode(Sha256::digest(secret.as_bytes()))
 }
 
 /// Each takes a core and 19 MiB: whoever asks for many waits.
@@ -66,15 +65,6 @@ pub fn is_password(password: &str, stored: Option<&str>) -> bool {
     // As much work as a real comparison: the time says nothing about who exists.
     let _ = Argon2::default().hash_password_with_salt(password.as_bytes(), b"nobody is there!");
     false
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing to a String cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
 }
 
 #[cfg(test)]

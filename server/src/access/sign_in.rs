@@ -6,10 +6,14 @@ use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::users::{self, User};
 use crate::store::{Connection, Writer, now, sessions, tokens};
+use serde::Serialize;
 use serde_json::json;
 
 /// An instant at which the person did something is written at most this often.
 const SEEN_EVERY_SECONDS: f64 = 60.0;
+
+/// For so long after coming in by a one-time link a password can be set without the present one, which may be forgotten.
+const LINK_IS_FRESH_SECONDS: f64 = 3600.0;
 
 /// Signs in with a one-time link: the user and the secret of the session.
 ///
@@ -24,7 +28,7 @@ pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String)
         return Err(refused());
     }
     sessions::use_link(writer, &hash).await?;
-    let secret = begin(writer, &user, "link").await?;
+    let secret = begin(writer, &user, By::Link).await?;
     Ok((user, secret))
 }
 
@@ -33,12 +37,20 @@ pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String)
 /// # Errors
 /// What the database reports.
 pub async fn with_password(writer: &mut Writer, user: &User) -> Result<String, Error> {
-    begin(writer, user, "password").await
+    begin(writer, user, By::Password).await
 }
 
-async fn begin(writer: &mut Writer, user: &User, by: &str) -> Result<String, Error> {
+/// What somebody came in by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum By {
+    Link,
+    Password,
+}
+
+async fn begin(writer: &mut Writer, user: &User, by: By) -> Result<String, Error> {
     let secret = secret::fresh()?;
-    sessions::begin(writer, &secret::hash(&secret), user.id).await?;
+    sessions::begin(writer, &secret::hash(&secret), user.id, by == By::Link).await?;
     let actor = Caller::person(user.id, &user.name, user.role).actor;
     audit::append(writer, &actor, "session.begin", &format!("user {}", user.id), &json!({ "by": by })).await?;
     Ok(secret)
@@ -50,8 +62,25 @@ async fn begin(writer: &mut Writer, user: &User, by: &str) -> Result<String, Err
 /// What the database reports.
 pub async fn renew(writer: &mut Writer, user: &User) -> Result<String, Error> {
     let secret = secret::fresh()?;
-    sessions::begin(writer, &secret::hash(&secret), user.id).await?;
+    sessions::begin(writer, &secret::hash(&secret), user.id, false).await?;
     Ok(secret)
+}
+
+/// Whether a user must say the present password to set another one: unless there is none, or a one-time link has just let
+/// the user in.
+///
+/// # Errors
+/// What the database reports.
+pub async fn must_say_password(db: &mut Connection, user: &User, session: Option<&str>) -> Result<bool, Error> {
+    if !user.has_password {
+        return Ok(false);
+    }
+    let Some(session) = session else { return Ok(true) };
+    let found = sessions::find(db, &secret::hash(session)).await?;
+    let by_fresh_link = found.filter(|session| {
+        session.by_link && session.user == user.id && now().seconds_since(session.begun_at) <= LINK_IS_FRESH_SECONDS
+    });
+    Ok(by_fresh_link.is_none())
 }
 
 /// Notes a failed attempt with a password.

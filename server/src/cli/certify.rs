@@ -42,9 +42,10 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (by differences {:.4e}), zero dynamics {:.4e}: {}",
+            "  largest multiplier {:.4e} (by differences {:.4e}, to {:.0e}), zero dynamics {:.4e}: {}",
             map.largest,
             map.largest_by_differences,
+            map.differences_resolve,
             map.zero_dynamics,
             if map.is_stable() { "stable" } else { "unstable" }
         ));

@@ -4,6 +4,7 @@ mod body;
 mod certify;
 mod config;
 mod convert;
+mod emg;
 mod gait_file;
 mod logging;
 mod numbers;
@@ -75,6 +76,8 @@ enum Command {
     Convert(convert::Convert),
     /// Make a reference gait from a recording.
     Reference(reference::Reference),
+    /// Process an electromyogram: envelopes, mean cycles, EMG RMSE, average activation.
+    Emg(emg::Emg),
     /// Check the audit trail.
     Audit(record::Audit),
     /// Show the settings of the service.
@@ -123,6 +126,7 @@ pub fn run() -> ExitCode {
         Command::Sweep(sweep) => runtime.block_on(sweep.run()),
         Command::Certify(certify) => runtime.block_on(certify.run()).map(|()| Ended::Done),
         Command::Reference(reference) => reference.run().map(|()| Ended::Done),
+        Command::Emg(emg) => emg.run().map(|()| Ended::Done),
         Command::Convert(convert) => convert.run().map(|()| Ended::Done),
         Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
         Command::Config(config) => config.run().map(|()| Ended::Done),

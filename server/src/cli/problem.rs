@@ -52,15 +52,16 @@ impl ProblemFiles {
     }
 
     pub(super) fn reference(&self) -> Result<ReferenceGait, Error> {
-        Ok(match &self.reference {
-            Some(path) => {
-                let reference: ReferenceGait = read_document(path, "a reference gait")?;
-                reference.validate()?;
-                reference
-            }
-            None => ReferenceGait::builtin()?,
-        })
+        reference_of(self.reference.as_deref())
     }
+}
+
+/// The reference gait of a file, or the built-in one.
+pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> {
+    let Some(path) = path else { return Ok(ReferenceGait::builtin()?) };
+    let reference: ReferenceGait = read_document(path, "a reference gait")?;
+    reference.validate()?;
+    Ok(reference)
 }
 
 #[derive(Debug, Clone, Args)]

@@ -6,7 +6,7 @@ use super::problem::read;
 use crate::error::Error;
 use crate::studies::recording::{Form, NewReferenceGait, Strikes, Unit};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct Reference {
@@ -22,9 +22,12 @@ pub(super) struct Reference {
     /// Unit of an OpenSim file whose header does not say it.
     #[arg(long, value_enum)]
     unit: Option<Unit>,
-    /// Column of the vertical force under the right foot in an OpenSim file.
+    /// Column of the vertical force under the right foot in an OpenSim file; default with --forces: ground_force_vy.
     #[arg(long, value_name = "NAME")]
     force_column: Option<String>,
+    /// The OpenSim file with this column, where it is not the recording itself; both have one clock.
+    #[arg(long, value_name = "FILE")]
+    forces: Option<PathBuf>,
     /// How right heel strikes are found.
     #[arg(long, value_enum, default_value = "kinematics", conflicts_with = "heel_strikes_s")]
     strikes: Strikes,
@@ -50,13 +53,16 @@ impl Reference {
             recording: read(&self.recording)?,
             unit: self.unit,
             force_column: self.force_column,
+            forces: self.forces.as_deref().map(read).transpose()?,
             strikes: self.strikes,
             heel_strikes_s: self.heel_strikes_s,
             height_m: self.height_m,
             body_mass_kg: self.mass_kg,
         };
         let reference = new.definition(&self.recording.display().to_string())?;
-        let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.recording])).transpose()?;
+        let inputs: Vec<&Path> =
+            [Some(&self.recording), self.forces.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
         let json = serde_json::to_string_pretty(&reference).map_err(|e| Error::Internal(e.to_string()))?;
         tell(&reference.provenance);
         match out {

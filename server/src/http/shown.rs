@@ -4,7 +4,8 @@ use super::AppState;
 use super::extract::Id;
 use crate::error::Error;
 use crate::store::{
-    Connection, FeedbackId, LabSessionId, StoreResult, StudyId, TrialId, consents, feedback, lab_sessions, trials,
+    Connection, FeedbackId, LabRecordingId, LabSessionId, StoreResult, StudyId, TrialId, consents, feedback,
+    lab_recordings, lab_sessions, trials,
 };
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
@@ -43,6 +44,12 @@ impl OfStudy for FeedbackId {
 impl OfStudy for LabSessionId {
     async fn study(self, db: &mut Connection) -> StoreResult<StudyId> {
         Ok(lab_sessions::get(db, self).await?.study_id)
+    }
+}
+
+impl OfStudy for LabRecordingId {
+    async fn study(self, db: &mut Connection) -> StoreResult<StudyId> {
+        lab_recordings::get(db, self).await?.session_id.study(db).await
     }
 }
 

@@ -5,7 +5,6 @@ use axum::extract::Path;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use rust_embed::Embed;
-use std::fmt::Write;
 
 #[derive(Embed)]
 #[folder = "../web/static"]
@@ -14,12 +13,7 @@ struct Files;
 /// `GET /static/{path}`: revalidated by content hash, so that a new version is seen at once.
 pub(super) async fn get(Path(path): Path<String>, headers: HeaderMap) -> Result<Response, Error> {
     let file = Files::get(&path).ok_or_else(|| Error::NotFound { what: "file".to_owned(), id: path })?;
-    let mut tag = String::from("\"");
-    for byte in &file.metadata.sha256_hash()[..16] {
-        // Writing to a String cannot fail.
-        let _ = write!(tag, "{byte:02x}");
-    }
-    tag.push('"');
+    let tag = format!("\"{}\"", hex::encode(&file.metadata.sha256_hash()[..16]));
     let known = headers.get(header::IF_NONE_MATCH).is_some_and(|value| value.as_bytes() == tag.as_bytes());
     if known {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());

@@ -9,19 +9,22 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
 use std::collections::{BTreeMap, HashMap};
 
-/// Format of the file.
-const FORMAT: &str = "gaitwright study 1";
+/// Format of the files that are written: as 1, and certificates with the version of their examination.
+const FORMAT: &str = "gaitwright study 2";
+/// Formats that are read.
+const READ: [&str; 2] = ["gaitwright study 1", FORMAT];
 /// Largest archive that is read, uncompressed.
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 18] = [
+const TABLES: [(&str, &str); 19] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
     ("studies", "id = ?"),
     ("trials", "study_id = ? order by number"),
     ("gaits", "trial_id in (select id from trials where study_id = ?)"),
+    ("certificates", "trial_id in (select id from trials where study_id = ?) order by trial_id, format_version"),
     ("jobs", "trial_id in (select id from trials where study_id = ?)"),
     ("results", "trial_id in (select id from trials where study_id = ?)"),
     ("feedback", "study_id = ? order by seq"),
@@ -83,8 +86,8 @@ pub fn open(file: &[u8]) -> StoreResult<Archive> {
     let end = file.iter().take(1000).position(|byte| *byte == b'\n').ok_or_else(|| damaged("it has no first line"))?;
     let (head, body) = (&file[..end], &file[end + 1..]);
     let head: Head = serde_json::from_slice(head).map_err(|_| damaged("its first line is not that of an archive"))?;
-    if head.format != FORMAT {
-        return Err(damaged(&format!("its format is {:?}, this program reads {FORMAT:?}", head.format)));
+    if !READ.contains(&head.format.as_str()) {
+        return Err(damaged(&format!("its format is {:?}, this program reads {}", head.format, READ.join(", "))));
     }
     if json::sha256(body) != head.sha256 {
         return Err(damaged("its content is not what its first line says: it was changed or cut off"));
@@ -250,7 +253,7 @@ fn to_json(row: &SqliteRow) -> StoreResult<Map<String, Value>> {
             _ if raw.is_null() => Value::Null,
             "INTEGER" | "BOOLEAN" => row.try_get::<i64, _>(index)?.into(),
             "REAL" => row.try_get::<f64, _>(index)?.into(),
-            "BLOB" => json!({ "hexadecimal": json::hexadecimal(row.try_get(index)?) }),
+            "BLOB" => json!({ "hexadecimal": hex::encode(row.try_get::<&[u8], _>(index)?) }),
             _ => row.try_get::<String, _>(index)?.into(),
         };
         object.insert(column.name().to_owned(), value);
@@ -261,13 +264,5 @@ fn to_json(row: &SqliteRow) -> StoreResult<Map<String, Value>> {
 fn bytes_of(object: &Map<String, Value>) -> StoreResult<Vec<u8>> {
     let damaged = || StoreError::Damaged { what: "archive", reason: "a value is no hexadecimal text".to_owned() };
     let text = object.get("hexadecimal").and_then(Value::as_str).ok_or_else(damaged)?;
-    let half = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
-    let pairs = text.as_bytes().chunks(2);
-    pairs
-        .map(|pair| match pair {
-            [high, low] => Some(half(*high)? << 4 | half(*low)?),
-            _ => None,
-        })
-        .collect::<Option<Vec<u8>>>()
-        .ok_or_else(damaged)
+    hex::decode(text).map_err(|_| damaged())
 }

@@ -19,6 +19,7 @@ pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
 /// # Errors
 /// As [`of_store`].
 pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
+    let _turn = store.copying.lock().await;
     let to = free_name(store.path(), "backup");
     of_store(store, &to).await?;
     let size = std::fs::metadata(&to).map_err(|source| StoreError::Open { path: to.clone(), source })?.len();

@@ -43,10 +43,5 @@ pub(super) fn decompress(what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8
 }
 
 pub(super) fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
-}
-
-pub(super) fn hexadecimal(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]).map(|half| char::from(DIGITS[usize::from(half)])).collect()
+    hex::encode(Sha256::digest(bytes))
 }

@@ -4,8 +4,8 @@ use super::audit::Actor;
 use super::{Connection, EmgResultId, Instant, LabRecordingId, LabSessionId, StoreError, StoreResult, json, now};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
@@ -120,19 +120,30 @@ pub async fn insert(
     Ok(added)
 }
 
+/// All but the file itself.
+const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, created_at from lab_recordings";
+
+/// The recording with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: LabRecordingId) -> StoreResult<LabRecording> {
+    let sql = AssertSqlSafe(format!("{SELECT} where id = ?"));
+    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| missing(id))
+}
+
 /// Every recording of a session, oldest first.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<LabRecording>> {
-    let rows = sqlx::query(
-        "select id, session_id, walk, kind, raw_sha256, actor, created_at from lab_recordings \
-         where session_id = ? order by id",
-    )
-    .bind(session)
-    .fetch_all(db)
-    .await?;
-    rows.iter().map(from_row).collect()
+    let sql = AssertSqlSafe(format!("{SELECT} where session_id = ? order by id"));
+    sqlx::query(sql).bind(session).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+fn missing(id: LabRecordingId) -> StoreError {
+    StoreError::Missing { what: "recording", id: id.to_string() }
 }
 
 /// The file of a recording, and how it is to be read.
@@ -144,7 +155,7 @@ pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) 
         .bind(id)
         .fetch_optional(db)
         .await?
-        .ok_or_else(|| StoreError::Missing { what: "recording", id: id.to_string() })?;
+        .ok_or_else(|| missing(id))?;
     let bytes = json::decompress("recording", row.try_get("raw")?)?;
     if json::sha256(&bytes) != row.try_get::<&str, _>("raw_sha256")? {
         return Err(StoreError::Damaged {

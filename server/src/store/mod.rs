@@ -54,6 +54,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::Mutex;
 use writing::Writing;
 
 /// A connection to read with. Sees one consistent state per statement.
@@ -68,6 +69,8 @@ pub struct Store {
     writing: Arc<Writing>,
     /// Where the file is, for messages.
     path: PathBuf,
+    /// Held while a copy is made beside the record: two that begin together take two names.
+    copying: Arc<Mutex<()>>,
     /// Held as long as any clone lives: a second process that opens the file for writing is refused.
     _owner: Arc<File>,
 }
@@ -105,7 +108,7 @@ impl Store {
         seals::watch(&mut connection).await?;
         let writing = Arc::new(Writing::new(connection));
         let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
-        let store = Self { readers, writing, path: path.to_owned(), _owner: Arc::new(owner) };
+        let store = Self { readers, writing, path: path.to_owned(), copying: Arc::default(), _owner: Arc::new(owner) };
         commit(store.write().await?).await?;
         Ok(store)
     }

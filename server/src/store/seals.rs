@@ -274,5 +274,5 @@ fn hash_of_row(row: &SqliteRow) -> StoreResult<String> {
         hash.update(format!("{name}\n{kind}\n{}\n", bytes.len()));
         hash.update(bytes);
     }
-    Ok(json::hexadecimal(&hash.finalize()))
+    Ok(hex::encode(hash.finalize()))
 }

@@ -2,12 +2,17 @@
 
 use super::{Connection, Instant, StoreResult, UserId, now};
 use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
 
 /// A session that was found by the hash of its secret.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Session {
     /// Whose.
     pub user: UserId,
+    /// When it was begun.
+    pub begun_at: Instant,
+    /// Whether with a one-time link.
+    pub by_link: bool,
     /// When the person last did something.
     pub seen_at: Instant,
 }
@@ -16,11 +21,12 @@ pub struct Session {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn begin(db: &mut Connection, hash: &str, user: UserId) -> StoreResult<()> {
+pub async fn begin(db: &mut Connection, hash: &str, user: UserId, by_link: bool) -> StoreResult<()> {
     let at = now();
-    sqlx::query("insert into sessions (hash, user_id, created_at, seen_at) values (?, ?, ?, ?)")
+    sqlx::query("insert into sessions (hash, user_id, by_link, created_at, seen_at) values (?, ?, ?, ?, ?)")
         .bind(hash)
         .bind(user)
+        .bind(by_link)
         .bind(at)
         .bind(at)
         .execute(db)
@@ -33,11 +39,20 @@ pub async fn begin(db: &mut Connection, hash: &str, user: UserId) -> StoreResult
 /// # Errors
 /// What the database reports.
 pub async fn find(db: &mut Connection, hash: &str) -> StoreResult<Option<Session>> {
-    let row = sqlx::query("select user_id, seen_at from sessions where hash = ? and ended_at is null")
-        .bind(hash)
-        .fetch_optional(db)
-        .await?;
-    row.map(|row| Ok(Session { user: row.try_get("user_id")?, seen_at: row.try_get("seen_at")? })).transpose()
+    let row =
+        sqlx::query("select user_id, created_at, by_link, seen_at from sessions where hash = ? and ended_at is null")
+            .bind(hash)
+            .fetch_optional(db)
+            .await?;
+    let session = |row: &SqliteRow| {
+        Ok(Session {
+            user: row.try_get("user_id")?,
+            begun_at: row.try_get("created_at")?,
+            by_link: row.try_get("by_link")?,
+            seen_at: row.try_get("seen_at")?,
+        })
+    };
+    row.as_ref().map(session).transpose()
 }
 
 /// Notes that the person did something.

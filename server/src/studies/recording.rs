@@ -14,6 +14,8 @@ use utoipa::ToSchema;
 
 /// Longest name, characters.
 const LONGEST_NAME: usize = 200;
+/// The right foot's force in the files of OpenSim's examples.
+const FORCE_COLUMN: &str = "ground_force_vy";
 /// Longest provenance: comments of a recording become part of it.
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
@@ -74,9 +76,13 @@ pub struct NewReferenceGait {
     /// Unit of an OpenSim file whose header does not say it.
     #[serde(default)]
     pub unit: Option<Unit>,
-    /// Column of the vertical force under the right foot in an OpenSim file.
+    /// Column of the vertical force under the right foot in an OpenSim file; by default `ground_force_vy` where `forces` is
+    /// given.
     #[serde(default)]
     pub force_column: Option<String>,
+    /// Text of the OpenSim file that has this column, where it is not the recording itself; both have one clock.
+    #[serde(default)]
+    pub forces: Option<String>,
     /// How right heel strikes are found where they are not given.
     #[serde(default)]
     pub strikes: Strikes,
@@ -101,10 +107,18 @@ impl NewReferenceGait {
         let recording = match self.form {
             Form::Opensim => {
                 let unit = self.unit.map(AngleUnit::from);
-                Recording::from_opensim(what, &self.recording, unit, self.force_column.as_deref())?
+                let here = self.force_column.as_deref().filter(|_| self.forces.is_none());
+                Recording::from_opensim(what, &self.recording, unit, here)?
             }
             Form::Camargo => Recording::from_camargo_csv(what, &self.recording)?,
             Form::Csv => Recording::from_csv(what, &self.recording)?,
+        };
+        let recording = match &self.forces {
+            Some(text) => {
+                let column = self.force_column.as_deref().unwrap_or(FORCE_COLUMN);
+                recording.with_force_file(&format!("{what}: forces"), text, column)?
+            }
+            None => recording,
         };
         let strikes = match self.strikes {
             _ if !self.heel_strikes_s.is_empty() => HeelStrikes::Given(self.heel_strikes_s.clone()),

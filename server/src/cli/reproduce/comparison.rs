@@ -19,10 +19,6 @@ impl Curve {
         })
     }
 
-    pub(super) fn of_reference(reference: &ReferenceGait) -> Self {
-        Self(reference.angles_rad.clone())
-    }
-
     fn sampled(at: impl Fn(f64) -> [f64; 5]) -> Self {
         Self((0..=100).map(|percent| at(f64::from(percent) / 100.0)).collect())
     }
@@ -45,7 +41,8 @@ pub(super) struct Outcome {
     pub(super) best_cost_of_transport: Option<f64>,
     pub(super) best_bounds: Option<String>,
     pub(super) curve: Option<Curve>,
-    pub(super) reference: Curve,
+    /// What Gait RMSE was measured by.
+    pub(super) reference: ReferenceGait,
 }
 
 /// Fills the iterations between milestones: a recommendation holds until the next one.
@@ -195,21 +192,24 @@ pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// Final joint angles, and the reference.
+/// Final joint angles, and the reference with its standard deviation where it has one.
 pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
     let columns = COORDINATES.map(|name| format!("{name}_rad")).join(",");
     let mut text = format!("subject,seed,muscles,percent,{columns}\n");
-    let mut rows = |who: &str, curve: &Curve| {
-        for (percent, angles) in curve.0.iter().enumerate() {
+    let mut rows = |who: &str, curve: &[[f64; 5]]| {
+        for (percent, angles) in curve.iter().enumerate() {
             let _ = writeln!(text, "{who},{percent},{}", angles.map(|a| a.to_string()).join(","));
         }
     };
     if let Some(first) = outcomes.first() {
-        rows("reference,,", &first.reference);
+        rows("reference,,", &first.reference.angles_rad);
+        if let Some(deviation) = &first.reference.standard_deviation_rad {
+            rows("reference standard deviation,,", deviation);
+        }
     }
     for outcome in outcomes {
         if let Some(curve) = &outcome.curve {
-            rows(&variant(outcome), curve);
+            rows(&variant(outcome), &curve.0);
         }
     }
     text
@@ -233,7 +233,7 @@ mod tests {
             best_cost_of_transport: Some(0.06),
             best_bounds: None,
             curve: None,
-            reference: Curve(Vec::new()),
+            reference: ReferenceGait::builtin().unwrap(),
         }
     }
 

@@ -7,10 +7,11 @@ use super::Ended;
 use super::numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
+use super::problem::reference_of;
 use super::unattended::{self, Lines};
 use crate::error::Error;
 use crate::store::studies::{self, Study, StudyState};
-use crate::store::{Store, commit, gaits};
+use crate::store::{Store, commit, gaits, reference_gaits};
 use crate::studies::catalogue;
 use crate::studies::choice::best_trial;
 use crate::studies::history;
@@ -18,7 +19,7 @@ use crate::studies::plan::{self, NewStudy};
 use crate::studies::standing::Standing;
 use clap::{Args, ValueEnum};
 use comparison::{Curve, Outcome};
-use gait_optimizer::Subject;
+use gait_optimizer::{ReferenceGait, Subject};
 use std::path::PathBuf;
 
 /// Subjects of the paper.
@@ -62,6 +63,9 @@ pub(super) struct Reproduce {
     /// How many seeds in a row: local optima can turn the comparison either way.
     #[arg(long, default_value = "3", value_name = "NUMBER", value_parser = seeds, allow_negative_numbers = true)]
     seeds: u64,
+    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
     /// Folder of record, report and tables; what is finished in it is not done again.
     #[arg(long, default_value = "reproduction", value_name = "FOLDER")]
     folder: PathBuf,
@@ -70,13 +74,14 @@ pub(super) struct Reproduce {
 impl Reproduce {
     /// Two studies per subject and seed, one trial at a time: reproducible bit for bit.
     pub(super) async fn run(self) -> Result<Ended, Error> {
+        let reference = reference_of(self.reference.as_deref())?;
         let cannot = |e: std::io::Error| Error::Malformed(format!("cannot make {}: {e}", self.folder.display()));
         std::fs::create_dir_all(&self.folder).map_err(cannot)?;
         let files = ["report.html", "iterations.csv", "studies.csv", "angles.csv"];
         let files: Vec<OutFile> =
             files.iter().map(|name| OutFile::open(&self.folder.join(name), &[])).collect::<Result<_, _>>()?;
         let store = Store::open(&self.folder.join("studies.db")).await?;
-        let outcomes = Box::pin(self.studies(&store)).await;
+        let outcomes = Box::pin(self.studies(&store, &reference)).await;
         store.close().await;
         let Some((outcomes, failures)) = outcomes? else {
             tell("interrupted; the same command goes on from there");
@@ -104,7 +109,11 @@ impl Reproduce {
 
     /// Every study in order, and in which of them trials failed for reasons of the program or the machine; none when
     /// somebody stopped it.
-    async fn studies(&self, store: &Store) -> Result<Option<(Vec<Outcome>, Vec<String>)>, Error> {
+    async fn studies(
+        &self,
+        store: &Store,
+        reference: &ReferenceGait,
+    ) -> Result<Option<(Vec<Outcome>, Vec<String>)>, Error> {
         let (mut outcomes, mut failures) = (Vec::new(), Vec::new());
         for seed in self.seed..self.seed + self.seeds {
             for &subject in self.subject.numbers() {
@@ -112,7 +121,7 @@ impl Reproduce {
                     let words = if muscles { "with" } else { "without" };
                     let title = format!("subject {subject}, {words} muscles, seed {seed}");
                     tell(&title);
-                    let (study, finished) = Box::pin(self.study(store, subject, muscles, seed)).await?;
+                    let (study, finished) = Box::pin(self.study(store, subject, muscles, seed, reference)).await?;
                     let standing = if finished {
                         Standing::read(&mut *store.read().await?, study).await?
                     } else {
@@ -127,7 +136,7 @@ impl Reproduce {
                         ran.standing
                     };
                     failures.extend(unattended::failure(&standing).map(|failure| format!("{title}: {failure}")));
-                    outcomes.push(outcome(store, subject, muscles, seed, &standing).await?);
+                    outcomes.push(outcome(store, subject, muscles, seed, &standing, reference).await?);
                 }
             }
         }
@@ -135,11 +144,26 @@ impl Reproduce {
     }
 
     /// The study of the folder, and whether it is finished.
-    async fn study(&self, store: &Store, subject: u32, muscles: bool, seed: u64) -> Result<(Study, bool), Error> {
+    async fn study(
+        &self,
+        store: &Store,
+        subject: u32,
+        muscles: bool,
+        seed: u64,
+        reference: &ReferenceGait,
+    ) -> Result<(Study, bool), Error> {
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
+        let reference = reference_gaits::ensure(&mut writer, reference).await?.0.id;
         let person = catalogue::subject_with(&mut writer, Subject::builtin(subject)?).await?;
-        let new = NewStudy { muscles, trial_budget: self.trials, seed, parallel_trials: 1, ..NewStudy::of(person.id) };
+        let new = NewStudy {
+            muscles,
+            trial_budget: self.trials,
+            seed,
+            parallel_trials: 1,
+            reference_gait_id: Some(reference),
+            ..NewStudy::of(person.id)
+        };
         let wanted = plan::checked(&mut writer, new.clone()).await?;
         // A folder holds at most two subjects, two variants and a hundred seeds of one number of trials.
         let known = studies::page(&mut writer, None, 1000).await?;
@@ -155,10 +179,16 @@ impl Reproduce {
 }
 
 /// What a study came to.
-async fn outcome(store: &Store, subject: u32, muscles: bool, seed: u64, standing: &Standing) -> Result<Outcome, Error> {
+async fn outcome(
+    store: &Store,
+    subject: u32,
+    muscles: bool,
+    seed: u64,
+    standing: &Standing,
+    reference: &ReferenceGait,
+) -> Result<Outcome, Error> {
     let milestones = history::of(standing).map_err(Error::Learner)?;
     let best = best_trial(standing).map_err(Error::Learner)?.and_then(|id| standing.trial(id));
-    let reference = gait_optimizer::ReferenceGait::builtin()?;
     let curve = match best {
         Some(trial) => Some(Curve::of(&gaits::get(&mut *store.read().await?, trial.id).await?)),
         None => None,
@@ -176,6 +206,6 @@ async fn outcome(store: &Store, subject: u32, muscles: bool, seed: u64, standing
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
         best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
         curve,
-        reference: Curve::of_reference(&reference),
+        reference: reference.clone(),
     })
 }

@@ -2,7 +2,7 @@
 
 use super::comparison::{COORDINATES, Outcome, Verdict, conclusion, verdicts};
 use crate::error::Error;
-use crate::plots::{Chart, Stroke};
+use crate::plots::{Chart, Stroke, band_in_words, over_reference};
 use askama::Template;
 
 /// The style sheet of the pages: the charts' colours and dashes are its classes.
@@ -15,6 +15,8 @@ struct Report<'a> {
     version: &'static str,
     trials: u32,
     conclusion: String,
+    /// Name of the reference, and what is to be known of its band.
+    reference: Option<(&'a str, &'static str)>,
     verdicts: Vec<Verdict>,
     outcomes: &'a [Outcome],
     charts: Vec<Drawn>,
@@ -44,6 +46,7 @@ pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
         version: env!("CARGO_PKG_VERSION"),
         trials,
         conclusion: conclusion(&verdicts),
+        reference: outcomes.first().map(|o| (o.reference.name.as_str(), band_in_words(&o.reference))),
         verdicts,
         outcomes,
         charts,
@@ -89,7 +92,7 @@ fn angle_chart(verdict: &Verdict, pair: &[&Outcome], coordinate: usize) -> Chart
     let points =
         |curve: &[[f64; 5]]| curve.iter().enumerate().map(|(i, a)| (i as f64, a[coordinate].to_degrees())).collect();
     if let Some(first) = pair.first() {
-        chart = chart.with("reference", 3, Stroke::Dashed, points(&first.reference.0));
+        chart = over_reference(chart, &first.reference, coordinate);
     }
     for outcome in pair {
         if let Some(curve) = &outcome.curve {

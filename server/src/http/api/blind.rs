@@ -109,13 +109,14 @@ async fn motion(
 ) -> Result<Json<Vec<Figure>>, Error> {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, &may.caller, token).await?;
-    // An error here must not say which trial it was.
-    let gait = gaits::get(&mut reader, side(&shown)).await.map_err(|error| {
+    let gait = gaits::get(&mut reader, side(&shown)).await;
+    drop(reader);
+    let motion = gait.map_err(Error::from).and_then(|gait| blind_motion(&gait));
+    // An error here must not say which trial it was, nor of which person or device.
+    motion.map(Json).map_err(|error| {
         tracing::error!(%error, "a gait cannot be shown to a rater");
         Error::NotFound { what: "the motion of the comparison".to_owned(), id: "with this token".to_owned() }
-    })?;
-    drop(reader);
-    Ok(Json(blind_motion(&gait)?))
+    })
 }
 
 /// `POST /blind/{token}/answer`.

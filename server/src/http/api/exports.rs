@@ -91,7 +91,7 @@ async fn leaving(app: &AppState, id: TrialId) -> Result<(Trial, Gait), Error> {
 }
 
 /// An answer that a browser saves under `name`.
-fn file(kind: &'static str, name: &str, text: String) -> Response {
+pub(super) fn file(kind: &'static str, name: &str, text: String) -> Response {
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),

@@ -1,5 +1,6 @@
 //! What is measured in the walks of a lab session.
 
+use super::exports;
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
@@ -7,12 +8,12 @@ use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
 use crate::http::shown::Shown;
-use crate::store::LabSessionId;
 use crate::store::lab_recordings::{self, LabRecording};
-use crate::studies::lab::{self, Checked, EmgView, LimitCycles, NewEmg, NewMotion};
+use crate::store::{LabRecordingId, LabSessionId};
+use crate::studies::lab::{self, Brought, Checked, EmgView, FileForm, LimitCycles, NewEmg, NewMotion};
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
 use serde::Deserialize;
@@ -33,6 +34,32 @@ pub(super) async fn list(
     Shown(id): Shown<LabSessionId>,
 ) -> Result<Json<Vec<LabRecording>>, Error> {
     Ok(Json(lab_recordings::of_session(&mut *app.read().await?, id).await?))
+}
+
+/// `GET /lab-recordings/{id}/file`: a file as it was brought, byte for byte. Its ETag is its SHA-256.
+#[utoipa::path(
+    get,
+    path = "/lab-recordings/{id}/file",
+    tag = "lab",
+    params(("id" = LabRecordingId, Path, description = "The recording")),
+    responses((status = 200, description = "The file; CSV, or an OpenSim file", body = String, content_type = "text/plain")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn file(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<LabRecordingId>,
+) -> Result<Response, Error> {
+    let Brought { recording, form, text } = lab::brought(&mut *app.read().await?, id).await?;
+    let (kind, ending) = match form {
+        FileForm::Csv => ("text/csv; charset=utf-8", "csv"),
+        FileForm::Opensim => ("text/plain; charset=utf-8", "sto"),
+    };
+    let name = format!("walk-{}-{}-{}.{ending}", recording.walk, recording.kind.as_str(), id.short());
+    let tag = HeaderValue::from_str(&format!("\"{}\"", recording.raw_sha256));
+    let mut answer = exports::file(kind, &name, text);
+    answer.headers_mut().insert(header::ETAG, tag.map_err(|e| Error::Internal(e.to_string()))?);
+    Ok(answer)
 }
 
 /// `POST /lab-sessions/{id}/electromyograms`: the electromyograms of a walk. A file that is not whole, or holds no

@@ -104,6 +104,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(lab_sessions::close))
         .routes(routes!(lab_sessions::unblind))
         .routes(routes!(lab_recordings::list))
+        .routes(routes!(lab_recordings::file))
         .routes(routes!(lab_recordings::electromyogram).layer(recordings()))
         .routes(routes!(lab_recordings::motion).layer(recordings()))
         .routes(routes!(lab_recordings::result, lab_recordings::process))

@@ -28,7 +28,8 @@ impl InWords {
         let mut figures = Vec::new();
         if let Some(map) = &certificate.return_map {
             figures.push(("Largest Poincaré multiplier", format!("{:.3e}", map.largest)));
-            figures.push(("The same by differences", format!("{:.3e}", map.largest_by_differences)));
+            let differences = format!("{:.3e} (to {:.0e})", map.largest_by_differences, map.differences_resolve);
+            figures.push(("The same by differences, and what they resolve", differences));
             figures.push(("Multiplier of the zero dynamics", format!("{:.3e}", map.zero_dynamics)));
             figures.push((
                 "From the gait to the periodic motion, rad, rad/s",

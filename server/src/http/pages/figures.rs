@@ -10,7 +10,7 @@ use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::{Chart, Figure, Stroke};
+use crate::plots::{Chart, Figure, Stroke, band_in_words};
 use crate::store::studies::Study;
 use crate::store::{
     Connection, LabSessionId, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials,
@@ -30,7 +30,7 @@ const OFFERED: u32 = 200;
 pub(crate) struct Section {
     id: &'static str,
     heading: &'static str,
-    hint: &'static str,
+    hint: String,
     figures: Vec<Figure>,
 }
 
@@ -134,20 +134,26 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
         Section {
             id: "course",
             heading: "Gait RMSE of the best action by iteration",
-            hint: "Figure 3b of the paper, with a study with muscles and one without.",
+            hint: "Figure 3b of the paper, with a study with muscles and one without.".to_owned(),
             figures: charts("course", vec![course]),
         },
         Section {
             id: "angles",
             heading: "Joint angles of the best gait",
-            hint: "Figure 3c: over the reference gait, with its standard deviation where it was recorded over several strides.",
+            hint: format!("Figure 3c: over the reference gait. {}", band_in_words(reference)),
             figures: charts("angles", gait_charts::beside_reference(&gaits, reference)),
         },
-        Section { id: "tiles", heading: "Gait tiles", hint: "Figure 4: the stride of the best gait.", figures: tiles },
+        Section {
+            id: "tiles",
+            heading: "Gait tiles",
+            hint: "Figure 4: the stride of the best gait.".to_owned(),
+            figures: tiles,
+        },
         Section {
             id: "orbits",
             heading: "Limit cycles of the best gait",
-            hint: "Figure 5: angle and velocity over the stride. What was measured lies over it in the lab sessions.",
+            hint: "Figure 5: angle and velocity over the stride. What was measured lies over it in the lab sessions."
+                .to_owned(),
             figures: charts("orbits", gait_charts::orbits(&gaits)),
         },
     ])

@@ -102,7 +102,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
 struct Group {
     id: &'static str,
     heading: &'static str,
-    hint: &'static str,
+    hint: String,
     charts: Vec<Drawn>,
 }
 

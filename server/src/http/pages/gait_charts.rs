@@ -3,7 +3,7 @@
 use super::drawn::Drawn;
 use crate::error::Error;
 use crate::http::gait_series::{MUSCLES, Point, points};
-use crate::plots::{Chart, Figure, Stroke};
+use crate::plots::{Chart, Figure, Stroke, band_in_words, over_reference};
 use gait_optimizer::solve::Phase;
 use gait_optimizer::walking::stick_figure::StickFigure;
 use gait_optimizer::walking::{Progress, progress};
@@ -37,14 +37,14 @@ const COORDINATES: [&str; 7] =
 pub(super) struct Group {
     pub(super) id: &'static str,
     pub(super) heading: &'static str,
-    pub(super) hint: &'static str,
+    pub(super) hint: String,
     pub(super) figures: Vec<Figure>,
 }
 
 impl Group {
-    fn new(id: &'static str, heading: &'static str, hint: &'static str, charts: Vec<Chart>) -> Self {
+    fn new(id: &'static str, heading: &'static str, hint: impl Into<String>, charts: Vec<Chart>) -> Self {
         let figures = charts.into_iter().map(|chart| Figure::chart(id, chart)).collect();
-        Self { id, heading, hint, figures }
+        Self { id, heading, hint: hint.into(), figures }
     }
 }
 
@@ -124,20 +124,19 @@ fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, Error> {
 }
 
 fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
-    let draw =
-        |&(title, q, column): &(&str, usize, usize)| {
-            let measured = reference.angles_rad.iter().enumerate().map(|(i, row)| (i as f64, row[column].to_degrees()));
-            let chart = Chart::new(title, CYCLE, "angle, °")
-                .with("reference", 7, Stroke::Dashed, measured.collect())
-                .with("this gait", 0, Stroke::Solid, cycle.over(|p| p.q[q].to_degrees()));
-            cycle.marked(chart)
-        };
+    let draw = |&(title, q, column): &(&str, usize, usize)| {
+        let chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);
+        cycle.marked(chart.with("this gait", 0, Stroke::Solid, cycle.over(|p| p.q[q].to_degrees())))
+    };
     let prosthesis = Chart::new("Prosthesis", CYCLE, "angle, °")
         .with("right knee", 0, Stroke::Solid, cycle.over(|p| p.q[7].to_degrees()))
         .with("right ankle", 1, Stroke::Dashed, cycle.over(|p| p.q[8].to_degrees()));
     let mut charts: Vec<Chart> = ANGLES.iter().map(draw).collect();
     charts.push(cycle.marked(prosthesis));
-    let hint = "Flexion, dorsiflexion and forward lean are positive. The prosthetic joints have no reference.";
+    let hint = format!(
+        "Flexion, dorsiflexion and forward lean are positive. {} The prosthetic joints have no reference.",
+        band_in_words(reference)
+    );
     Group::new("angles", "Joint angles", hint, charts)
 }
 
@@ -223,17 +222,7 @@ fn domain_starts(points: &[Point<'_>], end: f64) -> Vec<(f64, String)> {
 /// The human joint angles of gaits over a reference with its deviation: name and gait.
 pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
     let draw = |&(title, q, column): &(&str, usize, usize)| {
-        let mean = |row: usize| reference.angles_rad[row][column].to_degrees();
-        let rows = 0..reference.angles_rad.len();
-        let mut chart = Chart::new(title, CYCLE, "angle, °");
-        if let Some(deviation) = &reference.standard_deviation_rad {
-            let band = rows.clone().map(|row| {
-                let deviation = deviation[row][column].to_degrees();
-                (row as f64, mean(row) - deviation, mean(row) + deviation)
-            });
-            chart = chart.with_band("one standard deviation", 7, band.collect());
-        }
-        chart = chart.with("reference", 7, Stroke::Dashed, rows.map(|row| (row as f64, mean(row))).collect());
+        let mut chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);
         for (place, (name, gait)) in gaits.iter().enumerate() {
             let stroke = if place == 0 { Stroke::Solid } else { Stroke::Dashed };
             chart = chart.with(name, place, stroke, Cycle::of(gait).over(|p| p.q[q].to_degrees()));
@@ -265,9 +254,7 @@ pub(super) fn of_pair(a: &Gait, b: &Gait, reference: &ReferenceGait) -> Vec<Draw
         points.iter().map(|point| (100.0 * point.time_s / end, point.q[q].to_degrees())).collect()
     };
     let draw = |&(title, q, column): &(&str, usize, usize)| {
-        let measured = reference.angles_rad.iter().enumerate().map(|(i, row)| (i as f64, row[column].to_degrees()));
-        let chart = Chart::new(title, CYCLE, "angle, °")
-            .with("reference", 7, Stroke::Dashed, measured.collect())
+        let chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column)
             .with("gait A", 0, Stroke::Solid, line(a, q))
             .with("gait B", 1, Stroke::Dashed, line(b, q));
         Drawn::new(&chart, "")

@@ -25,7 +25,6 @@ struct RatePage {
     studies: Vec<(StudyId, String)>,
     nothing: bool,
     saved: Option<Saved>,
-    others: bool,
 }
 
 /// An answer as read back from the record.
@@ -54,8 +53,6 @@ pub(super) struct Before {
     nothing: bool,
     /// The pair that was just answered.
     saved: Option<String>,
-    #[serde(default)]
-    others: bool,
 }
 
 /// `GET /rate`: the studies that may ask for a comparison.
@@ -78,7 +75,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         // Names can say what is tuned: a rater sees the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
-    page(&RatePage { studies, nothing: before.nothing, saved, others: before.others })
+    page(&RatePage { studies, nothing: before.nothing, saved })
 }
 
 async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Saved>, Error> {
@@ -149,14 +146,12 @@ pub(super) async fn answer(
     let mut writer = app.write().await?;
     // The same form sent twice, by a double click or after a lost answer, is one answer.
     let before = blind::own(&mut writer, &may.caller, &token).await?.answer;
-    let mut others = "";
     if before != Some(form.answer) {
-        let (_, answered) = blind::answer(&mut writer, &may.caller, &token, &given).await?;
+        blind::answer(&mut writer, &may.caller, &token, &given).await?;
         commit(writer).await?;
         app.director.changed();
-        others = if answered.answered_by_others { "&others=true" } else { "" };
     }
-    Ok(Redirect::to(&format!("/rate?saved={token}{others}")))
+    Ok(Redirect::to(&format!("/rate?saved={token}")))
 }
 
 /// `POST /rate/pair/{token}/take-back`.

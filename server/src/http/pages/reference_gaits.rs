@@ -49,6 +49,7 @@ impl Fields {
                 other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
             },
             force_column: given(&self.force_column),
+            forces: None,
             strikes: self.strikes,
             heel_strikes_s: match given(&self.heel_strikes_s) {
                 None => Vec::new(),

@@ -6,6 +6,8 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Form;
 use crate::http::identify::{cookie, session_of};
+use crate::store::audit::Actor;
+use crate::store::users::User;
 use crate::store::{commit, users};
 use askama::Template;
 use axum::extract::{Path, State};
@@ -37,6 +39,8 @@ struct AccountPage {
     name: String,
     role: &'static str,
     shortest: usize,
+    /// Whether the present password is asked for.
+    must_say_password: bool,
     refused: Option<String>,
     saved: bool,
 }
@@ -115,50 +119,82 @@ pub(super) async fn out(
 }
 
 /// `GET /account`.
-pub(super) async fn account(State(app): State<AppState>, caller: Option<Caller>) -> Page {
+pub(super) async fn account(State(app): State<AppState>, caller: Option<Caller>, headers: HeaderMap) -> Page {
     if app.access.open && caller.as_ref().is_some_and(|caller| caller.user.is_none()) {
         return page(&NoAccountPage);
     }
-    page(&account_of(caller)?.0)
+    page(&account_of(&app, caller.as_ref(), &headers).await?.0)
 }
 
-fn account_of(caller: Option<Caller>) -> Result<(AccountPage, crate::store::UserId), Error> {
+async fn account_of(
+    app: &AppState,
+    caller: Option<&Caller>,
+    headers: &HeaderMap,
+) -> Result<(AccountPage, User, Actor), Error> {
     let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
-    let (Some(user), Some(role)) = (caller.user, caller.role) else {
-        return Err(Error::conflict("nobody is signed in here: there is no account"));
+    let id = caller.user.ok_or_else(|| Error::conflict("nobody is signed in here: there is no account"))?;
+    let mut reader = app.read().await?;
+    let user = users::get(&mut reader, id).await?;
+    let shown = AccountPage {
+        name: user.name.clone(),
+        role: user.role.as_str(),
+        shortest: secret::SHORTEST_PASSWORD,
+        must_say_password: sign_in::must_say_password(&mut reader, &user, session_of(headers)).await?,
+        refused: None,
+        saved: false,
     };
-    let (name, role) = (caller.name, role.as_str());
-    Ok((AccountPage { name, role, shortest: secret::SHORTEST_PASSWORD, refused: None, saved: false }, user))
+    Ok((shown, user, caller.actor.clone()))
 }
 
-/// A new password.
+/// A new password, and the present one where that is asked for.
 #[derive(Deserialize)]
 pub(super) struct NewPassword {
     password: String,
+    #[serde(default)]
+    present: String,
 }
 
 /// `POST /account`: sets the password, and ends every other session of the person.
 pub(super) async fn set_password(
     State(app): State<AppState>,
     caller: Option<Caller>,
+    headers: HeaderMap,
     Form(form): Form<NewPassword>,
 ) -> Result<Response, PageError> {
-    let actor = caller.as_ref().map(|caller| caller.actor.clone());
-    let (mut shown, user) = account_of(caller)?;
-    let hashed = secret::aside(move || secret::hash_password(&form.password)).await?;
-    let hashed = match (hashed, actor) {
-        (Ok(hashed), Some(actor)) => (hashed, actor),
-        (Err(Error::Invalid(field)), _) => {
+    let (mut shown, user, actor) = account_of(&app, caller.as_ref(), &headers).await?;
+    if shown.must_say_password && !is_present_password(&app, &user, form.present).await? {
+        shown.refused = Some("the present password is not right".to_owned());
+        return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
+    }
+    let hashed = match secret::aside(move || secret::hash_password(&form.password)).await? {
+        Err(Error::Invalid(field)) => {
             shown.refused = Some(field.message);
             return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
         }
-        (Err(other), _) => return Err(other.into()),
-        (Ok(_), None) => return Err(Error::NotSignedIn("sign in first".to_owned()).into()),
+        hashed => hashed?,
     };
     let mut writer = app.write().await?;
-    let user = people::set_password(&mut writer, &hashed.1, user, &hashed.0).await?;
+    let user = people::set_password(&mut writer, &actor, user.id, &hashed).await?;
     let session = sign_in::renew(&mut writer, &user).await?;
     commit(writer).await?;
-    shown.saved = true;
+    (shown.saved, shown.must_say_password) = (true, true);
     Ok(([(header::SET_COOKIE, cookie(Some(&session), app.access.secure)?)], page(&shown)?).into_response())
+}
+
+/// Whether somebody who is signed in knows the password, too. Guesses wait as they do at the door.
+async fn is_present_password(app: &AppState, user: &User, given: String) -> Result<bool, Error> {
+    if let Err(wait) = app.access.back_off.begin(&user.name, Instant::now()) {
+        return Err(Error::TooManyAttempts(wait.as_secs().max(1)));
+    }
+    let stored = user.password.clone();
+    let right = secret::aside(move || secret::is_password(&given, stored.as_deref())).await?;
+    if right {
+        app.access.back_off.succeeded(&user.name);
+        return Ok(true);
+    }
+    app.access.back_off.failed(&user.name, Instant::now());
+    let mut writer = app.write().await?;
+    sign_in::failed(&mut writer, &user.name).await?;
+    commit(writer).await?;
+    Ok(false)
 }

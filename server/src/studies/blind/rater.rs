@@ -10,7 +10,7 @@ use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
 use crate::store::{Connection, StudyId, TrialId, Writer, consents, events, studies};
-use crate::studies::answer;
+use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::standing::Standing;
 use serde::{Deserialize, Serialize};
@@ -33,22 +33,20 @@ pub struct RaterAnswer {
     pub note: String,
 }
 
-/// An answer as read back to the rater: nothing in it says which gaits they were.
+/// An answer as read back to the rater: nothing in it says which gaits they were, nor whether the pair was a control.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Answered {
     /// Number of the pair for this rater.
     pub number: u32,
     /// What was recorded.
     pub answer: Said,
-    /// Somebody else has answered this comparison too: both answers count.
-    pub answered_by_others: bool,
 }
 
 /// The pair that a study asks for, newest first, computed outside any transaction.
 async fn question(db: &mut Connection, study: StudyId) -> Result<(u64, Option<(TrialId, TrialId)>), Error> {
     let study = studies::get(db, study).await?;
     consents::may_be_shown(db, study.id).await?;
-    let seed = study.plan.seed;
+    let (study_id, seed) = (study.id, study.plan.seed);
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
         return Ok((seed, None));
     }
@@ -56,7 +54,8 @@ async fn question(db: &mut Connection, study: StudyId) -> Result<(u64, Option<(T
     let found = tokio::task::spawn_blocking(move || open_question(&standing))
         .await
         .map_err(|e| Error::Internal(e.to_string()))?;
-    Ok((seed, found.map_err(Error::Learner)?))
+    // What the learner says names bounds: it is logged, and the rater hears that the program failed.
+    Ok((seed, found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?))
 }
 
 /// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
@@ -142,18 +141,11 @@ pub async fn answer(
     if !presentations::answer(writer, shown.id, row).await? {
         return Err(Error::conflict("this pair was answered already"));
     }
-    let answered_by_others = match heard {
-        Some(id) => {
-            let row = feedback::get(writer, id).await?;
-            !answer::beside(writer, &row).await?.is_empty()
-        }
-        None => false,
-    };
     let payload = json!({ "feedback_id": heard, "presentation_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
     let detail = json!({ "study": shown.study_id, "number": shown.number, "answer": given.answer });
     audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
-    Ok((shown.study_id, Answered { number: shown.number, answer: given.answer, answered_by_others }))
+    Ok((shown.study_id, Answered { number: shown.number, answer: given.answer }))
 }
 
 /// Takes a rater's last answer back: what was said stays in the record, and counts no more.
@@ -167,13 +159,15 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
                    whoever runs the study";
         return Err(Error::conflict(why));
     }
-    if let Some(heard) = presentations::heard_of(writer, shown.id).await? {
-        crate::studies::answer::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back")
-            .await?;
+    if let Some(heard) = presentations::heard_of(writer, shown.id).await?
+        // Somebody else may have: a refusal would tell that the pair was no control.
+        && feedback::get(writer, heard).await?.retraction.is_none()
+    {
+        answering::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back").await?;
     }
     presentations::take_back(writer, shown.id).await?;
     note(writer, caller, &shown, "presentation.take_back").await?;
-    Ok(Answered { number: shown.number, answer: Said::Withdrawn, answered_by_others: false })
+    Ok(Answered { number: shown.number, answer: Said::Withdrawn })
 }
 
 /// Whether an answer stands that may go: the rater's last one, and not about safety.

@@ -1,7 +1,7 @@
 //! What was made of the recordings: muscle activity over the cycle, limit cycles; beside the model where the gait of a
 //! walk may be known.
 
-use super::recording::{EmgReading, MotionReading, aside};
+use super::recording::{EmgReading, MotionReading, WHAT, aside};
 use super::session::{gait_of, still_shown};
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
@@ -9,7 +9,7 @@ use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
 use crate::store::lab_sessions::{self, Act};
 use crate::store::{Connection, LabRecordingId, LabSessionId, StoreError, Writer, gaits};
 use gait_optimizer::Gait;
-use gait_optimizer::emg::{CycleActivity, EmgRecording, EmgRmse, EmgSettings, ModelActivity, emg_rmse, model_activity};
+use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
 use gait_optimizer::phase_portrait::PhasePortrait;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -68,40 +68,20 @@ pub async fn compute(db: &mut Connection, id: LabSessionId, settings: EmgSetting
         let mut walks: Vec<WalkActivity> = Vec::new();
         let mut normal: Vec<CycleActivity> = Vec::new();
         for (walk, recording_id, reading, text) in &files {
-            let (recording, strikes) = reading.read(text)?;
-            let measured = activities(&recording, &strikes, &settings)?;
-            if normal.is_empty() {
-                normal.clone_from(&measured);
-            }
-            let channels = normalised(&measured, &normal)?;
-            let emg_rmse = match walks.first() {
-                Some(first) => Some(emg_rmse(&channels, &first.channels)?),
-                None => None,
+            let (recording, strikes) = reading.read(WHAT, text)?;
+            let measured = recording.cycles(&strikes, &settings)?;
+            let activity = if walks.is_empty() {
+                normal = measured;
+                Activity::of_normal_walking(&normal)?
+            } else {
+                Activity::of_gait(&measured, &normal)?
             };
-            let averages = channels.iter().map(CycleActivity::average).collect();
+            let Activity { channels, averages, emg_rmse } = activity;
             walks.push(WalkActivity { walk: *walk, recording_id: *recording_id, channels, averages, emg_rmse });
         }
         Ok(EmgResult { settings, walks })
     })
     .await
-}
-
-fn activities(recording: &EmgRecording, strikes: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, Error> {
-    let envelopes = recording.envelopes(settings)?;
-    Ok(envelopes.iter().map(|envelope| CycleActivity::cut(envelope, strikes)).collect::<Result<_, _>>()?)
-}
-
-/// The channels of normal walking, in its order, in shares of its peaks.
-fn normalised(measured: &[CycleActivity], normal: &[CycleActivity]) -> Result<Vec<CycleActivity>, Error> {
-    normal
-        .iter()
-        .map(|normal| {
-            let same = measured.iter().find(|activity| activity.channel == normal.channel);
-            let missing =
-                || Error::conflict(format!("channel {} of walk 1 is missing in a later walk", normal.channel));
-            Ok(same.ok_or_else(missing)?.normalised_by(normal)?)
-        })
-        .collect()
 }
 
 /// Keeps what was made of a session's electromyograms.

@@ -11,7 +11,7 @@ mod session;
 pub use measured::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
 };
-pub use recording::{Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, keep};
+pub use recording::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, keep};
 pub use session::{
     Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
     gait_of, in_the_lab, plan, record_walk, still_open, unblind,

@@ -5,8 +5,9 @@ use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, PackedRecording, RecordingKind};
 use crate::store::lab_sessions::Act;
-use crate::store::{LabSessionId, Writer};
+use crate::store::{Connection, LabRecordingId, LabSessionId, Writer};
 use crate::studies::recording::Unit;
+use clap::ValueEnum;
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
 use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
@@ -15,11 +16,11 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// How a file is named in errors.
-const WHAT: &str = "recording";
+/// How a file that was brought is named in errors.
+pub(super) const WHAT: &str = "recording";
 
 /// Forms of files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FileForm {
     /// Comma-separated values, names in the first line that is no comment.
@@ -62,28 +63,28 @@ impl Default for EmgReading {
 }
 
 impl EmgReading {
-    /// The channels and the heel strikes of a file.
+    /// The channels and the heel strikes of a file, which is named `what` in errors.
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub fn read(&self, text: &str) -> Result<(EmgRecording, Vec<f64>), Error> {
+    pub fn read(&self, what: &str, text: &str) -> Result<(EmgRecording, Vec<f64>), Error> {
         if let Some(unknown) = self.channels.keys().find(|name| !CHANNELS.contains(&name.as_str())) {
             return Err(Error::invalid("reading.channels", unknown.as_str(), &CHANNELS.join(", ")));
         }
         let whole = match (self.form, self.rate_hz) {
-            (FileForm::Csv, rate_hz) => EmgRecording::from_csv(WHAT, text, rate_hz)?,
-            (FileForm::Opensim, None) => EmgRecording::from_opensim(WHAT, text)?,
+            (FileForm::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
+            (FileForm::Opensim, None) => EmgRecording::from_opensim(what, text)?,
             (FileForm::Opensim, Some(rate_hz)) => {
                 return Err(Error::invalid("reading.rate_hz", rate_hz, "nothing: an OpenSim file has its time"));
             }
         };
         let same = CHANNELS.map(|name| (name, name));
         let named = self.channels.iter().map(|(channel, column)| (channel.as_str(), column.as_str()));
-        let recording = if self.channels.is_empty() { whole.select(WHAT, same)? } else { whole.select(WHAT, named)? };
+        let recording = if self.channels.is_empty() { whole.select(what, same)? } else { whole.select(what, named)? };
         let strikes = match (&self.heel_strike_column, &self.heel_strikes_s[..]) {
-            (Some(column), []) => whole.strikes_of_column(WHAT, column, self.heel_strike_threshold)?,
+            (Some(column), []) => whole.strikes_of_column(what, column, self.heel_strike_threshold)?,
             (None, given @ [_, _, ..]) => {
-                whole.check_strikes(WHAT, given)?;
+                whole.check_strikes(what, given)?;
                 given.to_vec()
             }
             (_, given) => {
@@ -96,7 +97,7 @@ impl EmgReading {
 
     /// Checks that a file can be cut into strides, whatever it is filtered with later.
     fn check(&self, text: &str) -> Result<(), Error> {
-        let (recording, strikes) = self.read(text)?;
+        let (recording, strikes) = self.read(WHAT, text)?;
         for (channel, values) in recording.channels {
             let raw = Envelope { channel, start_s: recording.start_s, rate_hz: recording.rate_hz, values };
             CycleActivity::cut(&raw, &strikes)?;
@@ -215,6 +216,32 @@ pub(super) async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Error> + Send + 'static,
 ) -> Result<T, Error> {
     tokio::task::spawn_blocking(work).await.map_err(|e| Error::Internal(e.to_string()))?
+}
+
+/// A file as it was brought, byte for byte.
+#[derive(Debug)]
+pub struct Brought {
+    /// What is known of it.
+    pub recording: LabRecording,
+    /// Its form.
+    pub form: FileForm,
+    /// The file.
+    pub text: String,
+}
+
+/// A recording as it was brought.
+///
+/// # Errors
+/// [`Error::NotFound`], or that the file is not what its hash says.
+pub async fn brought(db: &mut Connection, id: LabRecordingId) -> Result<Brought, Error> {
+    /// What both kinds of recordings say of their reading.
+    #[derive(Deserialize)]
+    struct Reading {
+        form: FileForm,
+    }
+    let recording = lab_recordings::get(db, id).await?;
+    let (Reading { form }, text) = lab_recordings::file(db, id).await?;
+    Ok(Brought { recording, form, text })
 }
 
 /// Keeps a file with the walk that it is of.

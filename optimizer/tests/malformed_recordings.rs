@@ -1,0 +1,291 @@
+//! What each malformed recording gets: line, column and reason, word for word. `cargo test -p gait-optimizer --test
+//! malformed_recordings -- --nocapture` prints the table.
+
+#![allow(clippy::unwrap_used)]
+
+mod synthetic_recordings;
+
+use gait_optimizer::ModelError;
+use gait_optimizer::emg::EmgRecording;
+use gait_optimizer::phase_portrait::JointRecording;
+use gait_optimizer::reference::Recording;
+use synthetic_recordings::{camargo, electromyogram, opensim, own_table};
+
+/// A file that is wrong, and what it gets.
+type Case = (&'static str, String, &'static str);
+
+/// Holds the messages of a reader against a table, and prints it.
+fn check(kind: &str, read: impl Fn(&str) -> Option<ModelError>, cases: &[Case]) {
+    let mut other = Vec::new();
+    for (name, text, expected) in cases {
+        let message = read(text).map_or_else(|| "imported".to_owned(), |error| error.to_string());
+        println!("| {kind} | {name} | {message} |");
+        if message != *expected {
+            other.push((*name, message));
+        }
+    }
+    assert!(other.is_empty(), "{kind}: {other:#?}");
+}
+
+/// A whole file with the first `from` replaced by `to`.
+fn changed(whole: &str, from: &str, to: &str) -> String {
+    assert!(whole.contains(from), "{from}");
+    whole.replacen(from, to, 1)
+}
+
+/// The line with this number, from 1.
+fn line(text: &str, number: usize) -> String {
+    text.lines().nth(number - 1).unwrap().to_owned()
+}
+
+#[test]
+fn motion_files_of_opensim() {
+    let whole = opensim(2);
+    let read = |text: &str| Recording::from_opensim("walk.mot", text, None, Some("right_vy")).err();
+    assert_eq!(read(&whole), None);
+    let change = |from: &str, to: &str| changed(&whole, from, to);
+    let row = line(&whole, 11);
+    let cells: Vec<&str> = row.split('\t').collect();
+    let with = |column: usize, cell: &str| {
+        let mut cells = cells.clone();
+        cells[column - 1] = cell;
+        change(&row, &cells.join("\t"))
+    };
+    let names = "there are time, pelvis_tilt, hip_flexion_r, knee_angle_r, ankle_angle_r, hip_flexion_l";
+    let missing =
+        |name: &str, rest: &str| format!("walk.mot, line 7: column {name:?} is missing; {rest}").leak() as &str;
+    let cases = [
+        ("empty", String::new(), "walk.mot, line 1: there is no line \"endheader\""),
+        ("no endheader", change("endheader\n", ""), "walk.mot, line 227: there is no line \"endheader\""),
+        ("binary", "\u{0}\u{1}\u{2}PNG\n\u{3}".to_owned(), "walk.mot, line 2: there is no line \"endheader\""),
+        (
+            "header alone",
+            whole[..whole.find("time").unwrap()].to_owned(),
+            "walk.mot, line 7: the line of column names is missing",
+        ),
+        ("no unit", change("inDegrees=yes\n", ""), "walk.mot, line 5: the header has no inDegrees=yes or no"),
+        ("odd unit", change("inDegrees=yes", "inDegrees=grad"), "walk.mot, line 5: inDegrees=grad: expected yes or no"),
+        (
+            "wrong unit",
+            change("inDegrees=yes", "inDegrees=no"),
+            "walk.mot, line 8: torso_rad is 7.0 rad, beyond 3.14 rad; is the unit right?",
+        ),
+        ("cut in half", whole[..whole.len() / 2].to_owned(), "walk.mot, line 117: 7 cells, but 10 columns"),
+        (
+            "a row taken out",
+            change(&format!("{}\n", line(&whole, 50)), ""),
+            "walk.mot, line 3: nRows=221, but there are 220: the file is not whole",
+        ),
+        (
+            "number of columns",
+            change("nColumns=10", "nColumns=9"),
+            "walk.mot, line 4: nColumns=9, but there are 10: the file is not whole",
+        ),
+        (
+            "number of rows no number",
+            change("nRows=221", "nRows=many"),
+            "walk.mot, line 3: nRows=many, but there are 221: the file is not whole",
+        ),
+        (
+            "no column names",
+            change(&format!("{}\n", line(&whole, 7)), ""),
+            "walk.mot, line 7: the first column is \"0.0000\", expected \"time\"",
+        ),
+        (
+            "time not first",
+            change("time\t", "frame\t"),
+            "walk.mot, line 7: the first column is \"frame\", expected \"time\"",
+        ),
+        (
+            "a name twice",
+            change("hip_flexion_l", "hip_flexion_r"),
+            "walk.mot, line 7, column 6: \"hip_flexion_r\" is there twice",
+        ),
+        (
+            "knee missing",
+            change("knee_angle_l", "knee_l"),
+            missing("knee_angle_l", &format!("{names}, knee_l, ankle_angle_l, lumbar_extension, right_vy")),
+        ),
+        (
+            "force missing",
+            change("right_vy", "vy"),
+            missing("right_vy", &format!("{names}, knee_angle_l, ankle_angle_l, lumbar_extension, vy")),
+        ),
+        ("a word", with(2, "abc"), "walk.mot, line 11, column 2: pelvis_tilt = \"abc\" is not a number"),
+        ("not a number", with(5, "NaN"), "walk.mot, line 11, column 5: ankle_angle_r = \"NaN\" is not a number"),
+        ("infinity", with(10, "inf"), "walk.mot, line 11, column 10: right_vy = \"inf\" is not a number"),
+        ("decimal comma", with(3, "30,5"), "walk.mot, line 11, column 3: hip_flexion_r = \"30,5\" is not a number"),
+        ("a cell missing", change(&row, &cells[..9].join("\t")), "walk.mot, line 11: 9 cells, but 10 columns"),
+        ("a cell too many", change(&row, &format!("{row}\t1")), "walk.mot, line 11: 11 cells, but 10 columns"),
+        ("an empty line", change(&row, &format!("\n{row}")), "walk.mot, line 11: 0 cells, but 10 columns"),
+        ("time stands still", with(1, "0.0200"), "walk.mot, line 11, column 1: the time 0.02 does not follow 0.02"),
+        ("time goes back", with(1, "-1"), "walk.mot, line 11, column 1: the time -1 does not follow 0.02"),
+        (
+            "ten rows",
+            changed(&whole.lines().take(17).collect::<Vec<_>>().join("\n"), "nRows=221\n", ""),
+            "walk.mot, line 16: 10 rows, at least 20 are needed",
+        ),
+    ];
+    check("motion file", read, &cases);
+}
+
+#[test]
+fn tables_of_camargo_2021_and_own_tables() {
+    let (whole, own) = (camargo(2), own_table());
+    let read = |text: &str| Recording::from_camargo_csv("AB06.csv", text).err();
+    assert_eq!(read(&whole), None);
+    let row = line(&whole, 100);
+    check(
+        "Camargo table",
+        read,
+        &[
+            ("empty", String::new(), "AB06.csv, line 1: the line of column names is missing"),
+            (
+                "another table of the data set",
+                changed(&whole, "Header,", "HeelStrike,"),
+                "AB06.csv, line 1: the first column is \"HeelStrike\", expected \"Header\"",
+            ),
+            (
+                "semicolons",
+                whole.replace(',', ";"),
+                "AB06.csv, line 1: the first column is \"Header;pelvis_tilt;hip_flexion_r;knee_angle_r;ankle_angle_r;\
+                 hip_flexion_l;knee_angle_l;ankle_angle_l;lumbar_extension;right_vy\", expected \"Header\"",
+            ),
+            (
+                "a gap of the markers",
+                changed(&whole, &row, &row.replacen("-3.000000000", "NaN", 1)),
+                "AB06.csv, line 100, column 2: pelvis_tilt = \"NaN\" is not a number",
+            ),
+            ("cut off", whole[..whole.len() - 30].to_owned(), "AB06.csv, line 222: 8 cells, but 10 columns"),
+        ],
+    );
+    let read = |text: &str| Recording::from_csv("own.csv", text).err();
+    assert_eq!(read(&own), None);
+    check(
+        "own table",
+        read,
+        &[
+            ("comments alone", "# one adult\n".to_owned(), "own.csv, line 2: the line of column names is missing"),
+            (
+                "degrees",
+                own.replace(",0.4,", ",23,"),
+                "own.csv, line 3: knee_L_rad is 23.0 rad, beyond 3.14 rad; is the unit right?",
+            ),
+            (
+                "hip missing",
+                changed(&own, "hip_R_rad", "hip_rad"),
+                "own.csv, line 2: column \"hip_R_rad\" is missing; there are time_s, torso_rad, hip_L_rad, knee_L_rad, \
+                 ankle_L_rad, hip_rad, knee_R_rad",
+            ),
+            (
+                "an empty cell",
+                changed(&own, "\n1,0.1,", "\n1,,"),
+                "own.csv, line 103, column 2: torso_rad = \"\" is not a number",
+            ),
+            (
+                "rows swapped",
+                changed(&own, "\n0.5,", "\n0.47,"),
+                "own.csv, line 53, column 1: the time 0.47 does not follow 0.49",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn electromyograms() {
+    let whole = electromyogram();
+    let read = |text: &str| EmgRecording::from_csv("emg.csv", text, None).err();
+    assert_eq!(read(&whole), None);
+    check(
+        "electromyogram",
+        read,
+        &[
+            ("empty", String::new(), "emg.csv, line 1: the line of column names is missing"),
+            (
+                "no time",
+                changed(&whole, "time_s", "t"),
+                "emg.csv, line 1: the first column is \"t\", expected \"time_s\"",
+            ),
+            (
+                "time alone",
+                whole.lines().map(|l| l.split(',').next().unwrap()).collect::<Vec<_>>().join("\n"),
+                "emg.csv, line 1: there is no channel beside the time",
+            ),
+            ("a channel twice", changed(&whole, "BF_L", "TA_L"), "emg.csv, line 1, column 3: \"TA_L\" is there twice"),
+            (
+                "a word",
+                changed(&whole, "\n0.5,", "\n0.5,off"),
+                "emg.csv, line 502, column 2: TA_L = \"off-0.866025\" is not a number",
+            ),
+            (
+                "a sample at the wrong time",
+                changed(&whole, "\n0.5,", "\n0.5009,"),
+                "emg.csv, line 503, column 1: the time 0.501 follows 0.5009 by 0.000100 s, where rows are 0.001000 s apart: \
+                 the rows must be evenly spaced",
+            ),
+            (
+                "a pause",
+                whole.replace("\n0.9", "\n7.9"),
+                "emg.csv, line 902, column 1: the time 7.9 follows 0.899 by 7.001000 s, where rows are 0.001000 s apart: the \
+                 rows must be evenly spaced",
+            ),
+            ("cut off", whole[..whole.len() - 6].to_owned(), "emg.csv, line 1001: 3 cells, but 4 columns"),
+            (
+                "ten samples",
+                whole.lines().take(11).collect::<Vec<_>>().join("\n"),
+                "emg.csv, line 11: 10 rows, at least 20 are needed",
+            ),
+        ],
+    );
+    let recording = EmgRecording::from_csv("emg.csv", &whole, None).unwrap();
+    let refused = [
+        recording.select("emg.csv", [("RF_L", "EMG 1")]).unwrap_err(),
+        recording.strikes_of_column("emg.csv", "toe", 0.5).unwrap_err(),
+        recording.strikes_of_column("emg.csv", "heel", 2.0).unwrap_err(),
+        recording.check_strikes("emg.csv", &[0.1, 9.0]).unwrap_err(),
+        recording.check_strikes("emg.csv", &[0.5, 0.1]).unwrap_err(),
+        EmgRecording::from_csv("emg.csv", &whole, Some(5.0)).unwrap_err(),
+    ];
+    let expected = [
+        "emg.csv: column \"EMG 1\" is missing; there are TA_L, BF_L, heel",
+        "emg.csv: column \"toe\" is missing; there are TA_L, BF_L, heel",
+        "emg.csv: column \"heel\" rises 0 times above 2, two make a stride",
+        "heel strike (s) = 9 is outside the allowed range [0, 0.999]",
+        "emg.csv: the heel strikes are not in order",
+        "rate_hz = 5 is outside the allowed range [100, 20000]",
+    ];
+    for error in &refused {
+        println!("| electromyogram | asked for what is not in it | {error} |");
+    }
+    assert_eq!(refused.map(|error| error.to_string()), expected);
+}
+
+#[test]
+fn joint_angles() {
+    let whole = own_table();
+    let read = |text: &str| JointRecording::from_csv("angles.csv", text).err();
+    assert_eq!(read(&whole), None);
+    check(
+        "joint angles",
+        read,
+        &[
+            (
+                "no joint",
+                whole.replace("_rad", ""),
+                "angles.csv, line 2: no column is a joint's; there are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
+            ),
+            ("degrees", whole.replace(",0.4,", ",23,"), "angles.csv, line 3: knee_L is 23.0 rad: is the unit right?"),
+            (
+                "a gap",
+                whole
+                    .lines()
+                    .enumerate()
+                    .filter(|(k, _)| !(50..70).contains(k))
+                    .map(|(_, line)| line)
+                    .collect::<Vec<_>>()
+                    .join("\n"),
+                "angles.csv, line 51, column 1: 0.210 s without a row, at most 0.05 s",
+            ),
+        ],
+    );
+}

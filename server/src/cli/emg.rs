@@ -1,0 +1,188 @@
+//! `gaitwright emg`: muscle activity over the gait cycle from a recording, without the service.
+
+use super::out_file::OutFile;
+use super::output::data;
+use super::problem::read;
+use crate::error::Error;
+use crate::studies::lab::{EmgReading, FileForm};
+use clap::Args;
+use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+pub(super) struct Emg {
+    /// The recording: CSV or OpenSim file with a column per channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R).
+    #[arg(value_name = "FILE")]
+    recording: PathBuf,
+    /// Normal walking, which the recording is measured by; default: the recording is normal walking itself.
+    #[arg(long, value_name = "FILE")]
+    normal: Option<PathBuf>,
+    /// Form of both files.
+    #[arg(long, value_enum, default_value = "csv")]
+    form: FileForm,
+    /// Samples per second, 100 to 20000, of a CSV file without a column time_s.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    rate_hz: Option<f64>,
+    /// Columns of the channels where they have other names, as in TA_L=EMG2,BF_L=EMG3; others are left out.
+    #[arg(long, value_name = "CHANNEL=COLUMN,...", value_delimiter = ',', value_parser = channel)]
+    channels: Vec<(String, String)>,
+    /// Column of both files that tells right heel strikes: a switch under the heel, or the force under the foot.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
+    heel_strike_column: Option<String>,
+    /// The foot is on the ground where that column is above this.
+    #[arg(long, value_name = "NUMBER", default_value = "0.5", allow_negative_numbers = true)]
+    heel_strike_threshold: f64,
+    /// Right heel strikes of the recording, s, as in 0.41,1.52,2.63.
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]
+    heel_strikes_s: Vec<f64>,
+    /// Right heel strikes of normal walking, s.
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", allow_negative_numbers = true)]
+    normal_heel_strikes_s: Vec<f64>,
+    #[command(flatten)]
+    filters: Filters,
+    /// Print everything as one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Where the mean cycles go: percent, then mean and standard deviation of each channel, in shares of the peak of
+    /// normal walking.
+    #[arg(long, value_name = "FILE.csv")]
+    cycles: Option<PathBuf>,
+    /// Where the envelopes go: time, then each channel in the unit of the recording.
+    #[arg(long, value_name = "FILE.csv")]
+    envelopes: Option<PathBuf>,
+}
+
+/// The filters of the chain.
+#[derive(Debug, Args)]
+struct Filters {
+    /// Lower edge of the band-pass, Hz; default: 20.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    band_low_hz: Option<f64>,
+    /// Upper edge of the band-pass, Hz; below half the sampling rate; default: 450.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    band_high_hz: Option<f64>,
+    /// Edge of the low-pass that makes the envelope, Hz; default: 6.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    envelope_hz: Option<f64>,
+    /// Order of both filters: 2, 4, 6 or 8; default: 4.
+    #[arg(long, value_name = "NUMBER")]
+    order: Option<usize>,
+}
+
+impl Filters {
+    fn settings(&self) -> EmgSettings {
+        let usual = EmgSettings::default();
+        EmgSettings {
+            band_low_hz: self.band_low_hz.unwrap_or(usual.band_low_hz),
+            band_high_hz: self.band_high_hz.unwrap_or(usual.band_high_hz),
+            envelope_hz: self.envelope_hz.unwrap_or(usual.envelope_hz),
+            order: self.order.unwrap_or(usual.order),
+        }
+    }
+}
+
+fn channel(text: &str) -> Result<(String, String), String> {
+    let (channel, column) = text.split_once('=').ok_or("expected CHANNEL=COLUMN, as in TA_L=EMG2")?;
+    Ok((channel.trim().to_owned(), column.trim().to_owned()))
+}
+
+/// What was found, and how.
+#[derive(Serialize)]
+struct Found {
+    settings: EmgSettings,
+    heel_strikes_s: Vec<f64>,
+    #[serde(flatten)]
+    activity: Activity,
+}
+
+impl Emg {
+    pub(super) fn run(self) -> Result<(), Error> {
+        let settings = self.filters.settings();
+        let (recording, strikes) = self.read(&self.recording, &self.heel_strikes_s)?;
+        let envelopes = recording.envelopes(&settings)?;
+        let measured = recording.cycles(&strikes, &settings)?;
+        let activity = match &self.normal {
+            Some(path) => {
+                let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
+                Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?
+            }
+            None => Activity::of_normal_walking(&measured)?,
+        };
+        let inputs: Vec<&Path> =
+            [Some(&self.recording), self.normal.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        let open = |path: &Option<PathBuf>| path.as_deref().map(|path| OutFile::open(path, &inputs)).transpose();
+        let (cycles, envelope_file) = (open(&self.cycles)?, open(&self.envelopes)?);
+        if let Some(out) = cycles {
+            out.write(&cycles_csv(&activity.channels))?;
+        }
+        if let Some(out) = envelope_file {
+            out.write(&envelopes_csv(&recording, envelopes))?;
+        }
+        let found = Found { settings, heel_strikes_s: strikes, activity };
+        if self.json {
+            data(&serde_json::to_string_pretty(&found).map_err(|e| Error::Internal(e.to_string()))?)
+        } else {
+            data(&for_people(&found))
+        }
+    }
+
+    fn read(&self, path: &Path, heel_strikes_s: &[f64]) -> Result<(EmgRecording, Vec<f64>), Error> {
+        let reading = EmgReading {
+            form: self.form,
+            rate_hz: self.rate_hz,
+            channels: self.channels.iter().cloned().collect(),
+            heel_strikes_s: heel_strikes_s.to_vec(),
+            heel_strike_column: self.heel_strike_column.clone(),
+            heel_strike_threshold: self.heel_strike_threshold,
+        };
+        reading.read(&path.display().to_string(), &read(path)?)
+    }
+}
+
+fn for_people(found: &Found) -> String {
+    let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = found.settings;
+    let mut lines = vec![format!(
+        "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; in shares of the \
+         peak of normal walking"
+    )];
+    let Activity { channels, averages, emg_rmse } = &found.activity;
+    for (place, (channel, average)) in channels.iter().zip(averages).enumerate() {
+        let part = emg_rmse.as_ref().and_then(|rmse| rmse.parts.get(place));
+        let distance = part.map_or_else(String::new, |part| format!(", EMG RMSE {part:.4}"));
+        let (name, peak, strides) = (&channel.channel, channel.peak(), channel.strides);
+        lines.push(format!("{name}: average {average:.4}, peak {peak:.4}{distance} ({strides} strides)"));
+    }
+    lines.extend(emg_rmse.as_ref().map(|rmse| format!("EMG RMSE in all: {:.4}", rmse.total)));
+    lines.join("\n")
+}
+
+fn cycles_csv(channels: &[CycleActivity]) -> String {
+    let percent = (0..CYCLE_POINTS).map(|point| point as f64).collect();
+    let mut columns = vec![("percent".to_owned(), percent)];
+    for channel in channels {
+        columns.push((channel.channel.clone(), channel.mean.clone()));
+        columns.push((format!("{}_standard_deviation", channel.channel), channel.standard_deviation.clone()));
+    }
+    csv(&columns)
+}
+
+fn envelopes_csv(recording: &EmgRecording, envelopes: Vec<Envelope>) -> String {
+    let samples = envelopes.first().map_or(0, |envelope| envelope.values.len());
+    let times = (0..samples).map(|sample| recording.start_s + sample as f64 / recording.rate_hz).collect();
+    let mut columns = vec![("time_s".to_owned(), times)];
+    columns.extend(envelopes.into_iter().map(|envelope| (envelope.channel, envelope.values)));
+    csv(&columns)
+}
+
+/// Columns of the same length, by name.
+fn csv(columns: &[(String, Vec<f64>)]) -> String {
+    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    let mut text = names.join(",") + "\n";
+    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+        let cells: Vec<String> = columns.iter().map(|(_, values)| values[row].to_string()).collect();
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,84 @@
+//! Who sends a request: users of every role, tokens, nobody.
+
+use crate::analytic::Analytic;
+use crate::service::{Answer, Service};
+use axum::body::Body;
+use axum::http::{Method, Request, header};
+use gaitwright::access::people::{self, NewUser};
+use gaitwright::access::tokens::{self, NewToken};
+use gaitwright::access::{Right, Role, sign_in};
+use gaitwright::http::Access;
+use gaitwright::store::audit::Actor;
+use gaitwright::store::{UserId, commit};
+use std::sync::Arc;
+use tempfile::TempDir;
+
+/// Content type of a submitted form.
+pub const FORM: &str = "application/x-www-form-urlencoded";
+
+/// A service where everybody signs in.
+pub async fn service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    service.access = Arc::new(Access::by_sign_in(3600.0));
+    (folder, service)
+}
+
+/// How a request says who sends it.
+#[derive(Debug, Clone)]
+pub enum As {
+    /// Without a word.
+    Nobody,
+    /// A browser that was signed in: the secret of its session.
+    Session(String),
+    /// A program: its token.
+    Token(String),
+}
+
+/// A user, and the one-time link to come in by.
+pub async fn user(service: &Service, name: &str, role: Role) -> (UserId, String) {
+    let mut writer = service.store.write().await.unwrap();
+    let new = NewUser { name: name.to_owned(), role };
+    let user = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let link = people::link(&mut writer, &Actor::program(), user.id).await.unwrap();
+    commit(writer).await.unwrap();
+    (user.id, link)
+}
+
+/// A user of a role, signed in.
+pub async fn signed_in(service: &Service, role: Role) -> As {
+    let (_, link) = user(service, &format!("a {}", role.as_str()), role).await;
+    let mut writer = service.store.write().await.unwrap();
+    let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
+    commit(writer).await.unwrap();
+    As::Session(session)
+}
+
+/// A token with these scopes.
+pub async fn token(service: &Service, scopes: &[Right]) -> As {
+    let mut writer = service.store.write().await.unwrap();
+    let new = NewToken { name: format!("{scopes:?}"), scopes: scopes.to_vec(), days: Some(1) };
+    let (_, secret) = tokens::make(&mut writer, &Actor::program(), &new).await.unwrap();
+    commit(writer).await.unwrap();
+    As::Token(secret)
+}
+
+/// Sends a request as somebody.
+pub async fn send(service: &Service, who: &As, method: &Method, path: &str, kind: &str, body: &str) -> Answer {
+    let mut request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, kind);
+    request = match who {
+        As::Nobody => request,
+        As::Session(secret) => request
+            .header(header::COOKIE, format!("gaitwright_session={secret}"))
+            .header("sec-fetch-site", "same-origin"),
+        As::Token(secret) => request.header(header::AUTHORIZATION, format!("Bearer {secret}")),
+    };
+    service.send(request.body(Body::from(body.to_owned())).unwrap()).await
+}
+
+/// The session that an answer begins.
+pub fn session_of(answer: &Answer) -> As {
+    let cookie = answer.headers["set-cookie"].to_str().unwrap();
+    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Lax"), "{cookie}");
+    As::Session(cookie.split(';').next().unwrap().split_once('=').unwrap().1.to_owned())
+}

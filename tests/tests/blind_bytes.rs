@@ -1,0 +1,259 @@
+//! Every byte that a rater can get: whatever a rater asks for, with whichever identifier, it says nothing of what is
+//! rated; and one pair looks like another, whether it is a question or a control.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::{HeaderMap, Method, StatusCode};
+use gaitwright::access::{Right, Role};
+use gaitwright::http::openapi;
+use gaitwright::store::presentations::{self, Kind, Presentation};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, studies};
+use gaitwright_tests::callers::{As, FORM, send, service, signed_in, token};
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+const JSON: &str = "application/json";
+/// Headers that any answer of the service may carry. Anything else must be looked at: it may name something.
+const HEADERS: [&str; 16] = [
+    "allow",
+    "cache-control",
+    "content-length",
+    "content-security-policy",
+    "content-type",
+    "cross-origin-opener-policy",
+    "cross-origin-resource-policy",
+    "idempotency-replayed",
+    "location",
+    "permissions-policy",
+    "referrer-policy",
+    "set-cookie",
+    "vary",
+    "www-authenticate",
+    "x-content-type-options",
+    "x-frame-options",
+];
+
+async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
+    send(service, who, &Method::POST, path, JSON, &body.to_string()).await
+}
+
+async fn get(service: &Service, who: &As, path: &str) -> Answer {
+    send(service, who, &Method::GET, path, "", "").await
+}
+
+/// A study that asks people, with its first question.
+async fn waiting(service: &Service, trials: u32) -> StudyId {
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, trials)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    study
+}
+
+/// What nobody may learn from an answer to a rater: identifiers, names and figures of what is rated.
+async fn secrets(service: &Service, studies_of: &[StudyId]) -> BTreeSet<String> {
+    let mut secrets = BTreeSet::new();
+    let mut reader = service.store.read().await.unwrap();
+    for &id in studies_of {
+        let study = studies::get(&mut reader, id).await.unwrap();
+        secrets.extend([study.plan.name.clone(), study.plan.subject_id.to_string()]);
+        for trial in service.trials(id).await {
+            secrets.extend([trial.id.to_string(), trial.id.short()]);
+            secrets.insert(serde_json::to_string(&trial.action).unwrap());
+            for figure in [trial.gait_rmse_rad, trial.cost_of_transport, trial.objective].into_iter().flatten() {
+                secrets.extend([figure.to_string(), format!("{figure:.4}")]);
+            }
+        }
+        secrets.extend(service.feedback(id).await.iter().map(|row| row.id.to_string()));
+        secrets
+            .extend(presentations::of_study(&mut reader, id).await.unwrap().iter().map(|shown| shown.id.to_string()));
+    }
+    secrets.insert("paper-1".to_owned());
+    secrets
+}
+
+/// Every address that the service knows, as (method, path with placeholders).
+fn addresses() -> Vec<(Method, String)> {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut all = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        all.extend(item.as_object().unwrap().keys().map(|m| (m.to_uppercase().parse().unwrap(), path.clone())));
+    }
+    for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
+        let path = line.split('"').nth(1).unwrap().to_owned();
+        for (method, called) in [(Method::GET, "get("), (Method::POST, "post(")] {
+            if line.contains(called) && path != "/sign-out" {
+                all.push((method, path.clone()));
+            }
+        }
+    }
+    all
+}
+
+#[tokio::test]
+async fn whatever_a_rater_asks_for_says_nothing_of_what_is_rated() {
+    let (_folder, service) = service().await;
+    let automatic = service.study(|new| (new.name, new.trial_budget) = (Some("stiff ankle".to_owned()), 12)).await;
+    service.wait_for(automatic, &[StudyState::Finished]).await;
+    let study = waiting(&service, 6).await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let gaits: Vec<_> =
+        service.trials(automatic).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();
+    let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id, "notes": "treadmill"});
+    let session = post(&service, &clinician, &format!("/api/v1/studies/{automatic}/lab-sessions"), &plan).await.json();
+    let rater = signed_in(&service, Role::Rater).await;
+    let program = token(&service, &[Right::Rate]).await;
+    // Another rater's pair, which this one must not see.
+    let other = post(&service, &program, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let own = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let (other, own) = (other["pair"]["token"].as_str().unwrap(), own["pair"]["token"].as_str().unwrap());
+    let pairs = [own, other];
+    let secrets = secrets(&service, &[automatic, study]).await;
+    let (session, subject) = (session["id"].as_str().unwrap().to_owned(), service.subject().await.to_string());
+    let ids = [study.to_string(), session, gaits[0].id.to_string(), subject];
+
+    let mut seen = 0;
+    for (method, path) in addresses() {
+        for id in if path.contains("{id}") { &ids[..] } else { &ids[..1] } {
+            for token in &pairs[..if path.contains("{token}") { 2 } else { 1 }] {
+                let address = path.replace("{id}", id).replace("{token}", token).replace("{file}", "rmse.csv");
+                let (kind, bodies): (&str, &[&str]) = match (&method, path.starts_with("/api/")) {
+                    (&Method::GET, _) => ("", &[""]),
+                    (_, true) => (JSON, &["{}", "{\"walk\": 9}"]),
+                    (_, false) => (FORM, &["walk=9"]),
+                };
+                for body in bodies {
+                    let answer = send(&service, &rater, &method, &address, kind, body).await;
+                    check(&format!("{method} {address} {body}"), &answer, id, token, &secrets);
+                    seen += 1;
+                }
+            }
+        }
+    }
+    assert!(seen > 500, "{seen}");
+    service.stop().await;
+}
+
+/// Holds an answer against the secrets, but for what the rater has sent.
+fn check(what: &str, answer: &Answer, id: &str, token: &str, secrets: &BTreeSet<String>) {
+    assert!(!answer.status.is_server_error(), "{what}: {}", answer.text);
+    let mut bytes = answer.text.clone();
+    for (name, value) in &answer.headers {
+        assert!(HEADERS.contains(&name.as_str()), "{what}: {name}: {value:?}");
+        bytes.push_str(value.to_str().unwrap());
+    }
+    let bytes = bytes.replace(id, "").replace(token, "");
+    // A motion is positions to the millimetre, and nothing else.
+    if answer.status == StatusCode::OK && (what.contains("/first") || what.contains("/second")) {
+        assert!(answer.text.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
+        let digits = answer.text.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
+        assert!(digits.into_iter().all(|(_, decimals)| decimals.len() <= 3), "{what}");
+        return;
+    }
+    for secret in secrets.iter().filter(|secret| !id.ends_with(secret.as_str())) {
+        assert!(!bytes.contains(secret.as_str()), "{what}: {secret} in {bytes}");
+    }
+}
+
+/// What is left of an answer without what names the pair and what is drawn of it.
+fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, String)>) {
+    let mut text = answer.text.replace(pair["token"].as_str().unwrap(), "TOKEN");
+    if let Some((before, rest)) = text.clone().split_once("<noscript>") {
+        text = format!("{before}{}", rest.split_once("</noscript>").unwrap().1);
+    }
+    let number = pair["number"].to_string();
+    for (before, after) in [("Pair ", ""), ("\"number\":", ""), ("answer ", ":")] {
+        text = text.replace(&format!("{before}{number}{after}"), &format!("{before}N{after}"));
+    }
+    (answer.status, text, named(&answer.headers))
+}
+
+/// Headers but the length of the body, which follows from the motion.
+fn named(headers: &HeaderMap) -> Vec<(String, String)> {
+    let token = |value: &str| value.split("saved=").next().unwrap_or_default().to_owned();
+    let kept = headers.iter().filter(|(name, _)| name.as_str() != "content-length");
+    kept.map(|(name, value)| (name.to_string(), token(value.to_str().unwrap()))).collect()
+}
+
+#[tokio::test]
+async fn a_control_looks_like_a_question_even_where_others_answer_the_same() {
+    let (_folder, service) = service().await;
+    let study = waiting(&service, 40).await;
+    let (rater, clinician) = (signed_in(&service, Role::Rater).await, signed_in(&service, Role::Clinician).await);
+    let mut looks = BTreeSet::new();
+    let mut kinds = Vec::new();
+    for turn in 0..400 {
+        let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
+        if present.state == StudyState::Finished {
+            break;
+        }
+        let next = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await;
+        let pair = next.json()["pair"].clone();
+        if pair.is_null() {
+            // What was answered is being taken in.
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+            continue;
+        }
+        let shown = presentations::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
+        let shown = shown.last().unwrap().clone();
+        if shown.kind == Kind::New {
+            answer_too(&service, &clinician, study, &shown).await;
+        }
+        kinds.push(shown.kind);
+        let token = pair["token"].as_str().unwrap();
+        let page = get(&service, &rater, &format!("/rate/pair/{token}")).await;
+        let motion = get(&service, &rater, &format!("/api/v1/blind/{token}/first")).await;
+        let path = format!("/rate/pair/{token}");
+        let answered = if turn % 2 == 0 {
+            let path = format!("/api/v1/blind/{token}/answer");
+            post(&service, &rater, &path, &json!({"answer": "first"})).await
+        } else {
+            send(&service, &rater, &Method::POST, &path, FORM, "answer=first").await
+        };
+        let again = get(&service, &rater, &path).await;
+        let saved = get(&service, &rater, &format!("/rate?saved={token}")).await;
+        let saved = saved.text.split_once("Recorded ").unwrap().1.split_once("UTC").unwrap().1;
+        let saved = saved.split_once("</div>").unwrap().0.replace(token, "TOKEN");
+        looks.insert(format!(
+            "{:?} {:?} {:?} {:?} {:?}",
+            masked(&next, &pair),
+            masked(&page, &pair),
+            (motion.status, named(&motion.headers)),
+            masked(&again, &pair),
+            saved.replace(&format!("answer {}:", pair["number"]), "answer N:"),
+        ));
+        looks.insert(format!("{} {:?}", turn % 2, masked(&answered, &pair)));
+    }
+    let count = |kind| kinds.iter().filter(|k| **k == kind).count();
+    assert!(count(Kind::Repeat) > 0 && count(Kind::Null) > 0, "{kinds:?}");
+    // One look of a pair, and one of an answer for each way of giving it.
+    assert_eq!(looks.len(), 3, "{looks:#?}");
+    service.stop().await;
+}
+
+/// A clinician answers the comparison that a rater was shown.
+async fn answer_too(service: &Service, clinician: &As, study: StudyId, shown: &Presentation) {
+    let body = json!({"trial_a": shown.shown_first, "trial_b": shown.shown_second, "answer": "b"});
+    let given = post(service, clinician, &format!("/api/v1/studies/{study}/preferences"), &body).await;
+    assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
+}
+
+#[tokio::test]
+async fn taking_back_what_somebody_else_took_back_is_no_matter_of_its_kind() {
+    let (_folder, service) = service().await;
+    let study = waiting(&service, 6).await;
+    let (rater, clinician) = (signed_in(&service, Role::Rater).await, signed_in(&service, Role::Clinician).await);
+    let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
+    post(&service, &rater, &format!("/api/v1/blind/{token}/answer"), &json!({"answer": "first"})).await;
+    let heard = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
+    let path = format!("/api/v1/preferences/{}/retract", heard.id);
+    let retracted = post(&service, &clinician, &path, &json!({"reason": "wrong person"})).await;
+    assert!(retracted.status.is_success(), "{}", retracted.text);
+    let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/take-back"), FORM, "").await;
+    assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
+    let page = get(&service, &rater, back.headers["location"].to_str().unwrap()).await;
+    assert!(page.text.contains("was taken back"), "{}", page.text);
+    service.stop().await;
+}
