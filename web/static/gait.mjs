@@ -128,7 +128,8 @@ class Scene {
     for (let half = first; half / 2 <= walked + frame.hip[0] + reach; half += 1) {
       const [x, y] = at([half / 2 - walked, 0]);
       pen.fillRect(x - 0.5, y, 1, half % 2 === 0 ? 8 : 5);
-      if (half % 2 === 0) pen.fillText(`${half / 2} m`, x, y + 22);
+      // No number is cut in two at the edge.
+      if (half % 2 === 0 && x > 16 && x < width - 16) pen.fillText(`${half / 2} m`.replace("-", "\u2212"), x, y + 22);
     }
 
     // Forces.

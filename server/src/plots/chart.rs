@@ -96,7 +96,7 @@ const BOTTOM: f64 = 60.0;
 const MARK_DISTANCE: f64 = 24.0;
 const MARK_DROP: f64 = 56.0;
 /// What a character of a name above the axis takes where the style sheet writes it largest.
-const NAME_CHARACTER: f64 = 14.5;
+const NAME_CHARACTER: f64 = 13.5;
 /// What a logarithmic axis takes for nothing.
 const SMALLEST: f64 = 1e-16;
 
