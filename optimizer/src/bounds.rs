@@ -42,8 +42,8 @@ impl TunedBounds {
         "hip velocity upper bound, m/s",
         "swing-foot clearance, m",
         "torso lean, rad",
-        "hip angle, deg",
-        "ankle angle, deg",
+        "hip angle, °",
+        "ankle angle, °",
     ];
     /// Allowed range of each bound, in action order.
     pub const RANGES: [(f64, f64); 8] =

@@ -1,6 +1,7 @@
 //! The hybrid system: eight domains and their cycle, contact rows, outputs, Bezier curves, phase variable.
 
 pub mod bezier;
+mod clearance;
 pub mod domain;
 pub mod impact;
 pub mod phase;
@@ -8,6 +9,8 @@ mod progress;
 pub mod stick_figure;
 
 pub use bezier::{BEZIER_COEFFICIENTS, BEZIER_DEGREE, basis};
+pub(crate) use clearance::clearance_profile;
+pub use clearance::kept_clearance_m;
 pub use domain::{CYCLE, ContactRow, Domain, DomainKind};
 pub use impact::{Impact, impact, kinetic_energy};
 pub use phase::phase_gradient;

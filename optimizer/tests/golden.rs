@@ -7,7 +7,7 @@ mod golden_gaits;
 use gait_optimizer::gait_problem::gait_of;
 use gait_optimizer::metrics::{activation_alternations, gait_rmse};
 use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
-use gait_optimizer::walking::{CYCLE, progress};
+use gait_optimizer::walking::{CYCLE, kept_clearance_m, progress};
 use gait_optimizer::{
     CancelToken, ColdGuess, GaitProblem, GaitSettings, SolveOptions, SolveStatus, Subject, solve_from_guesses,
 };
@@ -33,6 +33,16 @@ fn residuals_of_the_golden_gaits() {
         let objective = golden.programme.objective(&golden.x);
         let theirs = golden.data["obj"].as_f64().unwrap();
         assert!((objective - theirs).abs() < 1e-10, "{objective} {theirs}");
+    }
+}
+
+#[test]
+fn the_golden_gaits_keep_the_least_clearance() {
+    for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
+        let (_, gait) = golden_gait(subject, muscles);
+        let least = gait.settings.limits.clearance_min_m;
+        let kept = kept_clearance_m(&gait).unwrap().unwrap();
+        assert!(gait.bounds.a5 < least && kept > least - 1e-6 && kept < 0.05, "{subject} {muscles}: {kept}");
     }
 }
 

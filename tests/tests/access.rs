@@ -65,7 +65,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 56] = [
+const PAGES: [(&str, Option<Right>); 57] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -114,6 +114,7 @@ const PAGES: [(&str, Option<Right>); 56] = [
     ("post /people", Some(Right::Administer)),
     ("get /audit", Some(Right::Administer)),
     ("get /system", Some(Right::Read)),
+    ("post /system/backup", Some(Right::Administer)),
     ("get /glossary", None),
     ("get /api", None),
     ("get /sign-in", None),

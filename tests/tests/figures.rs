@@ -56,8 +56,10 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
         assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
     }
     for (page, least) in [
+        (format!("/studies/{}", studies[0]), 1),
+        (format!("/studies/compare?a={}&b={}", studies[0], studies[1]), 1),
         (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 5 + 2 + 7),
-        (format!("/trials/{}", gaits[0].id), 1 + 6 + 2 + 6 + 6 + 2 + 7),
+        (format!("/trials/{}", gaits[0].id), 1 + 6 + 2 + 6 + 6 + 2 + 7 + 1),
         (format!("/lab-sessions/{session}"), 6 + 2),
     ] {
         let shown = service.fetch(&page).await;
@@ -86,7 +88,7 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
             }
         }
     }
-    let course = format!("/api/v1/studies/{}/figures/course-gait-rmse-of-the-best-action.csv", studies[0]);
+    let course = format!("/api/v1/studies/{}/figures/course-gait-rmse-of-the-best-action-by-iteration.csv", studies[0]);
     let (_, csv) = file(&service, &course).await;
     let history = service.fetch(&format!("/api/v1/studies/{}/history", studies[0])).await.json();
     let csv = String::from_utf8(csv).unwrap();
@@ -94,6 +96,10 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
         let row = format!(",{},{}\n", milestone["iteration"], milestone["gait_rmse_rad"]);
         assert!(csv.contains(&row), "{row} {csv}");
     }
+    let recommended = format!("/api/v1/studies/{}/recommendation", studies[0]);
+    let (best, bounds) = (service.fetch(&recommended).await.json(), service.fetch(&format!("{recommended}.csv")).await);
+    let row = format!("a5,{},m,swing-foot clearance\n", best["bounds"]["a5"]);
+    assert!(bounds.text.starts_with("bound,value,unit,limits\n") && bounds.text.contains(&row), "{}", bounds.text);
     for unknown in ["nothing.svg", "course.gif", "course", "..%2Fa.svg"] {
         let path = format!("/api/v1/studies/{}/figures/{unknown}", studies[0]);
         assert_eq!(service.fetch(&path).await.status, StatusCode::NOT_FOUND, "{unknown}");

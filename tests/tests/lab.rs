@@ -283,7 +283,8 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
     );
     let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
     assert!(page.contains("EMG, left tibialis anterior") && page.contains("low-pass 3 Hz, order 2"), "{page}");
-    assert!(page.contains("mean of 5, 5 strides") && page.contains("EMG RMSE in all"), "{page}");
+    assert!(page.contains("means of 5 strides (without the device), 5 strides (walk 2)"), "{page}");
+    assert!(page.contains("EMG RMSE, walk 2"), "{page}");
     service.stop().await;
 }
 
@@ -350,6 +351,9 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
     let form = "walk=1&form=csv&recording=time_s%2CTA_L&heel_strike_column=heel&channels=TA";
     let refused = service.post_text(&format!("{page}/electromyograms"), FORM, form).await;
     assert!(refused.text.contains("CHANNEL=COLUMN"), "{}", refused.text);
+    for typed in ["<details open>", ">time_s,TA_L</textarea>", "value=\"heel\"", "value=\"TA\""] {
+        assert!(refused.text.contains(typed), "{typed} comes back: {}", refused.text);
+    }
     assert_eq!(service.fetch(&format!("{api}/recordings")).await.json(), json!([]), "nothing was kept");
     service.post(&format!("{api}/close"), &json!({})).await;
     let closed = service.post(&format!("{api}/electromyograms"), &with_heel(1, &whole)).await;

@@ -1,5 +1,5 @@
 // @ts-check
-// The animated stick figure of a gait. Positions come from the server; here they are only drawn.
+// The animated stick figure of a gait, or of two on one clock. Positions come from the server; here they are only drawn.
 
 /**
  * @typedef {[number, number]} Place
@@ -65,72 +65,33 @@ export function frameAt(motion, time) {
   };
 }
 
-/** A walker in a box: canvas and controls. */
-class Walker {
+/** Names of the phases, without the leg. */
+const PHASES = { DS2: "double support", DS3: "double support", SS2: "single support", SS1: "single support" };
+
+/** @type {(domain: string) => string} `SS2_L` in words. */
+const inWords = (domain) => {
+  const [phase, side] = domain.split("_");
+  return `${PHASES[phase] ?? phase}, ${side === "R" ? "right" : "left"} (${domain})`;
+};
+
+/** A gait on a canvas. */
+class Scene {
   /**
-   * @param {HTMLElement} box
+   * @param {HTMLCanvasElement} canvas
    * @param {Motion} motion
    */
-  constructor(box, motion) {
+  constructor(canvas, motion) {
+    this.canvas = canvas;
     this.motion = motion;
-    this.time = 0;
-    this.strides = 0;
-    this.last = 0;
-    this.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.canvas = document.createElement("canvas");
-    this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute(
-      "aria-label",
-      `Stick figure walking: stride ${motion.stride_length_m.toFixed(2)} m in ${motion.stride_time_s.toFixed(2)} s`,
-    );
-    const controls = document.createElement("div");
-    controls.className = "controls";
-    controls.innerHTML = `
-      <button type="button" class="button quiet" data-play></button>
-      <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
-      <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
-      <output data-phase></output>`;
-    box.replaceChildren(this.canvas, controls);
-    this.button = /** @type {HTMLButtonElement} */ (controls.querySelector("[data-play]"));
-    this.speed = /** @type {HTMLSelectElement} */ (controls.querySelector("[data-speed]"));
-    this.scrub = /** @type {HTMLInputElement} */ (controls.querySelector("[data-scrub]"));
-    this.phase = /** @type {HTMLOutputElement} */ (controls.querySelector("[data-phase]"));
-    this.button.addEventListener("click", () => this.setPlaying(!this.playing));
-    this.scrub.addEventListener("input", () => {
-      this.setPlaying(false);
-      this.time = (Number(this.scrub.value) / 100) * this.motion.stride_time_s;
-      this.draw();
-    });
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
-    this.setPlaying(this.playing);
-    this.draw();
+    const stride = `stride ${motion.stride_length_m.toFixed(2)} m in ${motion.stride_time_s.toFixed(2)} s`;
+    canvas.setAttribute("aria-label", `${canvas.getAttribute("aria-label")}: ${stride}`);
   }
 
-  /** @param {boolean} playing */
-  setPlaying(playing) {
-    this.playing = playing;
-    this.button.textContent = playing ? "Pause" : "Play";
-    if (playing) {
-      this.last = performance.now();
-      requestAnimationFrame((now) => this.tick(now));
-    }
-  }
-
-  /** @param {number} now */
-  tick(now) {
-    if (!this.playing) return;
-    this.time += ((now - this.last) / 1000) * Number(this.speed.value);
-    this.last = now;
-    while (this.time >= this.motion.stride_time_s) {
-      this.time -= this.motion.stride_time_s;
-      this.strides += 1;
-    }
-    this.draw();
-    requestAnimationFrame((next) => this.tick(next));
-  }
-
-  draw() {
+  /**
+   * @param {number} share Of the gait cycle, 0 to 1.
+   * @param {number} strides Whole ones before.
+   */
+  draw(share, strides) {
     const ratio = window.devicePixelRatio || 1;
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (width === 0) return;
@@ -140,14 +101,11 @@ class Walker {
     pen.scale(ratio, ratio);
     const style = getComputedStyle(document.documentElement);
     const colour = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
-    const frame = frameAt(this.motion, this.time);
-    const percent = (100 * this.time) / this.motion.stride_time_s;
-    this.scrub.value = String(percent);
-    this.phase.textContent = `${percent.toFixed(0)} %, ${frame.domain}`;
+    const frame = frameAt(this.motion, share * this.motion.stride_time_s);
 
     const scale = height / 2.05;
     const ground = height - 0.22 * scale;
-    const walked = this.strides * this.motion.stride_length_m;
+    const walked = strides * this.motion.stride_length_m;
     /** @type {(place: Place) => Place} */
     const at = (place) => [width / 2 + (place[0] - frame.hip[0]) * scale, ground - place[1] * scale];
     /** @type {(places: Place[]) => void} */
@@ -170,7 +128,8 @@ class Walker {
     for (let half = first; half / 2 <= walked + frame.hip[0] + reach; half += 1) {
       const [x, y] = at([half / 2 - walked, 0]);
       pen.fillRect(x - 0.5, y, 1, half % 2 === 0 ? 8 : 5);
-      if (half % 2 === 0) pen.fillText(`${half / 2} m`, x, y + 22);
+      // No number is cut in two at the edge.
+      if (half % 2 === 0 && x > 16 && x < width - 16) pen.fillText(`${half / 2} m`.replace("-", "\u2212"), x, y + 22);
     }
 
     // Forces.
@@ -232,12 +191,92 @@ class Walker {
   }
 }
 
-for (const box of document.querySelectorAll(".walker[data-trial]")) {
-  const element = /** @type {HTMLElement} */ (box);
-  fetch(`/api/v1/trials/${element.dataset.trial}/motion`)
-    .then((answer) => (answer.ok ? answer.json() : Promise.reject(new Error(`status ${answer.status}`))))
-    .then((motion) => new Walker(element, motion))
+/** Plays scenes on one clock: gaits of different length are shown at the same share of their cycles. */
+class Player {
+  /**
+   * @param {HTMLElement} box
+   * @param {Scene[]} scenes
+   */
+  constructor(box, scenes) {
+    this.scenes = scenes;
+    this.stride = scenes.reduce((sum, scene) => sum + scene.motion.stride_time_s, 0) / scenes.length;
+    this.share = 0;
+    this.strides = 0;
+    this.last = 0;
+    this.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const controls = document.createElement("div");
+    controls.className = "controls";
+    controls.innerHTML = `
+      <button type="button" class="button quiet" data-play></button>
+      <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
+      <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
+      <output data-phase></output>`;
+    box.append(controls);
+    this.button = /** @type {HTMLButtonElement} */ (controls.querySelector("[data-play]"));
+    this.speed = /** @type {HTMLSelectElement} */ (controls.querySelector("[data-speed]"));
+    this.scrub = /** @type {HTMLInputElement} */ (controls.querySelector("[data-scrub]"));
+    this.phase = /** @type {HTMLOutputElement} */ (controls.querySelector("[data-phase]"));
+    this.button.addEventListener("click", () => this.setPlaying(!this.playing));
+    this.scrub.addEventListener("input", () => {
+      this.setPlaying(false);
+      this.share = Number(this.scrub.value) / 100;
+      this.draw();
+    });
+    for (const scene of scenes) new ResizeObserver(() => this.draw()).observe(scene.canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    this.setPlaying(this.playing);
+    this.draw();
+  }
+
+  /** @param {boolean} playing */
+  setPlaying(playing) {
+    this.playing = playing;
+    this.button.textContent = playing ? "Pause" : "Play";
+    if (playing) {
+      this.last = performance.now();
+      requestAnimationFrame((now) => this.tick(now));
+    }
+  }
+
+  /** @param {number} now */
+  tick(now) {
+    if (!this.playing) return;
+    // The first frame may be of a moment before the button was pressed.
+    this.share += (Math.max(now - this.last, 0) / 1000 / this.stride) * Number(this.speed.value);
+    this.last = now;
+    while (this.share >= 1) {
+      this.share -= 1;
+      this.strides += 1;
+    }
+    this.draw();
+    requestAnimationFrame((next) => this.tick(next));
+  }
+
+  draw() {
+    for (const scene of this.scenes) scene.draw(this.share, this.strides);
+    const percent = 100 * this.share;
+    this.scrub.value = String(percent);
+    // Gaits beside each other may be in different phases.
+    const [{ motion }, other] = this.scenes;
+    const time = this.share * motion.stride_time_s;
+    this.phase.textContent = other
+      ? `${percent.toFixed(0)} %`
+      : `${percent.toFixed(0)} %, ${time.toFixed(2)} s: ${inWords(frameAt(motion, time).domain)}`;
+  }
+}
+
+/** @type {(trial: string | undefined) => Promise<Motion>} */
+const load = async (trial) => {
+  const answer = await fetch(`/api/v1/trials/${trial}/motion`);
+  if (!answer.ok) throw new Error(`status ${answer.status}`);
+  return answer.json();
+};
+
+for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker"))) {
+  const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
+  Promise.all(canvases.map(async (canvas) => new Scene(canvas, await load(canvas.dataset.trial))))
+    .then((scenes) => new Player(box, scenes))
     .catch((error) => {
-      element.textContent = `The animation could not be loaded (${error.message}).`;
+      box.textContent = `The animation could not be loaded (${error.message}).`;
     });
 }

@@ -1,12 +1,12 @@
 // @ts-check
-// Keeps a study page current: recorded events bring the parts that changed from the server, iterations are written in
-// place. Sorting and filtering the trials changes the address and brings the table alone.
+// Keeps a study page current: recorded events bring the parts that changed from the server, iterations those of a running
+// solve. Sorting and filtering the trials changes the address and brings the table alone.
 // Without this script the page is right after a reload, and sorting and filtering load it anew.
 
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
 
-/** Shortest time between two drawings of a running solve, ms. */
-const DRAWING_PAUSE = 1000;
+/** Shortest time between two looks at a running solve, ms. */
+const PAUSE = 500;
 
 /**
  * Replaces what changed and leaves the rest, its focus and its scroll position alone.
@@ -89,21 +89,19 @@ if (live) {
     source.addEventListener(kind, () => void refresh());
   }
 
-  /** @type {Map<string, number>} When each running solve was last drawn. */
-  const drawn = new Map();
+  /** @type {Map<string, number>} When each running solve was last looked at. */
+  const looked = new Map();
   source.addEventListener("progress", async (event) => {
-    const p = JSON.parse(event.data);
-    const row = live.querySelector(`[data-trial="${p.trial_id}"]`);
-    const text = row?.querySelector("[data-text]");
-    if (!row || !text || p.objective === null || p.constraint_violation === null) return;
-    text.textContent =
-      `iteration ${p.iteration}, objective ${p.objective.toFixed(4)}, violation ${p.constraint_violation.toExponential(1)}`;
+    const { trial_id: trial } = JSON.parse(event.data);
     const now = performance.now();
-    if (now - (drawn.get(p.trial_id) ?? -Infinity) < DRAWING_PAUSE) return;
-    drawn.set(p.trial_id, now);
-    const answer = await fetch(`/trials/${p.trial_id}/running`).catch(() => null);
+    if (now - (looked.get(trial) ?? -Infinity) < PAUSE) return;
+    looked.set(trial, now);
+    const answer = await fetch(`/trials/${trial}/running`).catch(() => null);
     if (answer?.status !== 200) return;
-    const fresh = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[data-chart]");
-    if (fresh) row.querySelector("[data-chart]")?.replaceWith(fresh);
+    const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
+    for (const part of ["[data-text]", "[data-chart]"]) {
+      const next = fresh.querySelector(part);
+      if (next) live.querySelector(`[data-trial="${trial}"] ${part}`)?.replaceWith(next);
+    }
   });
 }

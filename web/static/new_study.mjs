@@ -23,7 +23,11 @@ if (form) {
     if (!answer?.ok || turn !== asked) return;
     const { field, text, reference } = await answer.json();
     for (const input of form.querySelectorAll("[aria-invalid]")) input.removeAttribute("aria-invalid");
-    if (field) form.querySelector(`[name="${CSS.escape(field)}"]`)?.setAttribute("aria-invalid", "true");
+    if (field) {
+      const input = form.querySelector(`[name="${CSS.escape(field)}"]`);
+      input?.setAttribute("aria-invalid", "true");
+      input?.closest("details")?.setAttribute("open", "");
+    }
     outlook.classList.toggle("bad", Boolean(field));
     outlook.textContent = text;
     if (reference && reference !== drawn) {

@@ -47,6 +47,12 @@ if (box) {
     pen.strokeStyle = colour;
     pen.lineCap = "round";
     line([1, 0], 6, []);
+    const [hip, shoulder] = [figure[0], figure[1]];
+    const head = at([hip[0] + (shoulder[0] - hip[0]) * 1.18, hip[1] + (shoulder[1] - hip[1]) * 1.18]);
+    pen.lineWidth = 3;
+    pen.beginPath();
+    pen.arc(...head, 0.1 * scale, 0, 2 * Math.PI);
+    pen.stroke();
     line([0, 2, 3, 4, 5, 3], 4, []);
     line([0, 6, 7, 8, 9, 7], 4, [9, 7]);
     pen.setLineDash([]);

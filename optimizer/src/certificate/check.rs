@@ -26,13 +26,23 @@ impl Check {
 
     /// The value as text.
     pub fn value_in_words(&self) -> String {
-        self.value.map_or_else(|| "not determined".to_owned(), |value| format!("{value:.2e} {}", self.unit))
+        self.value.map_or_else(|| "not determined".to_owned(), |value| format!("{} {}", figure(value), self.unit))
     }
 
     /// The limit as text.
     pub fn limit_in_words(&self) -> String {
-        self.limit.map_or_else(|| "reported only".to_owned(), |limit| format!("{limit:.0e} {}", self.unit))
+        self.limit.map_or_else(|| "reported only".to_owned(), |limit| format!("{} {}", figure(limit), self.unit))
     }
+}
+
+/// Three digits; as a power of ten where there would be many noughts.
+fn figure(value: f64) -> String {
+    let magnitude = value.abs();
+    if value != 0.0 && !(1e-3..1e4).contains(&magnitude) {
+        return format!("{value:.2e}");
+    }
+    let last = if value == 0.0 { 1.0 } else { 10_f64.powf(2.0 - magnitude.log10().floor()) };
+    format!("{}", (value * last).round() / last)
 }
 
 /// Where a value was measured.

@@ -8,7 +8,7 @@ use super::rows::PointRows;
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
 use crate::gait::{Axis, Side};
-use crate::walking::DomainKind;
+use crate::walking::{DomainKind, clearance_profile};
 
 const FRICTION_SCALE: f64 = 1.0 / 500.0;
 const HEIGHT_SCALE: f64 = 10.0;
@@ -60,13 +60,6 @@ fn swing_share(programme: &GaitProgramme, context: &PointContext<'_>, x: &[f64])
     let cross = -(gradient[0] + gradient[1]) / sum;
     let hessian = [[-2.0 * gradient[0] / sum, cross], [cross, -2.0 * gradient[1] / sum]];
     SwingShare { w, gradient, hessian, durations }
-}
-
-/// `(4 w (1 - w))^2` and its first two derivatives.
-fn clearance_profile(w: f64) -> [f64; 3] {
-    let bump = 4.0 * w * (1.0 - w);
-    let slope = 4.0 * (1.0 - 2.0 * w);
-    [bump * bump, 2.0 * bump * slope, 2.0 * slope * slope - 16.0 * bump]
 }
 
 /// Values.

@@ -1,5 +1,7 @@
 //! Axes: round ticks over a range.
 
+use std::fmt::Display;
+
 /// A range of values with round ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Axis {
@@ -11,6 +13,9 @@ pub(super) struct Axis {
     pub(super) ticks: Vec<f64>,
     decimals: usize,
 }
+
+/// A share of the distance between ticks that is too small to see.
+const HAIR: f64 = 0.05;
 
 impl Axis {
     /// An axis over all values, widened to whole ticks unless `exact`; about `count` ticks.
@@ -28,8 +33,9 @@ impl Axis {
             (low, high) = (low - half, high + half);
         }
         let step = round_step((high - low) / count as f64);
-        let (first, last) = ((low / step).floor(), (high / step).ceil());
-        let (from, to) = if exact { (low, high) } else { (first * step, last * step) };
+        // What is beyond a tick by a hair does not ask for another one.
+        let (first, last) = ((low / step + HAIR).floor(), (high / step - HAIR).ceil());
+        let (from, to) = if exact { (low, high) } else { ((first * step).min(low), (last * step).max(high)) };
         let mut ticks = Vec::new();
         let mut index = first;
         while index <= last {
@@ -65,6 +71,19 @@ impl Axis {
     pub(super) fn text(&self, tick: f64) -> String {
         format!("{tick:.*}", self.decimals).replace('-', "\u{2212}")
     }
+}
+
+/// `10⁻³`.
+pub fn power_of_ten(exponent: impl Display) -> String {
+    let raised = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        // The others follow one another.
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    };
+    format!("10{}", exponent.to_string().chars().map(raised).collect::<String>())
 }
 
 /// 1, 2 or 5 times a power of ten, not smaller than `raw`.
@@ -108,6 +127,17 @@ mod tests {
         );
         let axis = Axis::over([-40.0, 60.0].into_iter(), 5, false);
         assert_eq!(axis.ticks.iter().map(|t| axis.text(*t)).collect::<Vec<_>>(), ["−40", "−20", "0", "20", "40", "60"]);
+    }
+
+    #[test]
+    fn what_is_a_hair_below_a_tick_asks_for_no_other_one() {
+        let axis = Axis::over([-0.01, 1.02].into_iter(), 5, false);
+        assert_eq!((axis.from, axis.to, axis.ticks[0]), (-0.01, 1.02, 0.0));
+    }
+
+    #[test]
+    fn powers_are_raised() {
+        assert_eq!([-12, 0, 3].map(power_of_ten), ["10⁻¹²", "10⁰", "10³"]);
     }
 
     proptest! {

@@ -1,6 +1,6 @@
 //! Line charts.
 
-use super::axis::Axis;
+use super::axis::{Axis, power_of_ten};
 use std::fmt::Write;
 
 /// How a series is drawn. Lines differ by dash and not by colour alone.
@@ -44,6 +44,19 @@ pub struct Series {
     pub stroke: Stroke,
 }
 
+/// A part of the x axis: from this phase line to the next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    /// Where it begins.
+    pub from: f64,
+    /// Where it ends.
+    pub to: f64,
+    /// Written above it, where there is room.
+    pub name: String,
+    /// Whether it is shaded.
+    pub shaded: bool,
+}
+
 /// A chart of lines over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -57,10 +70,14 @@ pub struct Chart {
     pub bands: Vec<Band>,
     /// The lines.
     pub series: Vec<Series>,
-    /// Vertical lines with names: where one phase ends.
+    /// Vertical lines with names along them: where something begins.
     pub marks: Vec<(f64, String)>,
+    /// Parts of the x axis, with names above them.
+    pub spans: Vec<Span>,
     /// Whether the x axis shows whole numbers only.
     pub whole_x: bool,
+    /// Whether the y axis is logarithmic.
+    pub log_y: bool,
     /// The least range of the y axis, where charts are to be compared.
     pub y_range: Option<(f64, f64)>,
     /// Where the ticks of the x axis are; empty: at round values.
@@ -73,11 +90,15 @@ const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 330.0;
 const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
-const TOP: f64 = 42.0;
+const TOP: f64 = 46.0;
 const BOTTOM: f64 = 60.0;
 /// Names of marks nearer to each other than this would touch: every other one is written this much lower.
 const MARK_DISTANCE: f64 = 24.0;
 const MARK_DROP: f64 = 56.0;
+/// What a character of a name above the axis takes where the style sheet writes it largest.
+const NAME_CHARACTER: f64 = 13.5;
+/// What a logarithmic axis takes for nothing.
+const SMALLEST: f64 = 1e-16;
 
 impl Chart {
     /// A chart without lines.
@@ -89,7 +110,9 @@ impl Chart {
             bands: Vec::new(),
             series: Vec::new(),
             marks: Vec::new(),
+            spans: Vec::new(),
             whole_x: false,
+            log_y: false,
             y_range: None,
             x_ticks: Vec::new(),
         }
@@ -131,11 +154,20 @@ impl Chart {
         }
         let areas = self.bands.iter().flat_map(|band| band.points.iter()).flat_map(|p| [p.1, p.2]);
         let least = self.y_range.into_iter().flat_map(|(low, high)| [low, high]);
-        let y = Axis::over(all().map(|p| p.1).chain(areas).chain(least), 5, false);
+        let values = all().map(|p| p.1).chain(areas).chain(least).filter(|value| value.is_finite());
+        let mut y = Axis::over(values.map(|value| self.height(value)), 5, false);
+        if self.log_y {
+            y.keep_whole_ticks();
+        }
         let mut svg = String::with_capacity(16 * 1024);
         // Writing to a String cannot fail.
         let _ = self.draw(&mut svg, &x, &y);
         svg
+    }
+
+    /// Where a value stands on the y axis.
+    fn height(&self, value: f64) -> f64 {
+        if self.log_y { value.max(SMALLEST).log10() } else { value }
     }
 
     /// The names of the lines that have a point to be seen, for a legend in HTML: class, label.
@@ -150,11 +182,14 @@ impl Chart {
     fn draw(&self, svg: &mut String, x: &Axis, y: &Axis) -> std::fmt::Result {
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
         let px = |value: f64| LEFT + x.place(value) * (right - LEFT);
-        let py = |value: f64| bottom - y.place(value) * (bottom - TOP);
+        let at_height = |height: f64| bottom - y.place(height) * (bottom - TOP);
+        let py = |value: f64| at_height(self.height(value));
+        self.draw_spans(svg, &px)?;
         for &tick in &y.ticks {
-            let at = py(tick);
+            let at = at_height(tick);
+            let text = if self.log_y { power_of_ten(format_args!("{tick:.0}")) } else { y.text(tick) };
             write!(svg, "<path class=\"grid\" d=\"M{LEFT} {at:.1}H{right}\"/>")?;
-            write!(svg, "<text class=\"tick y\" x=\"{}\" y=\"{:.1}\">{}</text>", LEFT - 8.0, at + 5.0, y.text(tick))?;
+            write!(svg, "<text class=\"tick y\" x=\"{}\" y=\"{:.1}\">{text}</text>", LEFT - 8.0, at + 5.0)?;
         }
         for &tick in &x.ticks {
             let at = px(tick);
@@ -193,6 +228,26 @@ impl Chart {
             escape(&self.x_label)
         )?;
         write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.y_label))
+    }
+}
+
+impl Chart {
+    fn draw_spans(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
+        let bottom = HEIGHT - BOTTOM;
+        for span in &self.spans {
+            let (from, to) = (px(span.from), px(span.to));
+            if span.shaded {
+                write!(svg, "<path class=\"span\" d=\"M{from:.1} {TOP}H{to:.1}V{bottom}H{from:.1}Z\"/>")?;
+            } else {
+                write!(svg, "<path class=\"mark\" d=\"M{from:.1} {TOP}V{bottom}\"/>")?;
+            }
+            if NAME_CHARACTER * span.name.chars().count() as f64 <= to - from {
+                let (middle, above) = (f64::midpoint(from, to), TOP - 6.0);
+                let name = escape(&span.name);
+                write!(svg, "<text class=\"label\" x=\"{middle:.1}\" y=\"{above}\">{name}</text>")?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -281,6 +336,24 @@ mod tests {
         let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (9.0, 2.0)]);
         chart.marks = vec![(3.0, "DS2_R".to_owned())];
         assert!(chart.svg().contains(">DS2_R</text>"));
+    }
+
+    #[test]
+    fn a_span_is_named_where_there_is_room() {
+        let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (100.0, 2.0)]);
+        let span = |from, to, name: &str| Span { from, to, name: name.to_owned(), shaded: from == 0.0 };
+        chart.spans = vec![span(0.0, 2.0, "DS2_R"), span(2.0, 30.0, "SS2_R")];
+        let svg = chart.svg();
+        assert!(svg.contains(">SS2_R</text>") && !svg.contains("DS2_R"), "{svg}");
+        assert_eq!((svg.matches("class=\"span\"").count(), svg.matches("class=\"mark\"").count()), (1, 1));
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_powers_of_ten() {
+        let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1e-3), (1.0, 10.0)]);
+        chart.log_y = true;
+        let svg = chart.svg();
+        assert!(svg.contains(">10⁻³</text>") && svg.contains(">10¹</text>"), "{svg}");
     }
 
     #[test]

@@ -10,6 +10,9 @@ const HEIGHT: f64 = 190.0;
 const GROUND: f64 = 164.0;
 /// Units of the drawing per metre.
 const SCALE: f64 = 86.0;
+/// The middle of the head, in trunks above the hip, and its radius, m: it is drawn, the model has none.
+const HEAD_AT: f64 = 1.18;
+const HEAD_M: f64 = 0.1;
 
 /// Width and height of the drawing.
 pub(super) const SIZE: (f64, f64) = (WIDTH * TILES as f64, HEIGHT);
@@ -51,6 +54,9 @@ fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
         line("right", &[figure.hip, figure.right.knee, figure.right.ankle])?;
         line("right", &foot(&figure.right))?;
         line("trunk", &[figure.hip, figure.shoulder])?;
+        let along = |i: usize| figure.hip[i] + HEAD_AT * (figure.shoulder[i] - figure.hip[i]);
+        let (x, y) = at([along(0), along(1)]);
+        write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{:.1}\"/>", HEAD_M * SCALE)?;
         write!(svg, "<text x=\"{middle:.1}\" y=\"{}\">{:.0} %</text>", HEIGHT - 6.0, 100.0 * share)?;
     }
     Ok(())

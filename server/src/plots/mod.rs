@@ -13,7 +13,8 @@ mod sparkline;
 mod standalone;
 mod tree;
 
-pub use chart::{Band, Chart, Series, Stroke};
+pub use axis::power_of_ten;
+pub use chart::{Band, Chart, Series, Span, Stroke};
 pub use figure::{Drawing, Figure, PngError};
 pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};

@@ -89,9 +89,9 @@ pub fn best_to_show(standing: &Standing) -> Result<Option<TrialId>, LearnerError
 
 fn reason_in_words(reason: ProposalReason) -> String {
     match reason {
-        ProposalReason::FirstAction => "first action: drawn at random",
+        ProposalReason::FirstAction => "first one: drawn at random",
         ProposalReason::RandomAction => "drawn at random",
-        ProposalReason::ThompsonOnLine => "Thompson draw on a line through the best",
+        ProposalReason::ThompsonOnLine => "on a line through the best",
         ProposalReason::ExpectedBestUtility => "highest expected utility beside the best",
         ProposalReason::LinesExhausted => "lines exhausted: drawn at random",
         _ => "chosen by the learner",

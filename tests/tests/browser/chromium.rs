@@ -251,9 +251,10 @@ impl Tab {
         self.page.find_elements(selector).await.map_or(0, |found| found.len())
     }
 
-    /// The text of an element.
+    /// The text of an element, once it is there.
     pub(crate) async fn text(&self, selector: &str) -> String {
-        self.page.find_element(selector).await.unwrap().inner_text().await.unwrap().unwrap_or_default()
+        self.wait_for(selector).await;
+        self.value(&format!("document.querySelector({selector:?})?.innerText ?? ''")).await
     }
 
     /// Runs a script; while a page gives way to the next one, a moment later.

@@ -50,6 +50,10 @@ async fn browser_gait_is_shown_whole_and_colours_muscles() {
     }
     assert_eq!(page.count("svg.tiles").await, 1);
     assert_eq!(page.count("#bounds tbody tr").await, 8);
+    let reached =
+        "[...document.querySelectorAll('#bounds tbody tr')].every(row => /[0-9]/.test(row.cells[3].textContent))";
+    assert_eq!(page.value(reached).await, "true", "of every bound it is said what the gait makes of it");
+    assert_eq!(page.count("#solve .files a").await, 3);
     // Muscles of a leg are drawn in a colour of their own.
     let page = browser.open(&site.at(&format!("/trials/{trial}"))).await;
     page.wait_for("[data-play]").await;

@@ -34,7 +34,13 @@ async fn browser_signs_in_by_link_then_by_password() {
     page.goto(&site.at(&format!("/sign-in/{link}"))).await;
     page.click("main button").await;
     page.wait_for("a[href='/studies/new']").await;
-    page.click("nav a[href='/account']").await;
+    // The link was used up: a password is the next way in, and the page says so.
+    page.click("main .notice a[href='/account']").await;
+    page.wait_for("#password").await;
+    assert_eq!(
+        page.value("[...document.querySelectorAll('main input')].filter(e => e.checkVisibility()).length").await,
+        "1"
+    );
     page.fill("#password", "correct horse battery").await;
     page.click("main form[action='/account'] button").await;
     page.wait_for(".notice.good").await;
@@ -44,6 +50,7 @@ async fn browser_signs_in_by_link_then_by_password() {
     page.fill("#password", "correct horse battery").await;
     page.click("main button").await;
     page.wait_for("a[href='/studies/new']").await;
+    assert_eq!(page.count("main .notice").await, 0);
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
@@ -55,13 +62,15 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
     let page = browser.open(&site.at(&format!("/sign-in/{link}"))).await;
     page.click("main button").await;
     page.click("nav a[href='/system']").await;
+    page.click("form[action='/system/backup'] button").await;
+    page.wait_for(".notice.good code").await;
     page.click("main a[href='/people']").await;
     page.wait_for("#user-name").await;
     page.fill("#user-name", "R1").await;
     page.click("button[value=add_user]").await;
     page.wait_for(".secret").await;
-    let path = page.text(".secret").await;
-    assert!(path.starts_with("/sign-in/"), "{path}");
+    let link = page.text(".secret").await;
+    assert!(link.starts_with(&site.at("/sign-in/")), "{link}");
     page.fill("#token-name", "treadmill").await;
     page.click("button[value=make_token]").await;
     page.wait_until("document.querySelector('.secret')?.textContent.startsWith('gait_') ?? false").await;
@@ -72,9 +81,9 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
     page.goto(&site.at("/audit?verify=true")).await;
     page.wait_for(".notice.good").await;
     let rows = page.text("tbody").await;
-    assert!(rows.contains("token.make") && rows.contains("user.add"), "{rows}");
+    assert!(["token: make", "user: add", "record: backup"].iter().all(|row| rows.contains(row)), "{rows}");
     // The rater sees comparisons and nothing else.
-    page.goto(&site.at(&path)).await;
+    page.goto(&link).await;
     page.click("main button").await;
     page.wait_for("main h1").await;
     page.wait_until("location.pathname === '/rate'").await;

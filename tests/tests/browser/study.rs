@@ -21,12 +21,14 @@ async fn browser_from_nothing_to_a_finished_study_in_three_clicks() {
     page.wait_for("[data-trial]").await;
     page.wait_for("[data-part=state] .state.finished").await;
     page.wait_until("document.querySelectorAll('.trials tbody tr').length === 3").await;
+    assert!(!page.text("#trials").await.contains("None yet") && page.count("#trials form.filter").await == 1);
     assert_eq!(page.count("[data-part=history] svg.chart").await, 1);
     // What is recommended can be taken along.
-    let bounds = page.value("document.querySelector('[data-part=best] a[download]').getAttribute('href')").await;
+    let bounds = "document.querySelector('[data-part=best] a[download$=\".json\"]').getAttribute('href')";
+    let bounds = page.value(bounds).await;
     let told = site.service.fetch(&bounds).await.json();
     assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
-    page.click(".trials tbody tr a").await;
+    page.click("[data-part=best] a.button").await;
     page.wait_for(".walker canvas").await;
     page.wait_for("[data-phase]").await;
     assert!(page.count("svg.chart").await >= 12);
@@ -128,7 +130,7 @@ async fn browser_checks_a_new_study_while_it_is_typed() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let page = browser.open(&site.at("/studies/new")).await;
-    page.wait_until("document.querySelector('[data-outlook]').textContent.includes('11664')").await;
+    page.wait_until("document.querySelector('[data-outlook]').textContent.includes('11\u{202f}664')").await;
     page.wait_for("[data-reference] figure svg").await;
     let matcher = page.text("[data-reference]").await;
     assert!(matcher.contains("nearer") || matcher.contains("nearest"), "{matcher}");
@@ -136,6 +138,11 @@ async fn browser_checks_a_new_study_while_it_is_typed() {
     page.wait_for("#trial_budget[aria-invalid=true]").await;
     page.wait_for("[data-outlook].bad").await;
     page.fill("#trial_budget", "2").await;
+    // What is refused is shown, also where it was folded away.
+    page.run("document.querySelector('#seed').value = 'x'").await;
+    page.fill("#name", "a seed that is none").await;
+    page.wait_for("details[open] #seed[aria-invalid=true]").await;
+    page.run("document.querySelector('#seed').value = '1'").await;
     page.run("document.querySelector('.editor').closest('details').open = true; \
               for (const box of document.querySelectorAll('.editor [type=checkbox]')) box.checked = box.name === 'tuned_a5'")
         .await;
@@ -162,6 +169,12 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     // What waits is on the first page.
     let page = browser.open(&site.origin).await;
     page.click("[aria-labelledby=waits] a").await;
+    // Both gaits walk, on one clock.
+    page.wait_for(".walker [data-play]").await;
+    assert_eq!(page.count(".walker canvas").await, 2);
+    let drawn = "[...document.querySelectorAll('.walker canvas')].map(c => c.toDataURL().length).join()";
+    let before = page.value(drawn).await;
+    page.wait_until(&format!("{drawn} !== {before:?}")).await;
     page.wait_for("input[name=answer]").await;
     page.run("document.querySelector('input[name=answer]').focus()").await;
     page.press("ArrowRight").await;
@@ -172,7 +185,9 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     assert_eq!(page.value("document.querySelector('#author').value").await, "K1");
     page.press("Enter").await;
     page.wait_for(".notice.good").await;
-    assert!(page.text(".notice.good").await.contains("no difference between trial"));
+    let said = page.text(".notice.good").await;
+    assert!(said.contains("no difference between trial") && said.contains("how the study goes"), "{said}");
+    assert_eq!(page.count("input[name=answer]").await, 0, "nothing to answer, no form");
 
     while site.service.trials(study).await.len() < 3 {
         tokio::time::sleep(Duration::from_millis(10)).await;

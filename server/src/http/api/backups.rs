@@ -4,7 +4,8 @@ use crate::access::Administer;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::once::Once;
-use crate::store::{audit, backup};
+use crate::store::audit::Actor;
+use crate::store::{Writer, audit, backup};
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
@@ -14,11 +15,26 @@ use utoipa::ToSchema;
 
 /// A copy of the record.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Copy {
+pub(crate) struct Copy {
     /// Its name; it lies beside the record.
-    file: String,
+    pub(crate) file: String,
     /// Its size.
     bytes: u64,
+}
+
+impl Copy {
+    /// Copies the record to a new file beside it, and checks the copy.
+    pub(crate) async fn make(app: &AppState) -> Result<Self, Error> {
+        let (file, bytes) = backup::beside_record(app.store()).await?;
+        Ok(Self { file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(), bytes })
+    }
+
+    /// Writes down that it was made.
+    pub(crate) async fn record(&self, writer: &mut Writer, actor: &Actor) -> Result<(), Error> {
+        let detail = json!({ "bytes": self.bytes });
+        audit::append(writer, actor, "record.backup", &format!("file {}", self.file), &detail).await?;
+        Ok(())
+    }
 }
 
 /// `POST`: copies the record to a new file beside it, and checks the copy.
@@ -33,13 +49,11 @@ pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) 
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let (file, bytes) = backup::beside_record(app.store()).await?;
-    let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let copy = Copy::make(&app).await?;
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let detail = json!({ "bytes": bytes });
-    audit::append(&mut writer, &once.actor, "record.backup", &format!("file {file}"), &detail).await?;
-    once.finish(&app, writer, StatusCode::CREATED, None, &Copy { file, bytes }).await
+    copy.record(&mut writer, &once.actor).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &copy).await
 }

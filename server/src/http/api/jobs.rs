@@ -28,11 +28,21 @@ pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Js
 
 /// Who solves.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Workers {
+pub(crate) struct Workers {
     /// How many solves can run at the same time.
-    places: usize,
+    pub(crate) places: usize,
     /// Solves by the name of the worker that runs them.
-    at_work: BTreeMap<String, u32>,
+    pub(crate) at_work: BTreeMap<String, u32>,
+}
+
+impl Workers {
+    pub(crate) async fn read(app: &AppState) -> Result<Self, Error> {
+        let mut at_work = BTreeMap::new();
+        for worker in jobs::open(&mut *app.read().await?, MOST).await?.into_iter().filter_map(|job| job.worker) {
+            *at_work.entry(worker).or_default() += 1;
+        }
+        Ok(Self { places: app.director.workers(), at_work })
+    }
 }
 
 /// `GET`: who solves at the moment. A worker behind a broker is known while it has a job.
@@ -44,9 +54,5 @@ pub(super) struct Workers {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn workers(_: May<Read>, State(app): State<AppState>) -> Result<Json<Workers>, Error> {
-    let mut at_work = BTreeMap::new();
-    for worker in jobs::open(&mut *app.read().await?, MOST).await?.into_iter().filter_map(|job| job.worker) {
-        *at_work.entry(worker).or_default() += 1;
-    }
-    Ok(Json(Workers { places: app.director.workers(), at_work }))
+    Ok(Json(Workers::read(&app).await?))
 }

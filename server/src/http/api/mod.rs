@@ -29,6 +29,9 @@ mod tokens;
 mod trials;
 mod users;
 
+pub(super) use backups::Copy;
+pub(super) use jobs::Workers;
+
 use super::{AppState, RECORDING_LIMIT_BYTES};
 use axum::extract::DefaultBodyLimit;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouterExt};
@@ -66,6 +69,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::of_study))
         .routes(routes!(trials::of_study_csv))
         .routes(routes!(recommendation::of_study))
+        .routes(routes!(recommendation::of_study_csv))
         .routes(routes!(archive::of_study))
         .routes(routes!(history::of_study))
         .routes(routes!(history::of_study_csv))

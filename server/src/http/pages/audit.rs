@@ -1,6 +1,7 @@
 //! The audit trail: who did what, and whether the chain of its rows is whole.
 
 use super::error::{Page, page};
+use super::format::words;
 use crate::access::Administer;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -30,6 +31,21 @@ struct AuditPage {
 }
 
 impl AuditPage {
+    /// `lab_session.process` as `lab session: process`.
+    fn words(action: &str) -> String {
+        words(action).replacen('.', ": ", 1)
+    }
+
+    /// `study 0190...` with the end of the identifier alone, which tells it apart.
+    fn short(object: &str) -> String {
+        match object.rsplit_once('-') {
+            Some((start, end)) if end.len() == 12 => {
+                format!("{} {}", start.rsplit_once(' ').map_or("", |(kind, _)| kind), &end[4..])
+            }
+            _ => object.to_owned(),
+        }
+    }
+
     /// `study 0190...` as a link, where there is a page for it.
     fn link(row: &AuditRow) -> Option<String> {
         let (kind, id) = row.object.split_once(' ')?;

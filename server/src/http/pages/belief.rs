@@ -161,12 +161,15 @@ fn marginals(belief: &Belief) -> Vec<Drawn> {
         let line = levels.iter().map(|m| (m.value, m.average.mean)).collect();
         let band = levels.iter().map(|m| (m.value, ends(m)[0], ends(m)[1])).collect();
         let label = format!("{}: {}", dimension.name, meaning(&dimension.name));
-        let mut chart = Chart::new(&dimension.name, &label, "utility")
-            .with_band("one standard deviation", 0, band)
-            .with("mean", 0, Stroke::Marked, line);
+        let mut chart = Chart::new(&label, &label, "utility").with_band("one standard deviation", 0, band).with(
+            "mean",
+            0,
+            Stroke::Marked,
+            line,
+        );
         chart.y_range = Some(range);
         chart.x_ticks.clone_from(&dimension.values);
-        Drawn::new(&chart, "")
+        Drawn::new(&chart)
     };
     belief.posterior.space().dimensions().iter().zip(&belief.marginals).map(draw).collect()
 }

@@ -1,6 +1,7 @@
 //! The certificate on a gait's page, and the button that asks for it.
 
 use super::error::PageError;
+use super::format;
 use crate::access::Run;
 use crate::http::AppState;
 use crate::http::extract::Id;
@@ -20,21 +21,20 @@ pub(super) struct InWords {
     /// Figures of the closed loop: meaning and value.
     pub(super) figures: Vec<(&'static str, String)>,
     /// Every check.
-    pub(super) checks: Vec<Check>,
+    pub(super) checks: Vec<CheckInWords>,
 }
 
 impl InWords {
     pub(super) fn new(certificate: Certificate) -> Self {
         let mut figures = Vec::new();
         if let Some(map) = &certificate.return_map {
-            figures.push(("Largest Poincaré multiplier", format!("{:.3e}", map.largest)));
-            let differences = format!("{:.3e} (to {:.0e})", map.largest_by_differences, map.differences_resolve);
-            figures.push(("The same by differences, and what they resolve", differences));
-            figures.push(("Multiplier of the zero dynamics", format!("{:.3e}", map.zero_dynamics)));
-            figures.push((
-                "From the gait to the periodic motion, rad, rad/s",
-                format!("{:.1e}", map.fixed_point_distance),
-            ));
+            figures.push(("Largest Poincaré multiplier", format::number(map.largest)));
+            let (found, resolved) =
+                (format::number(map.largest_by_differences), format::number(map.differences_resolve));
+            figures.push(("The same by differences, and what they resolve", format!("{found} (to {resolved})")));
+            figures.push(("Multiplier of the zero dynamics", format::number(map.zero_dynamics)));
+            let distance = format::number(map.fixed_point_distance);
+            figures.push(("From the gait to the periodic motion, rad, rad/s", distance));
         }
         if let Some(free) = &certificate.free_hip_return_map {
             let words = format!("{:.3} (by differences {:.3})", free.largest, free.largest_by_differences);
@@ -47,7 +47,30 @@ impl InWords {
             );
             figures.push(("Pushes at the hip that are recovered", words));
         }
-        Self { passed: certificate.passed, objections: certificate.objections, figures, checks: certificate.checks }
+        let checks = certificate.checks.into_iter().map(CheckInWords::new).collect();
+        Self { passed: certificate.passed, objections: certificate.objections, figures, checks }
+    }
+}
+
+/// A check with its figures as people read them.
+pub(super) struct CheckInWords {
+    pub(super) name: String,
+    pub(super) value: String,
+    pub(super) limit: String,
+    pub(super) place: String,
+}
+
+impl CheckInWords {
+    fn new(check: Check) -> Self {
+        let in_unit = |value: Option<f64>, otherwise: &str| {
+            value.map_or_else(|| otherwise.to_owned(), |value| format!("{} {}", format::number(value), check.unit))
+        };
+        Self {
+            value: in_unit(check.value, "not determined"),
+            limit: in_unit(check.limit, "reported only"),
+            name: check.name,
+            place: check.place,
+        }
     }
 }
 

@@ -48,6 +48,8 @@ struct ComparePage {
     charts: Vec<Drawn>,
     key: FeedbackId,
     saved: Option<Saved>,
+    /// The learner asks for a comparison.
+    waits: bool,
     typed: Submitted,
     refused: Option<String>,
 }
@@ -75,12 +77,14 @@ const OFFERED: u32 = 200;
 
 /// `GET /studies/{id}/compare`.
 pub(super) async fn get(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
     Shown(id): Shown<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
-    show(&app, id, choice, Submitted::default(), None).await
+    // Who signed in need not say so again.
+    let author = if may.caller.user.is_some() { may.caller.name } else { String::new() };
+    show(&app, id, choice, Submitted { author, ..Submitted::default() }, None).await
 }
 
 async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
@@ -102,6 +106,7 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         None => None,
     };
     let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
+    let waits = question.is_some();
     let mut trials: Vec<Offered> = standing
         .trials
         .iter()
@@ -133,7 +138,11 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         _ => None,
     };
     drop(reader);
-    let draw = move || pair.map(|(a, b)| gait_charts::of_pair(&a, &b, &reference)).unwrap_or_default();
+    let draw = move || {
+        let Some((a, b)) = pair else { return Vec::new() };
+        let charts = gait_charts::beside_reference(&[("gait A", &a), ("gait B", &b)], &reference);
+        charts.iter().map(Drawn::new).collect()
+    };
     let charts = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
     let saved = saved.and_then(|(row, beside)| {
         let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, &standing)?));
@@ -145,7 +154,18 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
             beside: beside.into_iter().filter_map(said).collect(),
         })
     });
-    page(&ComparePage { study: standing.study, trials, a, b, charts, key: FeedbackId::fresh(), saved, typed, refused })
+    page(&ComparePage {
+        study: standing.study,
+        trials,
+        a,
+        b,
+        charts,
+        key: FeedbackId::fresh(),
+        saved,
+        waits,
+        typed,
+        refused,
+    })
 }
 
 /// Refuses what the address asks to compare and cannot be compared.

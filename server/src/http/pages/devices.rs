@@ -1,6 +1,7 @@
 //! Devices: the list, and each with the form that makes another one of it.
 
 use super::error::{Page, PageError, page};
+use super::format;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
@@ -44,6 +45,7 @@ struct DevicePage {
 
 struct Row {
     field: DeviceField,
+    allowed: String,
     value: String,
     source: String,
 }
@@ -52,6 +54,7 @@ impl DevicePage {
     fn of(device: Device, may_run: bool) -> Self {
         let of_device = |field: &DeviceField| Row {
             field: *field,
+            allowed: format::range(field.minimum, field.maximum),
             value: (field.value)(&device.definition).to_string(),
             source: device.definition.sources.get(field.name).cloned().unwrap_or_default(),
         };

@@ -14,9 +14,9 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    pub(super) fn new(chart: &Chart, note: &'static str) -> Self {
+    pub(super) fn new(chart: &Chart) -> Self {
         let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-        Self { title: chart.title.clone(), note, svg: chart.svg(), legend, files: Vec::new() }
+        Self { title: chart.title.clone(), note: "", svg: chart.svg(), legend, files: Vec::new() }
     }
 
     /// A figure with its files, which are in a folder, with a query.
@@ -24,7 +24,7 @@ impl Drawn {
         let address = |ending: &str| format!("{folder}/{}.{ending}{query}", figure.name);
         let files = vec![("SVG", address("svg")), ("PNG", address("png")), ("CSV", address("csv"))];
         let drawn = match &figure.drawing {
-            Drawing::Chart(chart) => Self::new(chart, ""),
+            Drawing::Chart(chart) => Self::new(chart),
             Drawing::Tiles(title, stick_figures) => Self {
                 title: title.clone(),
                 note: "",

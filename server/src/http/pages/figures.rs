@@ -3,14 +3,14 @@
 use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::side_by_side::Side;
-use super::{gait_charts, lab_charts};
+use super::{gait_charts, lab_charts, study};
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::{Chart, Figure, Stroke, band_in_words};
+use crate::plots::{Chart, Figure, band_in_words};
 use crate::store::studies::Study;
 use crate::store::{
     Connection, LabSessionId, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials,
@@ -40,6 +40,8 @@ pub(crate) struct StudyFigures {
     study: Study,
     /// The best trial of the study, with its number.
     best: Option<(TrialId, u32)>,
+    /// Those of the studies that have no gait to draw.
+    without_gait: Vec<String>,
     sections: Vec<Section>,
 }
 
@@ -53,9 +55,9 @@ impl StudyFigures {
 /// A study with its best gait.
 struct Best {
     side: Side,
+    figures: study::Figures,
     trial: Option<(TrialId, u32)>,
     gait: Option<Gait>,
-    course: Vec<(f64, f64)>,
 }
 
 impl Best {
@@ -76,7 +78,7 @@ impl Best {
             Some((id, _)) => gait_of(db, id).await?,
             None => None,
         };
-        Ok(Self { course: figures.course(), side, trial, gait })
+        Ok(Self { side, figures, trial, gait })
     }
 
     fn name(&self) -> &str {
@@ -112,18 +114,13 @@ pub(crate) async fn of_study(app: &AppState, id: StudyId, other: Option<StudyId>
     })
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
+    let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
     let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
-    Ok(StudyFigures { best: first.trial, study: first.side.standing.study, sections: sections? })
+    Ok(StudyFigures { best: first.trial, study: first.side.standing.study, without_gait, sections: sections? })
 }
 
 fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
-    let strokes = [Stroke::Steps, Stroke::DashedSteps];
-    let mut course =
-        Chart::new("Gait RMSE of the best action", "iteration (in order of the results)", "Gait RMSE, rad");
-    course.whole_x = true;
-    for (place, best) in shown.iter().enumerate() {
-        course = course.with(best.name(), place, strokes[place % 2], best.course.clone());
-    }
+    let standings: Vec<_> = shown.iter().map(|best| (&best.side.standing, &best.figures)).collect();
     let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
     let mut tiles = Vec::new();
     for (name, gait) in &gaits {
@@ -132,10 +129,10 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
     let charts = |group: &str, charts: Vec<Chart>| charts.into_iter().map(|c| Figure::chart(group, c)).collect();
     Ok(vec![
         Section {
-            id: "course",
+            id: study::COURSE,
             heading: "Gait RMSE of the best action by iteration",
             hint: "Figure 3b of the paper, with a study with muscles and one without.".to_owned(),
-            figures: charts("course", vec![course]),
+            figures: charts(study::COURSE, study::course(&standings).into_iter().collect()),
         },
         Section {
             id: "angles",
@@ -169,12 +166,14 @@ pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>,
     let reference = studies::get(&mut reader, study).await?.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
     let Some(gait) = gait_of(&mut reader, id).await? else { return Ok(Vec::new()) };
+    let iterations = gaits::iterations(&mut reader, id).await?;
     drop(reader);
     tokio::task::spawn_blocking(move || {
         let mut figures = vec![gait_charts::tiles(stick_figures(&gait)?)];
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
         }
+        figures.extend(gait_charts::of_iterations(&iterations).map(|chart| Figure::chart("solve", chart)));
         Ok(figures)
     })
     .await
@@ -214,6 +213,7 @@ pub(super) async fn measured_cycles(
 struct FiguresPage {
     study: Study,
     best: Option<(TrialId, u32)>,
+    without_gait: Vec<String>,
     other: Option<StudyId>,
     offered: Vec<Study>,
     sessions: Vec<(LabSessionId, u32)>,
@@ -244,7 +244,7 @@ pub(super) async fn get(
         None | Some("") => None,
         Some(text) => Some(text.parse::<StudyId>().map_err(|_| Error::invalid("other", text, "a study of the list"))?),
     };
-    let StudyFigures { study, best, sections } = of_study(&app, id, other).await?;
+    let StudyFigures { study, best, without_gait, sections } = of_study(&app, id, other).await?;
     let mut reader = app.read().await?;
     let mut offered = studies::page(&mut reader, None, OFFERED).await?;
     offered.retain(|offered| offered.id != id);
@@ -259,6 +259,7 @@ pub(super) async fn get(
     page(&FiguresPage {
         study,
         best,
+        without_gait,
         other,
         offered,
         sessions: sessions.iter().map(|session| (session.id, session.number)).collect(),

@@ -1,5 +1,6 @@
 //! Numbers as people read them.
 
+use crate::plots::power_of_ten;
 use crate::store::feedback::Source;
 use crate::store::studies::FeedbackMode;
 use gait_optimizer::TunedBounds;
@@ -28,9 +29,53 @@ pub(super) fn duration(seconds: f64) -> String {
     }
 }
 
-/// A very small number, or a dash.
-pub(super) fn tiny(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.0e}"))
+/// A number of any size with three digits: `0.0123`, `2.46 × 10⁻⁷`.
+pub(super) fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 || (1e-3..1e5).contains(&magnitude) {
+        return minus(&significant(value));
+    }
+    let text = format!("{value:.2e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => minus(&format!("{digits} × {}", power_of_ten(exponent))),
+        None => text,
+    }
+}
+
+/// At most three digits, and no nought at the end.
+fn significant(value: f64) -> String {
+    let whole = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let last = 10_f64.powf(2.0 - whole.min(2.0));
+    ((value * last).round() / last).to_string()
+}
+
+/// With the sign that is as wide as a plus.
+fn minus(text: &str) -> String {
+    text.replace('-', "\u{2212}")
+}
+
+/// `−0.1 to 0.2`.
+pub(super) fn range(minimum: f64, maximum: f64) -> String {
+    minus(&format!("{minimum} to {maximum}"))
+}
+
+/// The same, or a dash.
+pub(super) fn optional_number(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), number)
+}
+
+/// A count with its thousands apart: `11 664`.
+pub(super) fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            // Too narrow to break a line at.
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 /// `not_converged` as `not converged`.
@@ -52,6 +97,11 @@ pub(super) fn answers_by(mode: FeedbackMode) -> &'static str {
     }
 }
 
+/// What a study waits for besides its solves; empty: nothing.
+pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
+    if mode == FeedbackMode::Human { ", and the time people take to answer" } else { "" }
+}
+
 /// Where an answer comes from.
 pub(super) fn source(source: Source) -> &'static str {
     match source {
@@ -71,7 +121,7 @@ pub(super) fn percent(probability: f64) -> String {
 /// A number with two decimals and its sign.
 pub(super) fn signed(value: f64) -> String {
     // No zero is written as -0.
-    format!("{:+.2}", if value.abs() < 0.005 { 0.0 } else { value }).replace('-', "\u{2212}")
+    minus(&format!("{:+.2}", if value.abs() < 0.005 { 0.0 } else { value }))
 }
 
 /// What a bound limits, with its unit; empty for what is no bound.
@@ -94,4 +144,23 @@ pub(super) fn bounds(action: &TunedBounds) -> Vec<Bound> {
         .zip(TunedBounds::MEANINGS)
         .map(|((name, value), meaning)| Bound { name, value: value.to_string(), meaning })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_and_few_noughts() {
+        let numbers = [0.0, 1.0, 0.012_345, -79.998, 1234.5, 2.46e-7, -3e-10, 1.5e8].map(number);
+        assert_eq!(
+            numbers,
+            ["0", "1", "0.0123", "−80", "1235", "2.46 × 10⁻⁷", "−3.00 × 10⁻¹⁰", "1.50 × 10⁸"].map(str::to_owned)
+        );
+    }
+
+    #[test]
+    fn counts_have_their_thousands_apart() {
+        assert_eq!([7, 999, 11_664, 1_000_000].map(count), ["7", "999", "11\u{202f}664", "1\u{202f}000\u{202f}000"]);
+    }
 }

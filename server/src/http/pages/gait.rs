@@ -18,7 +18,7 @@ use crate::store::{StoreError, TrialId, certificates, gaits, reference_gaits, st
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
-use gait_optimizer::{Gait, IterationRecord, ReferenceGait, SolveStatus, TunedBounds};
+use gait_optimizer::{Gait, IterationRecord, ReferenceGait, SolveStatus, TunedBounds, Violation};
 
 #[derive(Template)]
 #[template(path = "gait.html")]
@@ -50,6 +50,12 @@ struct GaitPage {
     trial: Trial,
 }
 
+impl GaitPage {
+    fn missed_by(violation: &Violation) -> String {
+        format::number(violation.amount)
+    }
+}
+
 /// `GET /trials/{id}`.
 pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<TrialId>) -> Page {
     let mut reader = app.read().await?;
@@ -79,7 +85,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         rmse: format::figure(trial.gait_rmse_rad),
         cost: format::figure(trial.cost_of_transport),
         seconds: format::seconds(trial.seconds_total),
-        violation: format::tiny(trial.max_violation),
+        violation: format::optional_number(trial.max_violation),
         figures: figures(&trial),
         bounds: drawn.bounds,
         explanation: trial.status.and_then(explanation),
@@ -133,9 +139,9 @@ fn draw(
     let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
     Ok(Everything {
         groups: groups.into_iter().map(group).collect(),
-        solve: gait_charts::of_iterations(iterations),
+        solve: gait_charts::of_iterations(iterations).map(|chart| drawn(&Figure::chart("solve", chart))),
         tiles: tiles.as_ref().map(drawn),
-        bounds: bound_use::of(action, gait),
+        bounds: bound_use::of(action, gait)?,
     })
 }
 
@@ -172,7 +178,10 @@ fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
         ("Walking speed, m/s", format!("{:.3}", r.speed_m_s)),
         ("Stride length, m", format!("{:.3}", r.stride_length_m)),
         ("Stride time, s", format!("{:.3}", r.durations_s.iter().sum::<f64>())),
-        ("Hip velocities, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),
-        ("Problem", format!("{} variables, {} equalities, {} inequalities", r.variables, r.equalities, r.inequalities)),
+        ("Hip velocity in the four runs between impacts, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),
+        (
+            "Size of the problem",
+            format!("{} variables, {} equalities, {} inequalities", r.variables, r.equalities, r.inequalities),
+        ),
     ]
 }

@@ -1,9 +1,8 @@
 //! The charts of a gait.
 
-use super::drawn::Drawn;
 use crate::error::Error;
 use crate::http::gait_series::{MUSCLES, Point, points};
-use crate::plots::{Chart, Figure, Stroke, band_in_words, over_reference};
+use crate::plots::{Chart, Figure, Span, Stroke, band_in_words, over_reference};
 use gait_optimizer::solve::Phase;
 use gait_optimizer::walking::stick_figure::StickFigure;
 use gait_optimizer::walking::{Progress, progress};
@@ -52,15 +51,15 @@ impl Group {
 struct Cycle<'a> {
     points: Vec<Point<'a>>,
     end: f64,
-    marks: Vec<(f64, String)>,
+    spans: Vec<Span>,
 }
 
 impl<'a> Cycle<'a> {
     fn of(gait: &'a Gait) -> Self {
         let points = points(gait);
         let end = points.last().map_or(1.0, |point| point.time_s).max(1e-9);
-        let marks = domain_starts(&points, end);
-        Self { points, end, marks }
+        let spans = domains(&points, end);
+        Self { points, end, spans }
     }
 
     /// A line over the cycle, with a gap between domains: forces, torques and accelerations may jump there.
@@ -80,7 +79,7 @@ impl<'a> Cycle<'a> {
     }
 
     fn marked(&self, mut chart: Chart) -> Chart {
-        chart.marks.clone_from(&self.marks);
+        chart.spans.clone_from(&self.spans);
         chart
     }
 }
@@ -115,8 +114,12 @@ fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, Error> {
     let velocity = Chart::new("Hip velocity", CYCLE, "velocity, m/s")
         .with("of the linearised hip position", 0, Stroke::Solid, over(|point| point.hip_velocity_m_s))
         .with("of the hip", 1, Stroke::Dashed, cycle.over(|point| point.qd[0]));
-    let phase =
-        Chart::new("Phase", CYCLE, "phase of the domain").with("phase", 0, Stroke::Solid, over(|point| point.phase));
+    let phase = Chart::new("Phase", CYCLE, "share of the phase, 0 to 1").with(
+        "phase",
+        0,
+        Stroke::Solid,
+        over(|point| point.phase),
+    );
     let charts = vec![cycle.marked(velocity), cycle.marked(phase)];
     let hint = "The phase is the hip's linearised place over the stance toe, from the planned start of a domain to its planned \
                 end; it takes the place of time. In all domains but SS1 its velocity is held constant.";
@@ -206,20 +209,31 @@ fn portraits(cycle: &Cycle<'_>) -> Group {
     Group::new("portraits", "Phase portraits", hint, charts)
 }
 
-/// Where each domain begins, in percent of the cycle.
-fn domain_starts(points: &[Point<'_>], end: f64) -> Vec<(f64, String)> {
-    let mut starts: Vec<(f64, String)> = Vec::new();
-    let mut current = "";
+/// The domains in percent of the cycle; double support is shaded.
+fn domains(points: &[Point<'_>], end: f64) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
     for point in points {
-        if point.domain != current {
-            current = point.domain;
-            starts.push((100.0 * point.time_s / end, current.to_owned()));
+        let at = 100.0 * point.time_s / end;
+        match spans.last_mut() {
+            Some(span) if span.name == point.domain => span.to = at,
+            _ => {
+                let shaded = point.domain.starts_with("DS");
+                spans.push(Span { from: at, to: at, name: point.domain.to_owned(), shaded });
+            }
         }
     }
-    starts
+    spans
 }
 
-/// The human joint angles of gaits over a reference with its deviation: name and gait.
+/// The joint angles of a reference alone: title and chart.
+pub(super) fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
+    let chart = |&(title, _, column): &(&str, usize, usize)| {
+        over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column)
+    };
+    ANGLES.iter().map(chart).collect()
+}
+
+/// The human joint angles of gaits over a reference: name and gait.
 pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
     let draw = |&(title, q, column): &(&str, usize, usize)| {
         let mut chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);
@@ -244,22 +258,6 @@ pub(super) fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
         chart
     };
     if gaits.is_empty() { Vec::new() } else { COORDINATES.iter().enumerate().map(draw).collect() }
-}
-
-/// The human joint angles of two gaits, one over the other.
-pub(super) fn of_pair(a: &Gait, b: &Gait, reference: &ReferenceGait) -> Vec<Drawn> {
-    let line = |gait: &Gait, q: usize| -> Vec<(f64, f64)> {
-        let points = points(gait);
-        let end = points.last().map_or(1.0, |point| point.time_s).max(1e-9);
-        points.iter().map(|point| (100.0 * point.time_s / end, point.q[q].to_degrees())).collect()
-    };
-    let draw = |&(title, q, column): &(&str, usize, usize)| {
-        let chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column)
-            .with("gait A", 0, Stroke::Solid, line(a, q))
-            .with("gait B", 1, Stroke::Dashed, line(b, q));
-        Drawn::new(&chart, "")
-    };
-    ANGLES.iter().map(draw).collect()
 }
 
 /// In words.
@@ -291,23 +289,25 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
     starts
 }
 
-/// How the solve went.
-pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Drawn> {
-    if iterations.is_empty() {
+/// How the solve went; none before its first iterations.
+pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Chart> {
+    // One point is no line.
+    if iterations.len() < 2 {
         return None;
     }
     // Guesses that ran side by side are shown one after the other.
     let mut iterations: Vec<&IterationRecord> = iterations.iter().collect();
     iterations.sort_by_key(|r| r.guess);
     let line = |f: fn(&IterationRecord) -> f64| -> Vec<(f64, f64)> {
-        iterations.iter().enumerate().map(|(i, r)| (i as f64, f(r).max(1e-16).log10())).collect()
+        iterations.iter().enumerate().map(|(i, r)| (i as f64, f(r))).collect()
     };
-    let mut chart = Chart::new("How the solve went", "iteration", "log10")
+    let mut chart = Chart::new("Objective, violation and barrier by iteration", "iteration", "scaled, without unit")
         .with("constraint violation", 0, Stroke::Solid, line(|r| r.constraint_violation))
         .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
         .with("barrier", 2, Stroke::Solid, line(|r| r.barrier))
         .with("objective", 3, Stroke::Dashed, line(|r| r.objective.abs()));
     chart.whole_x = true;
+    chart.log_y = true;
     chart.marks = solve_phases(&iterations);
-    Some(Drawn::new(&chart, "Scaled; decimal logarithm. Vertical lines: where a phase of the solve begins."))
+    Some(chart)
 }

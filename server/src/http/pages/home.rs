@@ -10,7 +10,7 @@ use crate::http::may::May;
 use crate::plots::sparkline;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialCounts;
-use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
+use crate::store::{Connection, StudyId, consents, studies, subjects, trials, users};
 use askama::Template;
 use axum::extract::State;
 use serde::Deserialize;
@@ -21,6 +21,8 @@ const PAGE: u32 = 100;
 #[derive(Template)]
 #[template(path = "home.html")]
 struct Home {
+    /// Whoever asks came by a link that works once, and has no other way in.
+    no_password: bool,
     /// What goes on only when somebody does something.
     waiting: Vec<Waiting>,
     studies: Vec<Row>,
@@ -56,7 +58,11 @@ struct Waiting {
 }
 
 /// `GET /`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(Before { before }): Params<Before>) -> Page {
+pub(super) async fn get(
+    may: May<Read>,
+    State(app): State<AppState>,
+    Params(Before { before }): Params<Before>,
+) -> Page {
     let mut reader = app.read().await?;
     let mut found = studies::page(&mut reader, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;
@@ -67,7 +73,11 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(Before
         rows.push(row(&mut reader, study).await?);
     }
     let waiting = studies::waiting_for_people(&mut reader, PAGE).await?.into_iter().map(waiting).collect();
-    page(&Home { waiting, studies: rows, later: before.is_some(), next })
+    let no_password = match may.caller.user {
+        Some(id) => !users::get(&mut reader, id).await?.has_password,
+        None => false,
+    };
+    page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
 }
 
 fn waiting(study: Study) -> Waiting {

@@ -5,6 +5,7 @@ use super::error::{Page, PageError, page};
 use super::figures::measured_cycles;
 use super::format::{self, words};
 use super::lab_charts;
+use super::lab_recordings::{Forms, Settings};
 use crate::access::{Administer, Caller, Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
@@ -18,11 +19,11 @@ use crate::store::listing::{self, Listed, Listing};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
 use crate::store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
-use crate::studies::lab::{self, Condition, EmgView, NewSession, SessionView, WalkActivity, WalkView};
+use crate::studies::lab::{self, Condition, EmgView, FileForm, NewSession, SessionView, WalkActivity, WalkView};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gait_optimizer::emg::EmgSettings;
+use gait_optimizer::emg::{CycleActivity, EmgSettings};
 use serde::Deserialize;
 
 /// So many gaits are offered: those with the lowest Gait RMSE.
@@ -139,7 +140,8 @@ struct SessionPage {
     recorded: Vec<u8>,
     recordings: Vec<LabRecording>,
     has_emg: bool,
-    settings: EmgSettings,
+    forms: Forms,
+    filters: Settings,
     measured: Option<Measured>,
     portraits: Vec<Drawn>,
     refused: Option<String>,
@@ -150,8 +152,10 @@ struct SessionPage {
 struct Measured {
     how: String,
     walks: Vec<String>,
-    /// EMG RMSE of each muscle and in all, then the average activation of each.
-    rows: Vec<(String, Vec<String>)>,
+    /// Those that are held against the walk without the device.
+    compared: Vec<String>,
+    /// Muscle, its EMG RMSE in the walks that are compared, its average activation in each walk.
+    rows: Vec<(String, Vec<String>, Vec<String>)>,
     /// Walk, muscle as measured, muscle of the model, RMS difference, correlation.
     model: Vec<[String; 5]>,
     charts: Vec<Drawn>,
@@ -160,23 +164,23 @@ struct Measured {
 impl Measured {
     fn of(session: &SessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
-        let strides = |walk: &WalkActivity| walk.channels.first().map_or(0, |channel| channel.strides).to_string();
+        let strides = |walk: &WalkActivity| {
+            let strides = walk.channels.first().map_or(0, |channel| channel.strides);
+            format!("{strides} strides ({})", lab_charts::walk_name(session, walk.walk))
+        };
         let counts: Vec<String> = emg.result.walks.iter().map(strides).collect();
         let walks = || emg.result.walks.iter();
-        let mut rows = Vec::new();
+        let name = |walk: &WalkActivity| lab_charts::walk_name(session, walk.walk);
+        let compared: Vec<_> = walks().filter_map(|walk| Some((walk, walk.emg_rmse.as_ref()?))).collect();
         let channels = emg.result.walks.first().map_or(&[][..], |walk| &walk.channels);
-        for (place, channel) in channels.iter().enumerate() {
-            let name = format!("EMG RMSE, {}", lab_charts::muscle_name(&channel.channel));
-            let part = |walk: &WalkActivity| walk.emg_rmse.as_ref().and_then(|rmse| rmse.parts.get(place).copied());
-            rows.push((name, walks().map(|walk| format::figure(part(walk))).collect()));
-        }
-        let total = |walk: &WalkActivity| format::figure(walk.emg_rmse.as_ref().map(|rmse| rmse.total));
-        rows.push(("EMG RMSE in all".to_owned(), walks().map(total).collect()));
-        for (place, channel) in channels.iter().enumerate() {
-            let name = format!("average activation, {}", lab_charts::muscle_name(&channel.channel));
-            let average = |walk: &WalkActivity| format::figure(walk.averages.get(place).copied());
-            rows.push((name, walks().map(average).collect()));
-        }
+        let row = |(place, channel): (usize, &CycleActivity)| {
+            let rmse = compared.iter().map(|(_, rmse)| format::figure(rmse.parts.get(place).copied()));
+            let averages = walks().map(|walk| format::figure(walk.averages.get(place).copied()));
+            (lab_charts::muscle_name(&channel.channel).to_owned(), rmse.collect(), averages.collect())
+        };
+        let mut rows: Vec<(String, Vec<String>, Vec<String>)> = channels.iter().enumerate().map(row).collect();
+        let totals = compared.iter().map(|(_, rmse)| format::figure(Some(rmse.total))).collect();
+        rows.push(("all together".to_owned(), totals, walks().map(|_| String::new()).collect()));
         let model = emg.model.iter().flat_map(|walk| {
             walk.muscles.iter().map(|muscle| {
                 [
@@ -191,10 +195,11 @@ impl Measured {
         Self {
             how: format!(
                 "Band-pass {band_low_hz} to {band_high_hz} Hz, rectified, low-pass {envelope_hz} Hz, order {order}, all \
-                 zero-phase; mean of {} strides of the walks; in shares of the peak without the device.",
+                 zero-phase; means of {}. Figures are shares of the muscle's peak without the device.",
                 counts.join(", ")
             ),
-            walks: walks().map(|walk| lab_charts::walk_name(session, walk.walk)).collect(),
+            compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
+            walks: walks().map(name).collect(),
             rows,
             model: model.collect(),
             charts,
@@ -216,10 +221,10 @@ struct WalkRow {
 
 /// `GET /lab-sessions/{id}`.
 pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<LabSessionId>) -> Page {
-    show(&app, id, &may.caller, None).await
+    show(&app, id, &may.caller, Forms::default(), None).await
 }
 
-async fn show(app: &AppState, id: LabSessionId, caller: &Caller, refused: Option<String>) -> Page {
+async fn show(app: &AppState, id: LabSessionId, caller: &Caller, mut forms: Forms, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
     let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
     let study = studies::get(&mut reader, session.study_id).await?;
@@ -245,7 +250,11 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, refused: Option
         recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
         has_emg: recordings.iter().any(|recording| recording.kind == RecordingKind::Electromyogram),
         recordings,
-        settings: emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default(),
+        filters: forms
+            .filters
+            .take()
+            .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
+        forms,
         measured: emg
             .as_ref()
             .map(|emg| Measured::of(&session, emg, drawn(&lab_charts::electromyograms(&session, emg)))),
@@ -283,7 +292,7 @@ pub(super) async fn close(
         Ok(_) => Ok(commit(writer).await?),
         Err(error) => Err(error),
     };
-    answer(&app, id, &may.caller, done).await
+    answer(&app, id, &may.caller, done, Forms::default()).await
 }
 
 /// `POST /lab-sessions/{id}/unblind`.
@@ -298,7 +307,7 @@ pub(super) async fn unblind(
         Ok(_) => Ok(commit(writer).await?),
         Err(error) => Err(error),
     };
-    answer(&app, id, &may.caller, done).await
+    answer(&app, id, &may.caller, done, Forms::default()).await
 }
 
 /// Shows the session anew; what was refused, with the reason.
@@ -307,11 +316,12 @@ pub(super) async fn answer(
     id: LabSessionId,
     caller: &Caller,
     done: Result<(), Error>,
+    forms: Forms,
 ) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, Some(error.to_string())).await?;
+            let shown = show(app, id, caller, forms, Some(error.to_string())).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

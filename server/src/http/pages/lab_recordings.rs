@@ -17,21 +17,37 @@ use serde::Deserialize;
 use std::str::FromStr;
 
 /// Electromyograms, as typed.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct EmgFields {
-    walk: u8,
-    form: FileForm,
-    recording: String,
-    rate_hz: String,
-    channels: String,
-    heel_strikes_s: String,
-    heel_strike_column: String,
-    heel_strike_threshold: String,
+    pub(super) walk: u8,
+    pub(super) form: FileForm,
+    pub(super) recording: String,
+    pub(super) rate_hz: String,
+    pub(super) channels: String,
+    pub(super) heel_strikes_s: String,
+    pub(super) heel_strike_column: String,
+    pub(super) heel_strike_threshold: String,
+}
+
+impl Default for EmgFields {
+    fn default() -> Self {
+        let reading = EmgReading::default();
+        Self {
+            walk: 0,
+            form: reading.form,
+            recording: String::new(),
+            rate_hz: String::new(),
+            channels: String::new(),
+            heel_strikes_s: String::new(),
+            heel_strike_column: String::new(),
+            heel_strike_threshold: reading.heel_strike_threshold.to_string(),
+        }
+    }
 }
 
 impl EmgFields {
-    fn read(self) -> Result<NewEmg, Error> {
+    fn read(&self) -> Result<NewEmg, Error> {
         let reading = EmgReading {
             form: self.form,
             rate_hz: optional("rate_hz", &self.rate_hz)?,
@@ -44,7 +60,7 @@ impl EmgFields {
         let heel_strike_threshold = threshold.unwrap_or(reading.heel_strike_threshold);
         Ok(NewEmg {
             walk: self.walk,
-            recording: self.recording,
+            recording: self.recording.clone(),
             reading: EmgReading { heel_strike_threshold, ..reading },
         })
     }
@@ -73,18 +89,26 @@ fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {
 }
 
 /// Joint angles, as typed.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct MotionFields {
-    walk: u8,
-    form: FileForm,
-    recording: String,
-    unit: String,
-    cutoff_hz: String,
+    pub(super) walk: u8,
+    pub(super) form: FileForm,
+    pub(super) recording: String,
+    pub(super) unit: String,
+    pub(super) cutoff_hz: String,
+}
+
+impl Default for MotionFields {
+    fn default() -> Self {
+        let MotionReading { form, cutoff_hz, .. } = MotionReading::default();
+        let (recording, unit) = (String::new(), String::new());
+        Self { walk: 0, form, recording, unit, cutoff_hz: cutoff_hz.to_string() }
+    }
 }
 
 impl MotionFields {
-    fn read(self) -> Result<NewMotion, Error> {
+    fn read(&self) -> Result<NewMotion, Error> {
         let unit = match self.unit.as_str() {
             "" => None,
             "degrees" => Some(Unit::Degrees),
@@ -93,7 +117,7 @@ impl MotionFields {
         };
         let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(MotionReading::default().cutoff_hz);
         let reading = MotionReading { form: self.form, unit, cutoff_hz };
-        Ok(NewMotion { walk: self.walk, recording: self.recording, reading })
+        Ok(NewMotion { walk: self.walk, recording: self.recording.clone(), reading })
     }
 }
 
@@ -105,7 +129,8 @@ pub(super) async fn electromyogram(
     Form(fields): Form<EmgFields>,
 ) -> Result<Response, PageError> {
     let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
-    lab::answer(&app, id, &may.caller, kept.await).await
+    let kept = kept.await;
+    lab::answer(&app, id, &may.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
 }
 
 /// `POST /lab-sessions/{id}/motions`.
@@ -116,7 +141,8 @@ pub(super) async fn motion(
     Form(fields): Form<MotionFields>,
 ) -> Result<Response, PageError> {
     let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
-    lab::answer(&app, id, &may.caller, kept.await).await
+    let kept = kept.await;
+    lab::answer(&app, id, &may.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() }).await
 }
 
 async fn keep(app: &AppState, may: &May<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {
@@ -126,13 +152,35 @@ async fn keep(app: &AppState, may: &May<Run>, id: LabSessionId, checked: Checked
 }
 
 /// Settings of the filters, as typed.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Settings {
-    band_low_hz: String,
-    band_high_hz: String,
-    envelope_hz: String,
-    order: String,
+    pub(super) band_low_hz: String,
+    pub(super) band_high_hz: String,
+    pub(super) envelope_hz: String,
+    pub(super) order: String,
+}
+
+impl From<EmgSettings> for Settings {
+    fn from(settings: EmgSettings) -> Self {
+        Self {
+            band_low_hz: settings.band_low_hz.to_string(),
+            band_high_hz: settings.band_high_hz.to_string(),
+            envelope_hz: settings.envelope_hz.to_string(),
+            order: settings.order.to_string(),
+        }
+    }
+}
+
+/// The forms of the page as typed, so that a refused one comes back as it was.
+#[derive(Debug, Default)]
+pub(super) struct Forms {
+    pub(super) emg: EmgFields,
+    pub(super) motion: MotionFields,
+    /// None: as the electromyograms were processed last.
+    pub(super) filters: Option<Settings>,
+    /// The one that was refused: `emg`, `motion` or `filters`.
+    pub(super) open: &'static str,
 }
 
 /// `POST /lab-sessions/{id}/process`.
@@ -154,5 +202,7 @@ pub(super) async fn process(
         session::keep_result(&mut writer, &may.caller.actor, id, &result).await?;
         Ok(commit(writer).await?)
     };
-    lab::answer(&app, id, &may.caller, processed.await).await
+    let processed = processed.await;
+    let forms = Forms { filters: Some(typed), open: "filters", ..Forms::default() };
+    lab::answer(&app, id, &may.caller, processed, forms).await
 }

@@ -77,6 +77,7 @@ pub fn routes() -> Router<AppState> {
         .route("/people", get(people::get).post(people::post))
         .route("/audit", get(audit::get))
         .route("/system", get(system::get))
+        .route("/system/backup", post(system::backup))
         .route("/glossary", get(glossary::get))
         .route("/api", get(reference::get))
         .route("/sign-in", get(sign_in::get).post(sign_in::post))

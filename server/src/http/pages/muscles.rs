@@ -1,6 +1,7 @@
 //! The muscles of a person: the form for what is known better than the published table.
 
 use super::error::{Page, PageError, page};
+use super::format;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
@@ -78,7 +79,7 @@ fn shown(
             Cell {
                 label: format!("{name}: {}", column.meaning),
                 typed: typed.map_or(kept, |typed| typed.get(&field).cloned()).unwrap_or_default(),
-                otherwise: otherwise.as_ref().and_then(column.value).map(|value| format!("{value:.4}")),
+                otherwise: otherwise.as_ref().and_then(column.value).map(format::number),
                 refused: refused.as_ref().is_some_and(|refused| is_of(&refused.field, &field)),
                 field,
             }

@@ -14,7 +14,7 @@ use crate::store::users::User;
 use crate::store::{TokenId, UserId, Writer, commit, tokens, users};
 use askama::Template;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use std::str::FromStr;
@@ -97,10 +97,12 @@ async fn show(app: &AppState, outcome: Outcome, refused: Option<String>) -> Page
 pub(super) async fn post(
     may: May<Administer>,
     State(app): State<AppState>,
+    headers: HeaderMap,
     Form(asked): Form<Asked>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
-    match act(&mut writer, &may.caller, &asked).await {
+    let origin = origin(&app, &headers);
+    match act(&mut writer, &may.caller, &origin, &asked).await {
         Ok(outcome) => {
             commit(writer).await?;
             Ok(show(&app, outcome, None).await?.into_response())
@@ -114,7 +116,14 @@ pub(super) async fn post(
     }
 }
 
-async fn act(writer: &mut Writer, caller: &Caller, asked: &Asked) -> Result<Outcome, Error> {
+/// Where the asking browser reaches this service: `https://gait.clinic.example`. Other names are refused before.
+fn origin(app: &AppState, headers: &HeaderMap) -> String {
+    let host = headers.get(header::HOST).and_then(|value| value.to_str().ok()).unwrap_or_default();
+    let scheme = if app.access.secure { "https" } else { "http" };
+    if host.is_empty() { String::new() } else { format!("{scheme}://{host}") }
+}
+
+async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) -> Result<Outcome, Error> {
     let actor = &caller.actor;
     let done = |text: String| Outcome { done: Some(text), secret: None };
     match asked.act.as_str() {
@@ -123,12 +132,12 @@ async fn act(writer: &mut Writer, caller: &Caller, asked: &Asked) -> Result<Outc
             let role = asked.role.parse().map_err(|_| Error::invalid("role", asked.role.as_str(), &roles))?;
             let user = people::add(writer, actor, &NewUser { name: asked.name.clone(), role }).await?;
             let secret = people::link(writer, actor, user.id).await?;
-            Ok(link(&user, &secret))
+            Ok(link(&user, origin, &secret))
         }
         "link" => {
             let id: UserId = asked.id()?;
             let secret = people::link(writer, actor, id).await?;
-            Ok(link(&users::get(writer, id).await?, &secret))
+            Ok(link(&users::get(writer, id).await?, origin, &secret))
         }
         "disable" | "enable" => {
             let disabled = asked.act == "disable";
@@ -152,9 +161,9 @@ async fn act(writer: &mut Writer, caller: &Caller, asked: &Asked) -> Result<Outc
     }
 }
 
-fn link(user: &User, secret: &str) -> Outcome {
+fn link(user: &User, origin: &str, secret: &str) -> Outcome {
     Outcome {
-        done: Some(format!("A sign-in link for {}: it works once, within a day.", user.name)),
-        secret: Some(("Path of the link on this service", format!("/sign-in/{secret}"))),
+        done: Some(format!("A sign-in link for {}: it works once, within a day. Send it to them.", user.name)),
+        secret: Some(("The link", format!("{origin}/sign-in/{secret}"))),
     }
 }

@@ -72,7 +72,7 @@ fn described(document: &Value, path: &str, method: &str, operation: &Value) -> O
     Operation {
         method: method.to_uppercase(),
         path: path.to_owned(),
-        summary: text(&operation["summary"]),
+        summary: without_address(&text(&operation["summary"])),
         right: text(&operation["security"][0]["token"][0]),
         parameters: parameters
             .map(|p| Parameter {
@@ -85,6 +85,12 @@ fn described(document: &Value, path: &str, method: &str, operation: &Value) -> O
         body: schema.is_object().then(example),
         answers: answers.map(|(status, answer)| (status.clone(), text(&answer["description"]))).collect(),
     }
+}
+
+/// Without the `` `GET /me`: `` that a description begins with: the page says it already.
+fn without_address(summary: &str) -> String {
+    let rest = summary.strip_prefix('`').and_then(|rest| rest.split_once('`')).map_or(summary, |(_, rest)| rest);
+    rest.trim_start_matches([':', '.', ' ']).to_owned()
 }
 
 /// A document of the shape that a schema asks for: required fields alone.

@@ -2,12 +2,12 @@
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
+use super::gait_charts;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::extract::{Form as Submitted, Id, Params};
 use crate::http::may::May;
-use crate::plots::{Chart, Stroke};
 use crate::store::reference_gaits::{self, ReferenceGait};
 use crate::store::subjects::{self, Subject};
 use crate::store::{Connection, ReferenceGaitId, SubjectId, commit};
@@ -153,31 +153,7 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<Re
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
-        charts: charts(&reference.definition).iter().map(|chart| Drawn::new(chart, "")).collect(),
+        charts: gait_charts::of_reference(&reference.definition).iter().map(Drawn::new).collect(),
         reference,
     })
-}
-
-const TITLES: [&str; 5] = ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip"];
-
-/// Mean angles with their deviation over strides.
-fn charts(reference: &gait_optimizer::ReferenceGait) -> Vec<Chart> {
-    let line = |angle: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-        (0..reference.angles_rad.len()).map(|row| (row as f64, angle(row).to_degrees())).collect()
-    };
-    TITLES
-        .iter()
-        .enumerate()
-        .map(|(column, title)| {
-            let mean = |row: usize| reference.angles_rad[row][column];
-            let chart = Chart::new(title, "gait cycle from right heel strike, %", "angle, °");
-            let chart = chart.with("mean", 0, Stroke::Solid, line(&mean));
-            match &reference.standard_deviation_rad {
-                Some(deviation) => chart
-                    .with("one standard deviation above", 1, Stroke::Dashed, line(&|k| mean(k) + deviation[k][column]))
-                    .with("one below", 1, Stroke::Dashed, line(&|k| mean(k) - deviation[k][column])),
-                None => chart,
-            }
-        })
-        .collect()
 }

@@ -3,13 +3,13 @@
 use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::format::{self, words};
-use super::study::{Figures, figures};
+use super::study::{COURSE, Figures, course, figures};
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
-use crate::plots::{Chart, Stroke};
+use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
@@ -110,7 +110,7 @@ impl Side {
             ("Subject".to_owned(), self.subject.clone()),
             ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
             ("Answers by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
-            ("Combinations of bounds".to_owned(), plan.search_space.len().to_string()),
+            ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
             ("Seed".to_owned(), plan.seed.to_string()),
             ("Trials with a result".to_owned(), format!("{} of {}", self.counts.results(), plan.trial_budget)),
             ("Converged".to_owned(), self.counts.converged.to_string()),
@@ -130,18 +130,14 @@ impl Side {
 
 fn compare(a: Side, b: Side) -> Result<Compared, Error> {
     let (of_a, of_b) = (a.figures()?, b.figures()?);
-    let mut chart = Chart::new(
-        "Gait RMSE of the best action by iteration",
-        "iteration (in order of the results)",
-        "Gait RMSE, rad",
-    )
-    .with(&a.standing.study.plan.name, 0, Stroke::Steps, of_a.course())
-    .with(&b.standing.study.plan.name, 1, Stroke::DashedSteps, of_b.course());
-    chart.whole_x = true;
+    let chart = course(&[(&a.standing, &of_a), (&b.standing, &of_b)]).map(|chart| {
+        let files = format!("/api/v1/studies/{}/figures", a.standing.study.id);
+        Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.standing.study.id))
+    });
     let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
     Ok(Compared {
         rows: rows.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
-        chart: (!chart.legend().is_empty()).then(|| Drawn::new(&chart, "")),
+        chart,
         a: a.standing.study,
         b: b.standing.study,
     })

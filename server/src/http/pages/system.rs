@@ -2,11 +2,12 @@
 
 use super::error::{Page, page};
 use super::format::{duration, words};
-use crate::access::{Administer, Permission, Read};
+use crate::access::{Administer, Caller, Permission, Read};
 use crate::http::AppState;
+use crate::http::api::{Copy, Workers};
 use crate::http::may::May;
 use crate::store::totals::{self, Totals};
-use crate::store::{jobs, trials};
+use crate::store::{commit, jobs, trials};
 use askama::Template;
 use axum::extract::State;
 
@@ -14,7 +15,9 @@ use axum::extract::State;
 #[template(path = "system.html")]
 struct SystemPage {
     version: &'static str,
-    workers: usize,
+    workers: Workers,
+    /// The backup that was just made.
+    copied: Option<Copy>,
     queued: u32,
     running: u32,
     oldest_queued: String,
@@ -40,19 +43,34 @@ impl SystemPage {
 
 /// `GET /system`.
 pub(super) async fn get(may: May<Read>, State(app): State<AppState>) -> Page {
+    show(&app, &may.caller, None).await
+}
+
+/// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
+pub(super) async fn backup(may: May<Administer>, State(app): State<AppState>) -> Page {
+    let copy = Copy::make(&app).await?;
+    let mut writer = app.write().await?;
+    copy.record(&mut writer, &may.caller.actor).await?;
+    commit(writer).await?;
+    show(&app, &may.caller, Some(copy)).await
+}
+
+async fn show(app: &AppState, caller: &Caller, copied: Option<Copy>) -> Page {
+    let workers = Workers::read(app).await?;
     let mut reader = app.read().await?;
     let totals = totals::read(&mut reader).await?;
     let (queued, running) = jobs::depth(&mut reader).await?;
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
     page(&SystemPage {
         version: env!("CARGO_PKG_VERSION"),
-        workers: app.director.workers(),
+        workers,
+        copied,
         queued,
         running,
         oldest_queued: duration(totals.oldest_queued_seconds),
         totals,
         record: app.store().path().display().to_string(),
         measured,
-        may_administer: may.caller.may(Administer::NEEDED),
+        may_administer: caller.may(Administer::NEEDED),
     })
 }

@@ -37,7 +37,7 @@ impl Choice {
     pub(super) fn shown(&self) -> Result<String, Error> {
         let chosen = self.matches.iter().find(|found| found.reference_gait.id == self.chosen);
         let Some(chosen) = chosen else { return Ok(String::new()) };
-        let chart = Drawn::new(&chart(&chosen.reference_gait), "");
+        let chart = Drawn::new(&chart(&chosen.reference_gait));
         let part = ChosenReference { nearest: nearest(&self.matches, chosen), chart };
         part.render().map_err(|e| Error::Internal(e.to_string()))
     }
@@ -48,7 +48,10 @@ fn nearest(matches: &[Match], chosen: &Match) -> String {
     let known = matches.iter().filter(|found| found.distance.is_some()).count();
     let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
     match matches.first() {
-        _ if known == 0 => "No reference gait says whose it is: none is nearer to the subject.".to_owned(),
+        _ if known == 0 => {
+            "Of no reference gait height and body mass are known: none can be proposed as the nearest to the subject."
+                .to_owned()
+        }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
             format!("The nearest to the subject in height and body mass{}.", away(first))
         }

@@ -6,6 +6,7 @@ mod space_editor;
 use self::chosen_reference::Choice;
 use self::space_editor::SpaceEditor;
 use super::error::{Page, PageError, page};
+use super::format;
 use crate::access::{Caller, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
@@ -156,17 +157,27 @@ impl NewStudyPage {
         self.refuses(&format!("{part}_{bound}")) || self.refuses(bound)
     }
 
+    /// Whether one of the fields for experts was changed or refused: they are shown then.
+    fn expert(&self) -> bool {
+        let (typed, default) = (&self.fields, Fields::default());
+        let fields = |fields: &Fields| {
+            let Fields { learner, unchanged_limit, parallel_trials, seed, basin_within_percent, .. } = fields.clone();
+            [learner, unchanged_limit, parallel_trials, seed, basin_within_percent]
+        };
+        fields(typed) != fields(&default)
+    }
+
     /// How long solves took, in words; the first with muscles, the second without.
     fn measured(&self) -> String {
         let words = |measured: &Option<trials::Measured>, variant: &str| {
-            measured.as_ref().map(|m| format!("{variant} muscles {:.1} s (median of {})", m.median_seconds, m.solves))
+            measured.as_ref().map(|m| format!("{:.1} s {variant} muscles (median of {})", m.median_seconds, m.solves))
         };
         let [with, without] = &self.offered.measured;
         let both: Vec<String> = [words(with, "with"), words(without, "without")].into_iter().flatten().collect();
         if both.is_empty() {
             return "No solve was measured yet: seconds to a minute each.".to_owned();
         }
-        format!("A solve took here {}.", both.join(", "))
+        format!("What a solve took here: {}.", both.join(", "))
     }
 }
 
@@ -250,14 +261,17 @@ fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
 /// How large the study is, and how long it will take.
 async fn outlook(db: &mut Connection, study: &Study) -> Result<String, Error> {
     let plan = &study.plan;
-    let size = format!("{} of {} combinations of bounds will be tried", plan.trial_budget, plan.search_space.len());
-    let Some(measured) = trials::measured(db, plan.muscles).await? else {
-        return Ok(format!("{size}."));
-    };
+    let combinations = format::count(plan.search_space.len());
+    let size = format!("{} of {combinations} combinations of bounds will be tried", plan.trial_budget);
+    let people = format::besides_solves(plan.feedback_mode);
     // Trials that run at the same time share the machine: no gain is promised.
-    let seconds = measured.median_seconds * f64::from(plan.trial_budget);
-    let people = if plan.feedback_mode == FeedbackMode::Human { ", and the time people take to answer" } else { "" };
-    Ok(format!("{size}, in about {}{people}.", super::format::duration(seconds)))
+    let took = |measured: trials::Measured| measured.median_seconds * f64::from(plan.trial_budget);
+    Ok(match trials::measured(db, plan.muscles).await?.map(took) {
+        Some(seconds) => format!("{size}, in about {}{people}.", format::duration(seconds)),
+        None => format!(
+            "{size}. Nothing was measured here yet: the first takes up to a minute, later ones seconds{people}."
+        ),
+    })
 }
 
 async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &SpaceEditor) -> Result<Study, Error> {

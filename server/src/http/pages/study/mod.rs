@@ -13,7 +13,7 @@ use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::{Chart, Node, Stroke, tree};
+use crate::plots::{Chart, Figure, Node, Stroke, tree};
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
@@ -64,6 +64,8 @@ struct Live {
     state: String,
     acts: Vec<ActButton>,
     counts: TrialCounts,
+    /// How long it will go on; empty: it does not.
+    pace: String,
     running: Vec<RunningRow>,
     best: Option<Best>,
     unanswered: bool,
@@ -213,7 +215,7 @@ pub(super) struct Figures {
 
 impl Figures {
     /// Gait RMSE of the best action by iteration.
-    pub(super) fn course(&self) -> Vec<(f64, f64)> {
+    fn course(&self) -> Vec<(f64, f64)> {
         let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
         self.history.iter().filter_map(point).collect()
     }
@@ -265,10 +267,16 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
     let text = records.last().map_or_else(
         || "starting".to_owned(),
         |r| {
-            format!("iteration {}, objective {:.4}, violation {:.1e}", r.iteration, r.objective, r.constraint_violation)
+            let violation = format::number(r.constraint_violation);
+            format!("iteration {}, objective {:.4}, violation {violation}", r.iteration, r.objective)
         },
     );
-    RunningRow { id: trial.id, number: trial.number, text, chart: gait_charts::of_iterations(records) }
+    RunningRow {
+        id: trial.id,
+        number: trial.number,
+        text,
+        chart: gait_charts::of_iterations(records).map(|chart| Drawn::new(&chart)),
+    }
 }
 
 fn view(
@@ -293,11 +301,15 @@ fn view(
     Live {
         state: words(standing.study.state.as_str()),
         acts: acts.into_iter().filter_map(button).collect(),
+        pace: pace(&standing, counts),
         counts,
         running,
         best,
         unanswered: figures.unanswered,
-        chart: chart(&standing, &figures.history).map(|chart| Drawn::new(&chart, "")),
+        chart: course(&[(&standing, figures)]).map(|chart| {
+            let files = format!("/api/v1/studies/{}/figures", standing.study.id);
+            Drawn::of(&Figure::chart(COURSE, chart), &files, "")
+        }),
         table,
         tree: warm_starts(&standing, figures.best),
         answers,
@@ -343,22 +355,49 @@ pub(super) fn answer_in_words(row: &FeedbackRow, standing: &Standing) -> Option<
     }
 }
 
-fn chart(standing: &Standing, history: &[Milestone]) -> Option<Chart> {
-    let best: Vec<(f64, f64)> =
-        history.iter().filter_map(|m| Some((f64::from(m.iteration), m.gait_rmse_rad?))).collect();
-    let converged: Vec<(f64, f64)> = history::results(standing)
+/// How long the study will go on by itself, as far as its own solves tell.
+fn pace(standing: &Standing, counts: TrialCounts) -> String {
+    let study = &standing.study;
+    if study.state != StudyState::Running {
+        return String::new();
+    }
+    let mut seconds: Vec<f64> = standing.trials.iter().filter_map(|trial| trial.seconds_total).collect();
+    seconds.sort_by(f64::total_cmp);
+    let Some(median) = seconds.get(seconds.len() / 2) else {
+        return "The first trial starts from a guess and takes longest: up to a minute.".to_owned();
+    };
+    let left = study.plan.trial_budget.saturating_sub(counts.results());
+    let people = format::besides_solves(study.plan.feedback_mode);
+    format!("About {} to go{people}.", format::duration(median * f64::from(left)))
+}
+
+/// Group of the figures that show the course of a study.
+pub(super) const COURSE: &str = "course";
+
+/// Gait RMSE of the best action by iteration: of one study with its trials, or of several beside each other; none before
+/// the first converged trial.
+pub(super) fn course(studies: &[(&Standing, &Figures)]) -> Option<Chart> {
+    let title = "Gait RMSE of the best action by iteration";
+    let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad");
+    if let [(standing, figures)] = studies {
+        chart = chart.with("trial", 7, Stroke::Points, converged(standing));
+        chart = chart.with("best action so far", 0, Stroke::Steps, figures.course());
+    } else {
+        for (place, (standing, figures)) in studies.iter().enumerate() {
+            let stroke = if place == 0 { Stroke::Steps } else { Stroke::DashedSteps };
+            chart = chart.with(&standing.study.plan.name, place, stroke, figures.course());
+        }
+    }
+    chart.whole_x = true;
+    (!chart.legend().is_empty()).then_some(chart)
+}
+
+/// Gait RMSE of each converged trial by iteration.
+fn converged(standing: &Standing) -> Vec<(f64, f64)> {
+    history::results(standing)
         .into_iter()
         .zip(1_u32..)
         .filter(|(trial, _)| trial.state == TrialState::Converged)
         .filter_map(|(trial, iteration)| Some((f64::from(iteration), trial.gait_rmse_rad?)))
-        .collect();
-    if converged.is_empty() {
-        return None;
-    }
-    let title = "Gait RMSE of the best action by iteration";
-    let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad")
-        .with("trial", 7, Stroke::Points, converged)
-        .with("best action so far", 0, Stroke::Steps, best);
-    chart.whole_x = true;
-    Some(chart)
+        .collect()
 }
