@@ -153,10 +153,10 @@ pub(super) fn subtract_symmetric_product<S: Simd>(
             let (from, to) = (block * per_block, end * per_block);
             match (coupled[own], kind) {
                 (true, true) if width == 4 => {
-                    product_tiles::<S, 4, true>(simd, &mut s[j * stride..], x, g, stride, count, from, to, j)
+                    product_tiles::<S, 4, true>(simd, &mut s[j * stride..], x, g, stride, count, from, to, j);
                 }
                 (true, true) => {
-                    product_tiles::<S, 1, true>(simd, &mut s[j * stride..], x, g, stride, count, from, to, j)
+                    product_tiles::<S, 1, true>(simd, &mut s[j * stride..], x, g, stride, count, from, to, j);
                 }
                 (false, true) => subtract_outer(simd, s, x, g, stride, count, from, to, j, width),
                 (true, false) => subtract_outer(simd, s, g, x, stride, count, from, to, j, width),

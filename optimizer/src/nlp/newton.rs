@@ -70,7 +70,9 @@ pub(super) fn largest(values: &[f64]) -> f64 {
             take(k, *value);
         }
     }
-    rest.iter().for_each(|value| take(0, *value));
+    for value in rest {
+        take(0, *value);
+    }
     if zeros.iter().any(|zero| zero.is_nan()) { f64::INFINITY } else { largest.into_iter().fold(0.0, f64::max) }
 }
 
