@@ -182,6 +182,16 @@ impl Tab {
         self.page.execute(media).await.unwrap();
     }
 
+    /// From now on the page looks as it is printed.
+    pub(crate) async fn be_paper(&self) {
+        self.page.execute(SetEmulatedMediaParams::builder().media("print").build()).await.unwrap();
+    }
+
+    /// By how many pixels the page is wider than the window.
+    pub(crate) async fn beyond(&self) -> String {
+        self.value("document.documentElement.scrollWidth - document.documentElement.clientWidth").await
+    }
+
     /// Tells the page that the connection is cut, or back.
     pub(crate) async fn disconnect(&self, gone: bool) {
         self.page.execute(OverrideNetworkStateParams::new(gone, 0.0, -1.0, -1.0)).await.unwrap();

@@ -69,6 +69,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
 }
 
 const WIDTHS: [i64; 3] = [1280, 768, 360];
+/// What A4 is wide between margins of 1 cm, in pixels of a style sheet.
+const PAPER: i64 = 718;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn browser_every_page_fits_and_is_for_everybody() {
@@ -85,8 +87,7 @@ async fn browser_every_page_fits_and_is_for_everybody() {
             }
             for width in WIDTHS {
                 page.resize(width, 900).await;
-                let beyond = "document.documentElement.scrollWidth - document.documentElement.clientWidth";
-                let beyond = page.value(beyond).await;
+                let beyond = page.beyond().await;
                 if beyond != "0" {
                     wrong.push(format!("{name}: {beyond} px beyond {width} px"));
                 }
@@ -95,6 +96,12 @@ async fn browser_every_page_fits_and_is_for_everybody() {
                 }
             }
             page.resize(1280, 900).await;
+        }
+        page.be_paper().await;
+        page.resize(PAPER, 1000).await;
+        let beyond = page.beyond().await;
+        if beyond != "0" {
+            wrong.push(format!("{name}: {beyond} px beyond the paper"));
         }
         if name != "error" {
             page.is_clean(&site.origin).await;

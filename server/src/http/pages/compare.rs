@@ -82,9 +82,12 @@ pub(super) async fn get(
     Shown(id): Shown<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
-    // Who signed in need not say so again.
-    let author = if may.caller.user.is_some() { may.caller.name } else { String::new() };
-    show(&app, id, choice, Submitted { author, ..Submitted::default() }, None).await
+    // Who signed in need not say so again; whoever may see this page is of the staff, unless told otherwise.
+    let mut typed = Submitted::default();
+    if may.caller.user.is_some() {
+        (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
+    }
+    show(&app, id, choice, typed, None).await
 }
 
 async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
