@@ -9,7 +9,11 @@ pub(crate) struct Table {
     /// Line of the column names in the file.
     first_line: usize,
     names: Vec<String>,
+    /// Where a column of words stood, which is left out.
+    words: Option<usize>,
     rows: Vec<Vec<f64>>,
+    /// Line of each row in the file.
+    lines: Vec<usize>,
     /// Rows per second, where no column has the time.
     rate_hz: Option<f64>,
 }
@@ -22,6 +26,12 @@ pub(crate) enum Clock<'a> {
     /// No column: so many rows per second, the first at 0 s.
     Rate(f64),
 }
+
+/// The column of the tables of gaits that has words: the name of the domain. A domain ends when the next one begins, so
+/// that time is there twice, with the same angles; the second is left out.
+const DOMAIN: &str = "domain";
+/// Times that differ by less are the same, s: sums of durations, rounded.
+const SAME_TIME_S: f64 = 1e-9;
 
 /// Fewest rows of a table over time.
 const FEWEST_ROWS: usize = 20;
@@ -58,7 +68,7 @@ impl Table {
         clock: Clock<'_>,
     ) -> Result<Self, ModelError> {
         let malformed = |line: usize, reason: String| malformed(what, line, None, reason);
-        let names: Vec<String> = match lines.first() {
+        let mut names: Vec<String> = match lines.first() {
             Some(line) => separator.split(line).into_iter().map(str::to_owned).collect(),
             None => return Err(malformed(first_line, "the line of column names is missing".to_owned())),
         };
@@ -73,12 +83,28 @@ impl Table {
                 return Err(self::malformed(what, first_line, Some(column + 1), format!("{name:?} is there twice")));
             }
         }
+        let words = names.iter().position(|name| separator == Separator::Comma && name == DOMAIN);
+        if let Some(column) = words {
+            names.remove(column);
+        }
         let body = &lines[1..];
         let filled = body.iter().rposition(|line| !line.trim().is_empty()).map_or(0, |last| last + 1);
         let rate_hz = if let Clock::Rate(rate_hz) = clock { Some(rate_hz) } else { None };
-        let mut table = Self { what: what.to_owned(), first_line, names, rows: Vec::with_capacity(filled), rate_hz };
+        let mut table = Self {
+            what: what.to_owned(),
+            first_line,
+            names,
+            words,
+            rows: Vec::with_capacity(filled),
+            lines: Vec::new(),
+            rate_hz,
+        };
+        let mut before = "";
         for (index, line) in body[..filled].iter().enumerate() {
-            table.add_row(first_line + 1 + index, &separator.split(line))?;
+            let cells = separator.split(line);
+            let word = words.and_then(|column| cells.get(column).copied()).unwrap_or_default();
+            table.add_row(first_line + 1 + index, &cells, word != before)?;
+            before = word;
         }
         if table.rows.len() < FEWEST_ROWS {
             let reason = format!("{} rows, at least {FEWEST_ROWS} are needed", table.rows.len());
@@ -87,26 +113,33 @@ impl Table {
         Ok(table)
     }
 
-    fn add_row(&mut self, line: usize, cells: &[&str]) -> Result<(), ModelError> {
-        if cells.len() != self.names.len() {
-            let reason = format!("{} cells, but {} columns", cells.len(), self.names.len());
+    /// `opens`: a domain begins with this row.
+    fn add_row(&mut self, line: usize, cells: &[&str], opens: bool) -> Result<(), ModelError> {
+        let columns = self.names.len() + usize::from(self.words.is_some());
+        if cells.len() != columns {
+            let reason = format!("{} cells, but {columns} columns", cells.len());
             return Err(malformed(&self.what, line, None, reason));
         }
         let mut row = Vec::with_capacity(cells.len());
-        for (column, cell) in cells.iter().enumerate() {
+        for (column, cell) in cells.iter().enumerate().filter(|(column, _)| Some(*column) != self.words) {
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
-                let reason = format!("{} = {cell:?} is not a number", self.names[column]);
+                let reason = format!("{} = {cell:?} is not a number", self.names[row.len()]);
                 malformed(&self.what, line, Some(column + 1), reason)
             })?;
             row.push(value);
         }
-        if let Some(before) = self.rows.last().filter(|_| self.rate_hz.is_none())
+        let before = self.rows.last().filter(|_| self.rate_hz.is_none());
+        if opens && before.is_some_and(|before| (row[0] - before[0]).abs() < SAME_TIME_S) {
+            return Ok(());
+        }
+        if let Some(before) = before
             && row[0] <= before[0]
         {
             let reason = format!("the time {} does not follow {}", row[0], before[0]);
             return Err(malformed(&self.what, line, Some(1), reason));
         }
         self.rows.push(row);
+        self.lines.push(line);
         Ok(())
     }
 
@@ -143,7 +176,7 @@ impl Table {
 
     /// An error in a row, counted from 0.
     pub(crate) fn malformed_row(&self, row: usize, column: Option<usize>, reason: String) -> ModelError {
-        malformed(&self.what, self.first_line + 1 + row, column, reason)
+        malformed(&self.what, self.lines[row], column, reason)
     }
 
     /// An error in the line of column names.

@@ -113,3 +113,48 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
     assert_eq!(service.post("/api/v1/subjects", &body).await.status, StatusCode::PAYLOAD_TOO_LARGE);
     service.stop().await;
 }
+
+/// Angles between the rows of a table, linearly; `column` of its header.
+fn between(rows: &[Vec<f64>], column: usize, time: f64) -> f64 {
+    let after = rows.partition_point(|row| row[0] < time).clamp(1, rows.len() - 1);
+    let (a, b) = (&rows[after - 1], &rows[after]);
+    a[column] + (time - a[0]) / (b[0] - a[0]) * (b[column] - a[column])
+}
+
+#[tokio::test]
+async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await.remove(0).id;
+    let table = service.fetch(&format!("/api/v1/trials/{trial}/gait.csv")).await.text;
+    let names: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let mut rows: Vec<Vec<f64>> =
+        table.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(0.0)).collect()).collect();
+    rows.dedup_by_key(|row| row[0].to_bits());
+    let end = rows.last().unwrap()[0];
+    let body = json!({"name": "our own", "form": "csv", "recording": table, "heel_strikes_s": [0.0, end]});
+    let imported = service.post("/api/v1/reference-gaits", &body).await;
+    assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
+    let angles = imported.json()["definition"]["angles_rad"].clone();
+    for (place, name) in ["torso_rad", "hip_L_rad", "knee_L_rad", "ankle_L_rad", "hip_R_rad"].into_iter().enumerate() {
+        let column = names.iter().position(|known| *known == name).unwrap();
+        for percent in 0..=100 {
+            let found = angles[percent][place].as_f64().unwrap();
+            let wanted = between(&rows, column, end * percent as f64 / 100.0);
+            assert!((found - wanted).abs() < 1e-12, "{name} at {percent} %: {found} {wanted}");
+        }
+    }
+    // The name of the domain is no excuse for a time that goes back, and columns keep their numbers.
+    let line = table.lines().nth(12).unwrap();
+    let word = body_with(&body, &table.replacen(line, &line.replacen(",DS3_R,", ",DS3_R,x", 1), 1));
+    let refused = service.post("/api/v1/reference-gaits", &word).await;
+    assert!(refused.text.contains("recording, line 13, column 3: px_m = "), "{}", refused.text);
+    service.stop().await;
+}
+
+fn body_with(body: &Value, recording: &str) -> Value {
+    let mut body = body.clone();
+    body["recording"] = json!(recording);
+    body
+}

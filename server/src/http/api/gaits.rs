@@ -80,7 +80,7 @@ fn rows(gait: &Gait) -> (Vec<String>, Vec<Vec<String>>) {
     }
     let mut rows = Vec::new();
     for point in crate::http::gait_series::points(gait) {
-        let mut row = vec![format!("{:.6}", point.time_s), point.domain.to_owned()];
+        let mut row = vec![point.time_s.to_string(), point.domain.to_owned()];
         row.extend(point.q.iter().chain(point.qd).chain(point.u).chain(&point.forces).map(f64::to_string));
         row.extend(point.activation.iter().flat_map(|a| a.iter()).map(f64::to_string));
         rows.push(row);
