@@ -54,7 +54,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
     assert!(list.find(">near</a>").unwrap() < list.find(">far</a>").unwrap());
     let page = service.fetch(&format!("/references/{id}")).await.text;
     assert!(
-        page.contains("Right hip") && page.contains("one standard deviation above") && page.contains("<svg"),
+        page.contains("Right hip") && page.contains("</i>one standard deviation") && page.contains("<svg"),
         "{page}"
     );
     let audit = service.fetch("/api/v1/audit").await.text;

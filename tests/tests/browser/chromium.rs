@@ -189,7 +189,16 @@ impl Tab {
 
     /// By how many pixels the page is wider than the window.
     pub(crate) async fn beyond(&self) -> String {
-        self.value("document.documentElement.scrollWidth - document.documentElement.clientWidth").await
+        self.value(
+            "(() => {
+                const width = document.documentElement.clientWidth;
+                const beyond = document.documentElement.scrollWidth - width;
+                const wide = [...document.querySelectorAll('body, body *')].filter(e => e.scrollWidth > e.clientWidth + 1);
+                const names = wide.slice(-3).map(e => `${e.tagName} ${e.className} ${e.textContent.slice(0, 60)}`);
+                return beyond ? `${beyond}: ${names.join('; ')}` : '0';
+            })()",
+        )
+        .await
     }
 
     /// Tells the page that the connection is cut, or back.
@@ -251,9 +260,17 @@ impl Tab {
         self.page.execute(InsertTextParams::new(text)).await.unwrap();
     }
 
-    /// Presses a key.
+    /// Presses a key; while a page gives way to the next one, a moment later.
     pub(crate) async fn press(&self, key: &str) {
-        self.page.find_element("body").await.unwrap().press_key(key).await.unwrap();
+        for _ in 0..100 {
+            if let Ok(body) = self.page.find_element("body").await
+                && body.press_key(key).await.is_ok()
+            {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        panic!("no page to press {key} on");
     }
 
     /// How many elements there are.
