@@ -9,7 +9,7 @@
 
 use pulp::Simd;
 
-use super::dense_kernels::{LANES, subtract_columns_within, subtract_product};
+use super::dense_kernels::{LANES, largest_entry, subtract_columns_within, subtract_product};
 use super::kkt_solver::Inertia;
 
 /// (1 + sqrt 17) / 8.
@@ -165,18 +165,6 @@ fn bring_up_to_date<S: Simd>(
     // Rows before j are not in use: whatever they hold is finite.
     w[from..j].fill(0.0);
     subtract_columns_within(simd, w, &a[start * stride..], stride, &terms[..count], from, stride);
-}
-
-/// Largest |v_i| from `first` on, and where; numbers that are none do not count.
-#[inline(always)]
-fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
-    let (mut largest, mut at) = (0.0, first);
-    for (i, v) in values.iter().enumerate().skip(first) {
-        if v.abs() > largest {
-            (largest, at) = (v.abs(), i);
-        }
-    }
-    (largest, at)
 }
 
 /// Exchanges rows and columns p < s, the rows in the finished columns included.

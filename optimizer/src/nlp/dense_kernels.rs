@@ -112,6 +112,18 @@ pub(super) fn sum_of_lanes(sums: &[f64; LANES]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
+/// Largest |v_i| from `first` on, and where; numbers that are none do not count.
+#[inline(always)]
+pub(super) fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
+    let (mut largest, mut at) = (0.0, first);
+    for (i, v) in values.iter().enumerate().skip(first) {
+        if v.abs() > largest {
+            (largest, at) = (v.abs(), i);
+        }
+    }
+    (largest, at)
+}
+
 /// Whether all values, of padded length, are finite.
 #[inline(always)]
 pub(super) fn all_finite(values: &[f64]) -> bool {

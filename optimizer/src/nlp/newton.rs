@@ -13,6 +13,7 @@
 
 use std::time::Instant;
 
+use super::dense_kernels::LANES;
 use super::formulation::Formulation;
 use super::kkt::KktMatrix;
 use super::kkt_solver::{Inertia, KktSolver};
@@ -57,7 +58,6 @@ impl PrimalDual {
 
 /// Largest absolute entry; NaN counts as infinite.
 pub(super) fn largest(values: &[f64]) -> f64 {
-    const LANES: usize = 8;
     let (mut largest, mut zeros) = ([0.0f64; LANES], [0.0f64; LANES]);
     let (blocks, rest) = values.as_chunks::<LANES>();
     let mut take = |k: usize, value: f64| {

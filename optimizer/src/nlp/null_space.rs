@@ -18,7 +18,7 @@
 use pulp::Simd;
 
 use super::bunch_kaufman::WORK_COLUMNS;
-use super::dense_kernels::{LANES, subtract, subtract_columns_within, subtract_symmetric_product};
+use super::dense_kernels::{LANES, largest_entry, subtract, subtract_columns_within, subtract_symmetric_product};
 use super::front::{Front, MOST_DEFERRED};
 
 /// A pivot below this share of its row's largest entry defers the row.
@@ -187,12 +187,7 @@ fn factor<S: Simd>(
     let mut t = 0;
     while t < count {
         let column = &lu[t * tall..t * tall + variables];
-        let (mut largest, mut at) = (0.0, t);
-        for (i, v) in column.iter().enumerate().skip(t) {
-            if v.abs() > largest {
-                (largest, at) = (v.abs(), i);
-            }
-        }
+        let (largest, at) = largest_entry(column, t);
         let eliminated = column[..t].iter().fold(largest, |a: f64, v| a.max(v.abs()));
         // Not a number is no pivot.
         let acceptable = largest > SMALLEST_PIVOT * eliminated;
