@@ -241,7 +241,8 @@ class Gait:
         # Inequalities.
         for side in (domain.stance, 1 - domain.stance):
             mine = [c for c in range(nc) if domain.contacts[c][0] // 2 == side]
-            if mine:
+            leaves = domain.kind == "DS3" and last and side != domain.stance
+            if mine and not leaves:
                 normal = sum(force[c] for c in mine if domain.contacts[c][1] == 1)
                 shear = sum(force[c] for c in mine if domain.contacts[c][1] == 0)
                 mu = self.options["friction"]
@@ -430,6 +431,8 @@ class Gait:
         torques += [(-limits[key], limits[key]) for key in ("u_prosthetic_knee", "u_prosthetic_ankle")]
         for d, domain in enumerate(self.domains):
             unloading = {"DS3": 4, "SS2": 1}.get(domain.kind)
+            # With the last vertical force of a foot its friction vanishes: the vertex of the cone.
+            vanishing = {"DS3": (3, 4), "SS2": (1,)}.get(domain.kind, ())
             for k in range(domain.points):
                 p = layout.point_start[d][k]
                 for i in range(9):
@@ -443,8 +446,8 @@ class Gait:
                     low, high = (0.0 if axis == 1 else -limits["force_max"]), limits["force_max"]
                     if c == unloading:
                         low = limits["liftoff_force"] * (1 - k / (domain.points - 1))
-                        if k == domain.points - 1:
-                            low = high = 0.0
+                    if k == domain.points - 1 and c in vanishing:
+                        low = high = 0.0
                     put(p + 33 + c, low, high)
                 if self.muscles:
                     fibre = p + 33 + len(domain.contacts)

@@ -20,8 +20,8 @@ const SMOOTHNESS: f64 = 30.0;
 const ROW_PRICE: f64 = 1e4;
 /// Linearisations.
 const PASSES: usize = 8;
-/// Stop when no coordinate moves more than this, m or rad.
-const STEP_TOLERANCE: f64 = 1e-6;
+/// Stop when no coordinate moves more than this, m or rad: the next pass would move less than a tenth of it.
+const STEP_TOLERANCE: f64 = 0.02;
 
 /// One instant of the stride: the points of the domains that share it.
 struct Instant {

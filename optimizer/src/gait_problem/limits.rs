@@ -117,9 +117,9 @@ pub fn variable_bounds(
                 }
                 if CYCLE[d].unloading_row() == Some(c) {
                     low = low.max(limits.liftoff_force_n * (1.0 - domain.sigma(k)));
-                    if k == domain.last() {
-                        (low, high) = (0.0, 0.0);
-                    }
+                }
+                if k == domain.last() && CYCLE[d].unloaded_rows().contains(&c) {
+                    (low, high) = (0.0, 0.0);
                 }
                 set(p + FORCE + c, low, high);
             }

@@ -427,6 +427,11 @@ impl RowTable {
         }
         let feet = if matches!(domain.kind, DomainKind::Ds2 | DomainKind::Ds3) { 2 } else { 1 };
         rows.friction = self.add(place, RowKind::Friction, 2 * feet, 0.0, f64::INFINITY);
+        if domain.kind == DomainKind::Ds3 && k == domain_layout.last() {
+            // The trailing foot leaves the ground. Its cone is down to the vertex, which the bounds of its forces say; two
+            // rows without an interior would have unbounded multipliers.
+            self.lower[rows.friction + 2..].fill(f64::NEG_INFINITY);
+        }
         self.height_rows(domain_layout, place, k, &mut rows);
         if domain.kind == DomainKind::Ss1 {
             rows.phase_rate = Some(self.add(place, RowKind::PhaseRate, 1, 0.0, f64::INFINITY));

@@ -53,6 +53,18 @@ impl BlockColumns {
         }
     }
 
+    /// Copies them back.
+    #[inline(always)]
+    pub(super) fn unpack(&self, packed: &[f64], matrix: &mut [f64]) {
+        let mut sources = packed.as_chunks::<LANES>().0.iter();
+        for (column, range) in matrix.chunks_exact_mut(self.stride.max(1)).zip(self.starts.windows(2)) {
+            let targets = column.as_chunks_mut::<LANES>().0;
+            for (&block, source) in self.blocks[range[0]..range[1]].iter().zip(&mut sources) {
+                targets[block] = *source;
+            }
+        }
+    }
+
     /// y -= sum of f x_k over the terms (k, f), x_k being columns.
     #[inline(always)]
     pub(super) fn subtract<S: Simd>(&self, simd: S, y: &mut [f64], packed: &[f64], terms: &[(usize, f64)]) {

@@ -112,16 +112,26 @@ pub(super) fn sum_of_lanes(sums: &[f64; LANES]) -> f64 {
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
-/// Largest |v_i| from `first` on, and where; numbers that are none do not count.
+/// Largest |v_i|; numbers that are none do not count.
 #[inline(always)]
-pub(super) fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
-    let (mut largest, mut at) = (0.0, first);
-    for (i, v) in values.iter().enumerate().skip(first) {
-        if v.abs() > largest {
-            (largest, at) = (v.abs(), i);
+pub(super) fn largest_magnitude(values: &[f64]) -> f64 {
+    let larger = |a: f64, v: f64| if v.abs() > a { v.abs() } else { a };
+    let mut largest = [0.0; LANES];
+    let (blocks, rest) = values.as_chunks::<LANES>();
+    for block in blocks {
+        for k in 0..LANES {
+            largest[k] = larger(largest[k], block[k]);
         }
     }
-    (largest, at)
+    rest.iter().copied().chain(largest).fold(0.0, larger)
+}
+
+/// Largest |v_i| from `first` on, and where (the first of them); numbers that are none do not count.
+#[inline(always)]
+pub(super) fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
+    let largest = largest_magnitude(&values[first.min(values.len())..]);
+    let at = if largest > 0.0 { values.iter().skip(first).position(|v| v.abs() == largest) } else { None };
+    (largest, first + at.unwrap_or(0))
 }
 
 /// Whether all values, of padded length, are finite.

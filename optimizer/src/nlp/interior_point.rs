@@ -8,6 +8,7 @@ use super::feasibility;
 use super::filter::Filter;
 use super::formulation::{Formulation, Goal, RowKind};
 use super::inertia_correction::InertiaCorrection;
+use super::kkt_solver::Change;
 use super::line_search::Search;
 use super::newton::{Linearisation, NewtonSystem, PrimalDual, largest};
 use super::optimality::Optimality;
@@ -290,9 +291,11 @@ impl<'p> Run<'p> {
             *r = -c;
         }
         self.correction.begin(settings, self.mu);
+        let mut change = Change::Any;
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
-            let inertia = session.newton.factor(&self.form, &self.point, &self.at, dw, dc);
+            let inertia = session.newton.factor(&self.form, &self.point, &self.at, (dw, dc), change);
+            change = Change::Diagonal;
             let go_on = match inertia {
                 Some(i) if i.zero == 0 && i.negative == self.form.m => {
                     let ratio = session.newton.solve(

@@ -38,6 +38,14 @@ impl Inertia {
     }
 }
 
+/// How a matrix differs from the one factorised before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Change {
+    Any,
+    /// On the diagonal only: another regularisation.
+    Diagonal,
+}
+
 /// A symmetric indefinite factorisation, analysed once for a fixed pattern. The residual of a solution is the
 /// caller's business.
 pub(super) trait KktSolver: Send {
@@ -46,7 +54,8 @@ pub(super) trait KktSolver: Send {
         true
     }
     /// Factorises the matrix with these values (order of the analysed pattern); `None` when it broke down.
-    fn factor(&mut self, values: &[f64]) -> Option<Inertia>;
+    /// What `change` allows may be kept of the last one; the result is the same.
+    fn factor(&mut self, values: &[f64], change: Change) -> Option<Inertia>;
     /// Overwrites `rhs` by the solution with the last factorisation.
     fn solve(&mut self, rhs: &mut [f64]);
     /// Marks the rows (indices of the matrix) whose diagonal the last factorisation took for zero.

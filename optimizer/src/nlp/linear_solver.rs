@@ -3,7 +3,7 @@
 use super::formulation::{Formulation, RowKind};
 use super::front::PivotKind;
 use super::kkt::KktMatrix;
-use super::kkt_solver::{Inertia, KktSolver};
+use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::multifrontal::Multifrontal;
 use super::ordering;
 use super::settings::{LinearSolver, NlpSettings};
@@ -59,12 +59,14 @@ pub(super) fn choose(
     if settings.linear_solver == LinearSolver::Auto {
         methods.push(Box::new(other));
     }
-    Ok(Box::new(Ladder { methods, first: 0, in_use: 0, fallbacks: 0 }))
+    Ok(Box::new(Ladder { up_to_date: vec![false; methods.len()], methods, first: 0, in_use: 0, fallbacks: 0 }))
 }
 
 /// Several methods, the fastest first: a matrix on which one breaks down or gives a bad residual goes to the next.
 struct Ladder {
     methods: Vec<Box<dyn KktSolver>>,
+    /// Which have factorised the last matrix, or one that differs from it on the diagonal only.
+    up_to_date: Vec<bool>,
     /// Where the next matrix begins.
     first: usize,
     /// Which holds the present factor.
@@ -73,14 +75,19 @@ struct Ladder {
 }
 
 impl KktSolver for Ladder {
-    fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
+    fn factor(&mut self, values: &[f64], change: Change) -> Option<Inertia> {
+        if change == Change::Any {
+            self.up_to_date.fill(false);
+        }
         let first = std::mem::take(&mut self.first);
         for (k, method) in self.methods.iter_mut().enumerate().skip(first) {
             if !method.suits(values) {
                 continue;
             }
             self.in_use = k;
-            if let Some(inertia) = method.factor(values) {
+            // A method that was passed over has not seen the matrix that only the diagonal differs from.
+            let change = if std::mem::replace(&mut self.up_to_date[k], true) { Change::Diagonal } else { Change::Any };
+            if let Some(inertia) = method.factor(values, change) {
                 return Some(inertia);
             }
             self.fallbacks += 1;

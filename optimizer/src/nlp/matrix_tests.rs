@@ -1,7 +1,7 @@
 //! Factorisations against matrices of known inertia, and the promise that no wrong answer is silent.
 
 use super::front::PivotKind;
-use super::kkt_solver::{Inertia, KktSolver};
+use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::multifrontal::Multifrontal;
 use super::supernodal::Supernodal;
 
@@ -125,7 +125,7 @@ fn nlp_inertia_of_random_matrices_is_right() {
         for seed in 1..6 {
             let matrix = with_inertia(order, negative, seed);
             for (name, mut solver) in matrix.solvers(23) {
-                let inertia = solver.factor(&matrix.values);
+                let inertia = solver.factor(&matrix.values, Change::Any);
                 assert_eq!(
                     inertia,
                     Some(Inertia { positive: order - negative, negative, zero: 0 }),
@@ -181,7 +181,7 @@ fn nlp_saddle_matrices_with_barrier_spread_are_solved() {
         for spread in [1.0, 1e6, 1e12] {
             let matrix = saddle(chunks, spread, 1e-8, false);
             for (name, mut solver) in matrix.solvers(7) {
-                let inertia = solver.factor(&matrix.values);
+                let inertia = solver.factor(&matrix.values, Change::Any);
                 assert_eq!(
                     inertia,
                     Some(Inertia { positive: 4 * chunks, negative: 3 * chunks, zero: 0 }),
@@ -199,7 +199,7 @@ fn nlp_a_singular_matrix_is_never_solved_in_silence() {
     for chunks in [1, 5, 60] {
         let matrix = saddle(chunks, 1e3, 0.0, true);
         for (name, mut solver) in matrix.solvers(7) {
-            let Some(inertia) = solver.factor(&matrix.values) else { continue };
+            let Some(inertia) = solver.factor(&matrix.values, Change::Any) else { continue };
             let expected = Inertia { positive: 4 * chunks, negative: 3 * chunks, zero: 0 };
             let residual = matrix.residual(solver.as_mut(), 3);
             assert!(inertia != expected || residual > 1e-5, "{name}, {chunks} chunks: {inertia:?}, {residual}");
@@ -209,7 +209,7 @@ fn nlp_a_singular_matrix_is_never_solved_in_silence() {
     let mut zero = Matrix::from_dense(&vec![vec![1.0; 4]; 4]);
     zero.values.fill(0.0);
     for (name, mut solver) in zero.solvers(2) {
-        let inertia = solver.factor(&zero.values);
+        let inertia = solver.factor(&zero.values, Change::Any);
         assert!(inertia.is_none_or(|i| i.zero > 0), "{name}: {inertia:?}");
     }
 }
@@ -218,9 +218,9 @@ fn nlp_a_singular_matrix_is_never_solved_in_silence() {
 fn nlp_a_factorisation_does_not_depend_on_the_one_before() {
     let (a, b) = (saddle(20, 1e6, 1e-8, false), saddle(20, 1.0, 1e-8, false));
     for ((name, mut used), (_, mut fresh)) in a.solvers(7).into_iter().zip(a.solvers(7)) {
-        used.factor(&b.values);
-        used.factor(&vec![f64::NAN; a.values.len()]);
-        assert_eq!(used.factor(&a.values), fresh.factor(&a.values), "{name}");
+        used.factor(&b.values, Change::Any);
+        used.factor(&vec![f64::NAN; a.values.len()], Change::Any);
+        assert_eq!(used.factor(&a.values, Change::Any), fresh.factor(&a.values, Change::Any), "{name}");
         let rhs: Vec<f64> = (0..140).map(f64::from).collect();
         let (mut x, mut y) = (rhs.clone(), rhs);
         used.solve(&mut x);
@@ -257,7 +257,7 @@ fn nlp_threads_do_not_change_a_bit() {
     let kinds = vec![PivotKind::Other; order];
     let solve_with = |threads| {
         let mut solver = Multifrontal::new(&starts, &rows, &front_of, &kinds, threads).unwrap();
-        let inertia = solver.factor(&values).unwrap();
+        let inertia = solver.factor(&values, Change::Any).unwrap();
         let mut x: Vec<f64> = (0..order).map(|i| (i % 17) as f64).collect();
         solver.solve(&mut x);
         (inertia, x)
@@ -320,7 +320,11 @@ fn nlp_rows_eliminated_by_their_variables_give_the_same_answer() {
         let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, 1).unwrap();
         let mut two = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
         assert!(two.suits(&matrix.values));
-        assert_eq!(one.factor(&matrix.values).unwrap(), two.factor(&matrix.values).unwrap(), "H {hessian}");
+        assert_eq!(
+            one.factor(&matrix.values, Change::Any).unwrap(),
+            two.factor(&matrix.values, Change::Any).unwrap(),
+            "H {hessian}"
+        );
         let mut neglected = vec![false; kinds.len()];
         two.mark_neglected(&mut neglected);
         assert_eq!(neglected.iter().filter(|n| **n).count(), 6 * 22);
@@ -362,8 +366,26 @@ fn nlp_rows_without_a_variable_of_their_own_are_deferred() {
     let mut solver = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
     let alike = vec![PivotKind::Other; kinds.len()];
     let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, 1).unwrap();
-    assert_eq!(solver.factor(&matrix.values).unwrap(), one.factor(&matrix.values).unwrap());
+    assert_eq!(solver.factor(&matrix.values, Change::Any).unwrap(), one.factor(&matrix.values, Change::Any).unwrap());
     let mut neglected = vec![false; kinds.len()];
     solver.mark_neglected(&mut neglected);
     assert_eq!(neglected.iter().filter(|n| **n).count(), 2 * 22 - 1);
+}
+
+#[test]
+fn nlp_another_diagonal_gives_the_same_bits_as_a_fresh_start() {
+    let (matrix, front_of, kinds) = kkt_of_points(6, 1.0);
+    let mut heavier = matrix.values.clone();
+    for (j, kind) in kinds.iter().enumerate() {
+        heavier[matrix.starts[j]] += if *kind == PivotKind::Variable { 0.3 } else { -1e-8 };
+    }
+    let new = || Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+    let (mut used, mut fresh) = (new(), new());
+    used.factor(&matrix.values, Change::Any).unwrap();
+    assert_eq!(used.factor(&heavier, Change::Diagonal), fresh.factor(&heavier, Change::Any));
+    let right: Vec<f64> = (0..kinds.len()).map(|i| (i % 13) as f64 - 6.0).collect();
+    let (mut x, mut y) = (right.clone(), right);
+    used.solve(&mut x);
+    fresh.solve(&mut y);
+    assert_eq!(x, y);
 }

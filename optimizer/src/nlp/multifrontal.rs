@@ -17,7 +17,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::bunch_kaufman::{self, Pivots};
 use super::dense_kernels::all_finite;
 use super::front::{ChildMap, Front, PivotKind, Place};
-use super::kkt_solver::{Inertia, KktSolver};
+use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::schedule::{Piece, Schedule};
 use super::status::NlpError;
@@ -230,6 +230,7 @@ fn analyse(
 struct FactorPiece<'a> {
     fronts: &'a [Front],
     values: &'a [f64],
+    change: Change,
     piece: Piece,
     /// From front number `base` to the end of the piece.
     factors: &'a mut [Factor],
@@ -242,7 +243,7 @@ impl WithSimd for FactorPiece<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { fronts, values, piece, factors, base, work } = self;
+        let Self { fronts, values, change, piece, factors, base, work } = self;
         work.stack.clear();
         for f in piece.start..piece.end {
             let (before, rest) = factors.split_at_mut(f - base);
@@ -254,8 +255,10 @@ impl WithSimd for FactorPiece<'_> {
             for &(q, offset) in &front.sources {
                 scratch[offset as usize] += values[q as usize];
             }
+            // Deferred rows are needed as they were.
+            let same_rows = change == Change::Diagonal && !own.broke_down && own.null_space.rank == front.rows.len();
             own.broke_down = !add_children(fronts, f, scratch, before, base, &mut work.stack)
-                || !factor_front(simd, front, scratch, own, work);
+                || !factor_front(simd, front, scratch, own, same_rows, work);
             if !own.broke_down {
                 front.keep(scratch, front.first_slot(own.null_space.rank), &mut own.numbers);
                 if f + 1 == piece.end {
@@ -308,12 +311,20 @@ fn add_children(
     true
 }
 
-/// Factorises the assembled front; false when it breaks down.
+/// Factorises the assembled front; false when it breaks down. `same_rows`: its rows are those of the last matrix.
 #[inline(always)]
-fn factor_front<S: Simd>(simd: S, front: &Front, numbers: &mut [f64], own: &mut Factor, work: &mut Workspace) -> bool {
+fn factor_front<S: Simd>(
+    simd: S,
+    front: &Front,
+    numbers: &mut [f64],
+    own: &mut Factor,
+    same_rows: bool,
+    work: &mut Workspace,
+) -> bool {
     own.inertia = Inertia::default();
     if !front.rows.is_empty() {
-        if !null_space::eliminate(simd, front, numbers, &mut own.null_space, work) {
+        let before = same_rows.then_some(own.numbers.as_slice());
+        if !null_space::eliminate(simd, front, numbers, &mut own.null_space, before, work) {
             return false;
         }
         own.inertia.positive += own.null_space.rank;
@@ -370,15 +381,15 @@ impl KktSolver for Multifrontal {
         self.neglected.iter().all(|&q| values[q as usize].abs() <= LARGEST_DIAGONAL)
     }
 
-    fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
+    fn factor(&mut self, values: &[f64], change: Change) -> Option<Inertia> {
         let (fronts, architecture) = (&self.fronts, self.architecture);
         self.schedule.subtrees(&mut self.factors, &mut self.workspaces, |piece, factors, work| {
-            architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: piece.start, work });
+            architecture.dispatch(FactorPiece { fronts, values, change, piece, factors, base: piece.start, work });
         });
         if let Some(work) = self.workspaces.first_mut() {
             for piece in self.schedule.top() {
                 let factors = &mut self.factors;
-                architecture.dispatch(FactorPiece { fronts, values, piece, factors, base: 0, work });
+                architecture.dispatch(FactorPiece { fronts, values, change, piece, factors, base: 0, work });
             }
         }
         let mut inertia = Inertia::default();

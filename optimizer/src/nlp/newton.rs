@@ -16,7 +16,7 @@ use std::time::Instant;
 use super::dense_kernels::LANES;
 use super::formulation::Formulation;
 use super::kkt::KktMatrix;
-use super::kkt_solver::{Inertia, KktSolver};
+use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::settings::NlpSettings;
 
 /// A point or a direction: w, row multipliers, bound multipliers.
@@ -155,8 +155,8 @@ impl NewtonSystem {
         form: &Formulation,
         point: &PrimalDual,
         at: &Linearisation,
-        delta_w: f64,
-        delta_c: f64,
+        (delta_w, delta_c): (f64, f64),
+        change: Change,
     ) -> Option<Inertia> {
         let lower = point.zl.iter().zip(&at.slack_lower);
         let upper = point.zu.iter().zip(&at.slack_upper);
@@ -166,13 +166,19 @@ impl NewtonSystem {
         form.add_curvature(&mut self.diagonal);
         self.delta_w = delta_w;
         self.delta_c = delta_c;
-        self.factor_with(form, Some(&at.hessian), &at.jacobian)
+        self.factor_with(form, Some(&at.hessian), &at.jacobian, change)
     }
 
-    fn factor_with(&mut self, form: &Formulation, hessian: Option<&[f64]>, jacobian: &[f64]) -> Option<Inertia> {
+    fn factor_with(
+        &mut self,
+        form: &Formulation,
+        hessian: Option<&[f64]>,
+        jacobian: &[f64],
+        change: Change,
+    ) -> Option<Inertia> {
         let clock = Instant::now();
         let finite = self.matrix.assemble(form, hessian, jacobian, &self.diagonal, self.delta_c);
-        let inertia = if finite { self.solver.factor(&self.matrix.values) } else { None };
+        let inertia = if finite { self.solver.factor(&self.matrix.values, change) } else { None };
         self.unregularised.fill(false);
         self.solver.mark_neglected(&mut self.unregularised);
         self.tally.factor_seconds += clock.elapsed().as_secs_f64();
@@ -194,7 +200,7 @@ impl NewtonSystem {
         self.diagonal.fill(1.0);
         self.delta_w = 0.0;
         self.delta_c = delta_c;
-        let inertia = self.factor_with(form, None, jacobian)?;
+        let inertia = self.factor_with(form, None, jacobian, Change::Any)?;
         if inertia.negative != form.m || inertia.zero > 0 {
             return None;
         }

@@ -18,7 +18,9 @@
 use pulp::Simd;
 
 use super::bunch_kaufman::WORK_COLUMNS;
-use super::dense_kernels::{LANES, largest_entry, subtract, subtract_columns_within, subtract_symmetric_product};
+use super::dense_kernels::{
+    LANES, largest_entry, largest_magnitude, subtract, subtract_columns_within, subtract_symmetric_product,
+};
 use super::front::{Front, MOST_DEFERRED};
 
 /// A pivot below this share of its row's largest entry defers the row.
@@ -90,13 +92,15 @@ impl Front {
     }
 }
 
-/// Eliminates the rows; false when too many must be deferred.
+/// Eliminates the rows; false when too many must be deferred. `before`: what was kept of a matrix with the same rows, of
+/// which L, U and X are still right.
 #[inline(always)]
 pub(super) fn eliminate<S: Simd>(
     simd: S,
     front: &Front,
     numbers: &mut [f64],
     null_space: &mut NullSpace,
+    before: Option<&[f64]>,
     work: &mut Workspace,
 ) -> bool {
     let (tall, wide) = (front.tall, front.wide);
@@ -106,9 +110,16 @@ pub(super) fn eliminate<S: Simd>(
     let (coupling, rest) = rest.split_at_mut(front.row_coupling - front.coupling);
     let (x, rest) = rest.split_at_mut(front.row_diagonal - front.row_coupling);
     let (diagonal, reduced) = rest.split_at_mut(front.reduced - front.row_diagonal);
-    work.jacobian[..lu.len()].copy_from_slice(lu);
-    if !factor(simd, front, lu, x, null_space, &mut work.pivot) {
-        return false;
+    if let Some(before) = before {
+        let [lu_before, x_before, ..] = front.kept.parts(before);
+        lu.copy_from_slice(lu_before);
+        front.kept.row_coupling.unpack(x_before, x);
+    } else {
+        work.jacobian[..lu.len()].copy_from_slice(lu);
+        if !factor(simd, front, lu, x, null_space, &mut work.pivot) {
+            return false;
+        }
+        solve_for_slots(simd, front, lu, x, null_space.rank, &mut work.terms);
     }
     let rank = null_space.rank;
     for c in 0..variables {
@@ -116,7 +127,6 @@ pub(super) fn eliminate<S: Simd>(
             hessian[r * tall + c] = hessian[c * tall + r];
         }
     }
-    solve_for_slots(simd, front, lu, x, rank, &mut work.terms);
 
     // Free variables and deferred rows take their slots.
     let first_free = front.first_free(rank);
@@ -188,9 +198,8 @@ fn factor<S: Simd>(
     while t < count {
         let column = &lu[t * tall..t * tall + variables];
         let (largest, at) = largest_entry(column, t);
-        let eliminated = column[..t].iter().fold(largest, |a: f64, v| a.max(v.abs()));
         // Not a number is no pivot.
-        let acceptable = largest > SMALLEST_PIVOT * eliminated;
+        let acceptable = largest > SMALLEST_PIVOT * largest_magnitude(column);
         if !acceptable {
             count -= 1;
             if null_space.rows.len() - count > MOST_DEFERRED {

@@ -133,7 +133,7 @@ pub struct NlpSettings {
     /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c).
     pub dual_regularisation_value: f64,
 
-    /// Relative residual of the full KKT system that ends iterative refinement. Default 1e-8: smaller ones cost substitutions
+    /// Relative residual of the full KKT system that ends iterative refinement. Default 1e-7: smaller ones cost substitutions
     /// and save no iterations.
     pub residual_target: f64,
     /// Relative residual above which the step is refused and the matrix treated as singular. Default 1e-5.
@@ -204,7 +204,7 @@ impl Default for NlpSettings {
             proximal_first: 1e-4,
             dual_regularisation: DualRegularisation::default(),
             dual_regularisation_value: 1e-8,
-            residual_target: 1e-8,
+            residual_target: 1e-7,
             residual_limit: 1e-5,
             max_refinements: 10,
             max_second_order_corrections: 4,

@@ -11,7 +11,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::kkt_solver::{Inertia, KktSolver};
+use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::status::NlpError;
 
 /// Analysis, factor and workspace.
@@ -93,7 +93,7 @@ impl Supernodal {
 }
 
 impl KktSolver for Supernodal {
-    fn factor(&mut self, values: &[f64]) -> Option<Inertia> {
+    fn factor(&mut self, values: &[f64], _change: Change) -> Option<Inertia> {
         if values.iter().any(|v| !v.is_finite()) {
             return None;
         }

@@ -75,7 +75,7 @@ impl ColdGuess {
         stride_time_s: 1.2,
         stride_length_m: 1.15,
         timing: GuessTiming::Even,
-        barrier: 1e-4,
+        barrier: 1e-5,
         curvature_from: 0.03,
         adaptive_barrier: false,
     };

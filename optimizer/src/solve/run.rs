@@ -14,9 +14,12 @@ use std::time::Instant;
 /// barrier of 7,000 bounds swamps a cost of 0.06.
 const MU_TRACKING: f64 = 1e-3;
 const MU_MUSCLE_TRACKING: f64 = 1e-2;
-/// Weight and tolerance of the tracking phases.
+/// Weight of the tracking phases.
 const TRACKING_WEIGHT: f64 = 10.0;
-const TRACKING_TOLERANCE: f64 = 1e-3;
+/// Tolerances of a phase whose end is but a start: error, complementarity (it stays at the first barrier parameter),
+/// violation. Smaller ones cost iterations and save none afterwards.
+const ROUGH: f64 = 1e-2;
+const ROUGH_VIOLATION: f64 = 1e-3;
 /// First barrier parameter of a cost phase that may not choose its own.
 const MU_COST: f64 = 1e-4;
 /// Longest run of iterations that do not try the unregularised matrix again after it had the wrong inertia.
@@ -132,8 +135,13 @@ impl<'a> Run<'a> {
         let tracked_problem = guess.tracked(problem);
         let (plain, first) = guess.begin(&tracked_problem, &|| self.context.cancel.is_cancelled())?;
         let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..NlpSettings::default() };
-        let tracking_settings =
-            NlpSettings { tolerance: TRACKING_TOLERANCE, mu_initial: MU_TRACKING, ..every_phase.clone() };
+        let rough = NlpSettings {
+            tolerance: ROUGH,
+            complementarity_tolerance: ROUGH,
+            violation_tolerance: ROUGH_VIOLATION,
+            ..every_phase.clone()
+        };
+        let tracking_settings = NlpSettings { mu_initial: MU_TRACKING, ..rough.clone() };
         let cost_settings =
             |mu_initial| NlpSettings { tolerance: self.context.options.tolerance, mu_initial, ..every_phase.clone() };
         let mut tracked = self.phase(
@@ -144,7 +152,7 @@ impl<'a> Run<'a> {
         )?;
         if problem.muscles {
             if guess.route == ColdRoute::PlainOptimum && !Self::interrupted(&tracked) {
-                let settings = NlpSettings { tolerance: TRACKING_TOLERANCE, ..cost_settings(MU_COST) };
+                let settings = NlpSettings { mu_initial: MU_COST, ..rough };
                 tracked = self.phase(Phase::PlainCost, &plain, &StartPoint::Cold(tracked.x), settings)?;
             }
             let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x);

@@ -160,4 +160,14 @@ impl Domain {
             DomainKind::Ds2 | DomainKind::Ss1 => None,
         }
     }
+
+    /// Indices among [`Self::contact_rows`] of all forces that vanish at the end of the domain: that one, and with the last
+    /// vertical force of a foot its friction.
+    pub fn unloaded_rows(self) -> &'static [usize] {
+        match self.kind {
+            DomainKind::Ds3 => &[3, 4],
+            DomainKind::Ss2 => &[1],
+            DomainKind::Ds2 | DomainKind::Ss1 => &[],
+        }
+    }
 }
