@@ -1,8 +1,8 @@
 //! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guess 1] [--mesh 4,4,6,6] [--trace]` (one guess of the catalogue, as the other side has one start; the service tries
-//! two; `--trace` prints a line per iteration on stderr).
+//! [--guess 1] [--mesh 4,4,6,6] [--solver '{"tau_min": 0.995}'] [--trace]` (one guess of the catalogue, as the other side has
+//! one start; the service tries two; `--trace` prints a line per iteration on stderr).
 
 use gait_optimizer::{
     CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve_from_guesses,
@@ -28,6 +28,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let intervals: Vec<usize> = value()?.split(',').map(str::parse).collect::<Result<_, _>>()?;
                 let [ds2, ds3, ss2, ss1] = intervals[..] else { return Err("--mesh needs four numbers".into()) };
                 settings.mesh = Mesh { ds2, ds3, ss2, ss1 };
+            }
+            "--solver" => {
+                let solver: serde_json::Value = serde_json::from_str(&value()?)?;
+                options.solver =
+                    serde_json::from_value::<SolveOptions>(serde_json::json!({ "solver": solver }))?.solver;
             }
             "--threads" => options.threads = value()?.parse()?,
             other => return Err(format!("unknown argument {other}").into()),

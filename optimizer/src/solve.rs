@@ -13,6 +13,7 @@ mod problem;
 mod progress;
 mod report;
 mod run;
+mod solver_settings;
 mod warm_start;
 
 pub use attempts::CONVERGED_VIOLATION;

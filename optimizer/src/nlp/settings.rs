@@ -55,7 +55,7 @@ pub enum LinearSolver {
 }
 
 /// Settings of [`solve`](super::solve). `NlpSettings::default()` is a good general choice.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NlpSettings {
     /// Scaled optimality error below which a point is converged. Default 1e-8 (WB06 epsilon_tol).

@@ -1,6 +1,8 @@
 //! Limits and numerical options of a solve.
 
 use super::cold_guesses::ColdGuess;
+use super::solver_settings;
+use crate::nlp::NlpSettings;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +25,10 @@ pub struct SolveOptions {
     pub retry: bool,
     /// Which of the converged guesses is the answer.
     pub basin_choice: BasinChoice,
+    /// Settings of the interior point, but for those that the phases of a solve decide ([`solver_settings`]). In JSON only
+    /// what differs from the default needs to be there.
+    #[serde(with = "solver_settings", skip_serializing_if = "solver_settings::are_default")]
+    pub solver: NlpSettings,
 }
 
 impl Default for SolveOptions {
@@ -35,6 +41,7 @@ impl Default for SolveOptions {
             cold_guesses: 2,
             retry: true,
             basin_choice: BasinChoice::default(),
+            solver: solver_settings::default(),
         }
     }
 }
@@ -50,6 +57,7 @@ impl SolveOptions {
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
         ModelError::check_range("cold_guesses", self.cold_guesses as f64, 1.0, ColdGuess::CATALOGUE.len() as f64)?;
         self.basin_choice.validate()?;
+        solver_settings::validate(&self.solver)?;
         if let Some(limit) = self.time_limit_s {
             ModelError::check_range("time_limit_s", limit, 0.0, 1e7)?;
         }

@@ -5,8 +5,8 @@ use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveO
 use crate::cold_start;
 use crate::gait_problem::GaitProgramme;
 use crate::nlp::{
-    self, BarrierStrategy, BoundMultiplierStart, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram,
-    Residuals, StartPoint, Timing, WarmPoint,
+    self, BarrierStrategy, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, Residuals,
+    StartPoint, Timing, WarmPoint,
 };
 use std::time::Instant;
 
@@ -22,8 +22,6 @@ const ROUGH: f64 = 1e-2;
 const ROUGH_VIOLATION: f64 = 1e-3;
 /// First barrier parameter of a cost phase that may not choose its own.
 const MU_COST: f64 = 1e-4;
-/// Longest run of iterations that do not try the unregularised matrix again after it had the wrong inertia.
-const REGULARISATION_MEMORY: usize = 4;
 
 /// What all attempts of one solve share.
 #[derive(Clone, Copy)]
@@ -85,8 +83,6 @@ impl<'a> Run<'a> {
         let settings = NlpSettings {
             max_seconds: remaining,
             max_iterations: options.max_iterations,
-            bound_multiplier_start: BoundMultiplierStart::Centred,
-            regularisation_memory: REGULARISATION_MEMORY,
             threads: self.threads,
             ..settings
         };
@@ -134,21 +130,21 @@ impl<'a> Run<'a> {
         let (problem, programme) = (self.context.problem, self.context.programme);
         let tracked_problem = guess.tracked(problem);
         let (plain, first) = guess.begin(&tracked_problem, &|| self.context.cancel.is_cancelled())?;
-        let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..NlpSettings::default() };
+        let every_phase = NlpSettings { curvature_from_violation: guess.curvature_from, ..self.context.options.solver };
         let rough = NlpSettings {
             tolerance: ROUGH,
             complementarity_tolerance: ROUGH,
             violation_tolerance: ROUGH_VIOLATION,
-            ..every_phase.clone()
+            ..every_phase
         };
-        let tracking_settings = NlpSettings { mu_initial: MU_TRACKING, ..rough.clone() };
+        let tracking_settings = NlpSettings { mu_initial: MU_TRACKING, ..rough };
         let cost_settings =
-            |mu_initial| NlpSettings { tolerance: self.context.options.tolerance, mu_initial, ..every_phase.clone() };
+            |mu_initial| NlpSettings { tolerance: self.context.options.tolerance, mu_initial, ..every_phase };
         let mut tracked = self.phase(
             Phase::Tracking,
             &plain.for_tracking(TRACKING_WEIGHT),
             &StartPoint::Cold(first),
-            tracking_settings.clone(),
+            tracking_settings,
         )?;
         if problem.muscles {
             if guess.route == ColdRoute::PlainOptimum && !Self::interrupted(&tracked) {
@@ -185,8 +181,8 @@ impl<'a> Run<'a> {
     /// Begins with the barrier parameter that a cold start ends with: a larger one forgets the point, and with a smaller
     /// or larger one the same problem would end elsewhere.
     pub(super) fn warm(&mut self, point: WarmPoint) -> Result<NlpResult, SolveError> {
-        let defaults = NlpSettings::default();
-        let mu_warm = self.context.options.tolerance / (defaults.kappa_epsilon + 1.0);
+        let solver = self.context.options.solver;
+        let mu_warm = self.context.options.tolerance / (solver.kappa_epsilon + 1.0);
         self.phase(
             Phase::Cost,
             self.context.programme,
@@ -197,7 +193,7 @@ impl<'a> Run<'a> {
                 mu_warm: Some(mu_warm),
                 warm_bound_push: 1e-7,
                 warm_bound_fraction: 1e-7,
-                ..defaults
+                ..solver
             },
         )
     }

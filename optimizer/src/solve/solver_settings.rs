@@ -1,0 +1,115 @@
+//! The settings of the interior point that a caller may choose for gait problems.
+//!
+//! The phases of a solve decide the others, by the rest of the options and the guess in progress: tolerances, limits, barrier
+//! parameters and strategy, distance of a warm start from its bounds, when the rows' curvature counts, threads.
+
+use crate::nlp::{BoundMultiplierStart, NlpSettings};
+use crate::subject::ModelError;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value};
+
+/// Fields that the phases decide.
+const DECIDED_BY_PHASES: [&str; 14] = [
+    "tolerance",
+    "violation_tolerance",
+    "dual_tolerance",
+    "complementarity_tolerance",
+    "max_iterations",
+    "max_seconds",
+    "barrier_strategy",
+    "mu_initial",
+    "mu_warm",
+    "warm_bound_push",
+    "warm_bound_fraction",
+    "gradient_scaling",
+    "curvature_from_violation",
+    "threads",
+];
+
+/// What suits gait problems: bound multipliers begin on the central path, and the unregularised matrix is not tried again at
+/// once after it had the wrong inertia.
+pub(super) fn default() -> NlpSettings {
+    NlpSettings {
+        bound_multiplier_start: BoundMultiplierStart::Centred,
+        regularisation_memory: 4,
+        ..NlpSettings::default()
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+pub(super) fn are_default(settings: &NlpSettings) -> bool {
+    *settings == default()
+}
+
+fn fields(settings: &NlpSettings) -> Result<Map<String, Value>, serde_json::Error> {
+    match serde_json::to_value(settings)? {
+        Value::Object(fields) => Ok(fields),
+        other => Err(serde_json::Error::custom(format!("not an object: {other}"))),
+    }
+}
+
+/// Checks every range, and that nothing is set here that is decided elsewhere.
+pub(super) fn validate(settings: &NlpSettings) -> Result<(), ModelError> {
+    let invalid = |reason: String| ModelError::Malformed { what: "solver".to_owned(), reason };
+    settings.validate().map_err(|error| invalid(error.to_string()))?;
+    let (own, usual) = (fields(settings), fields(&default()));
+    let (own, usual) = (own.map_err(|e| invalid(e.to_string()))?, usual.map_err(|e| invalid(e.to_string()))?);
+    match DECIDED_BY_PHASES.into_iter().find(|&field| own.get(field) != usual.get(field)) {
+        Some(field) => Err(invalid(format!(
+            "{field} is decided by the phases of a solve; leave it out (the options beside solver, and the guesses, set it)"
+        ))),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn serialize<S: Serializer>(settings: &NlpSettings, serializer: S) -> Result<S::Ok, S::Error> {
+    settings.serialize(serializer)
+}
+
+/// Fields that are left out have the default for gait problems.
+pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NlpSettings, D::Error> {
+    let mut all = fields(&default()).map_err(D::Error::custom)?;
+    all.extend(Map::deserialize(deserializer)?);
+    serde_json::from_value(Value::Object(all)).map_err(D::Error::custom)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use crate::solve::SolveOptions;
+
+    fn options(text: &str) -> Result<SolveOptions, String> {
+        let options: SolveOptions = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        options.validate().map(|()| options).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn what_is_left_out_is_the_default_for_gaits() {
+        let given = options(r#"{"solver": {"tau_min": 0.995}}"#).unwrap();
+        let mut expected = SolveOptions::default();
+        expected.solver.tau_min = 0.995;
+        assert_eq!(given, expected);
+        let written = serde_json::to_string(&given).unwrap();
+        assert_eq!(options(&written).unwrap(), given);
+    }
+
+    #[test]
+    fn nothing_is_written_of_the_default() {
+        assert!(!serde_json::to_string(&SolveOptions::default()).unwrap().contains("solver"));
+    }
+
+    #[test]
+    fn wrong_settings_are_named() {
+        for (text, expected) in [
+            (r#"{"solver": {"tau_min": 1.5}}"#, "tau_min"),
+            (r#"{"solver": {"tau_mni": 0.9}}"#, "unknown field `tau_mni`"),
+            (r#"{"solver": {"tau_min": "high"}}"#, "invalid type: string"),
+            (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial is decided by the phases of a solve"),
+            (r#"{"solver": {"threads": 2}}"#, "threads is decided by the phases of a solve"),
+        ] {
+            let error = options(text).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+}
