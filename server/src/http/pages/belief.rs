@@ -269,7 +269,7 @@ fn best(belief: &Belief, standing: &Standing) -> Result<Vec<BestRow>, LearnerErr
 fn answer_row(comparison: &Comparison, standing: &Standing) -> Option<AnswerRow> {
     Some(AnswerRow {
         text: answer_in_words(&comparison.given, standing)?,
-        source: format::source(comparison.given.source),
+        source: format::source(&comparison.given),
         percent: percent(comparison.probability),
         agrees: comparison.probability > 0.5,
     })

@@ -1,7 +1,6 @@
 //! What a rater does: takes the next pair, answers it. And the act that ends blindness.
 
 use super::draw::draw;
-use super::{skipped_pairs, unsafe_trials};
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
@@ -12,6 +11,7 @@ use crate::store::studies::{FeedbackMode, StudyState};
 use crate::store::{Connection, StudyId, TrialId, Writer, consents, events, studies};
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
+use crate::studies::objections::Objections;
 use crate::studies::standing::Standing;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -73,7 +73,8 @@ pub async fn next(
     let (seed, question) = question(reader, study).await?;
     let mut writer = store.write().await?;
     let all = presentations::of_study(&mut writer, study).await?;
-    let closed = unsafe_trials(&all);
+    let objections = Objections::read(&mut writer, study).await?;
+    let closed: Vec<TrialId> = objections.closed.iter().map(|closed| closed.trial).collect();
     let own: Vec<Presentation> = all.iter().filter(|shown| shown.rater == caller.name).cloned().collect();
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         if !closed.contains(&open.shown_first) && !closed.contains(&open.shown_second) {
@@ -84,9 +85,7 @@ pub async fn next(
         presentations::answer(&mut writer, open.id, withdrawn).await?;
     }
     let is_closed = |pair: &(TrialId, TrialId)| {
-        closed.contains(&pair.0)
-            || closed.contains(&pair.1)
-            || skipped_pairs(&all).iter().any(|(a, b)| (*a, *b) == *pair || (*b, *a) == *pair)
+        closed.contains(&pair.0) || closed.contains(&pair.1) || objections.is_skipped(*pair)
     };
     let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
     let drawn = draw(seed, &caller.name, pair, &own, &closed);
@@ -133,7 +132,9 @@ pub async fn answer(
     }
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let voice = Voice { source, author: &caller.name, note: &given.note };
-    let heard = match heard(&shown, given.answer) {
+    // What is shown twice, or beside itself, says how the rater judges, and nothing of gaits.
+    let heard = if shown.kind == Kind::New { given.answer.heard(shown.pair()) } else { None };
+    let heard = match heard {
         Some(said) => Some(feedback::append(writer, shown.study_id, &said, voice).await?),
         None => None,
     };
@@ -186,20 +187,6 @@ pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Re
     }
     consents::may_be_shown(db, shown.study_id).await?;
     Ok(shown)
-}
-
-/// What the learner hears of an answer: pairs of the study alone. That a gait is unsafe says that the other is better.
-fn heard(shown: &Presentation, said: Said) -> Option<feedback::Said> {
-    let (first, second) = (shown.shown_first, shown.shown_second);
-    if shown.kind != Kind::New {
-        return None;
-    }
-    match said {
-        Said::First | Said::UnsafeSecond => Some(feedback::Said::Preference { winner: first, loser: second }),
-        Said::Second | Said::UnsafeFirst => Some(feedback::Said::Preference { winner: second, loser: first }),
-        Said::NoDifference => Some(feedback::Said::Tie { a: first, b: second }),
-        Said::CannotTell | Said::UnsafeBoth | Said::Withdrawn => None,
-    }
 }
 
 /// Tells which gaits a rater was shown; from now on the rater's pairs are marked.
