@@ -28,7 +28,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
-    let running = service.study(|new| new.trial_budget = 50).await;
+    let running = service.study(|new| new.trial_budget = 300).await;
     while !service.trials(running).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
@@ -71,7 +71,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     for (path, body) in [
         ("/api/v1/studies".to_owned(), json!({"subject_id": person})),
         (format!("/api/v1/studies/{finished}/fork"), json!({})),
-        (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 60})),
+        (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 310})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
         (format!("/api/v1/studies/{human}/blind/next"), json!({})),

@@ -92,6 +92,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_study))
         .routes(routes!(figures::of_trial))
         .routes(routes!(figures::of_session))
+        .routes(routes!(figures::of_belief))
+        .routes(routes!(figures::of_reference))
         // scripts of the lab
         .routes(routes!(scripts::ask))
         .routes(routes!(scripts::tell))

@@ -1,7 +1,7 @@
 //! Pages for people: rendered on the server, usable without scripts.
 
 mod audit;
-mod belief;
+pub(super) mod belief;
 mod bound_use;
 mod certificate;
 mod compare;
