@@ -5,6 +5,7 @@
 
 mod draw;
 mod figures;
+mod hold;
 mod rater;
 
 pub use draw::{Drawn, draw};

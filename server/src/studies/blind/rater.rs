@@ -1,6 +1,7 @@
 //! What a rater does: takes the next pair, answers it. And the act that ends blindness.
 
-use super::draw::draw;
+use super::draw::{self, draw};
+use super::hold;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
@@ -8,7 +9,8 @@ use crate::store::audit;
 use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
-use crate::store::{Connection, StudyId, TrialId, Writer, consents, events, studies};
+use crate::store::trials::TrialState;
+use crate::store::{Connection, Instant, StudyId, TrialId, Writer, consents, events, now, studies};
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::objections::Objections;
@@ -42,20 +44,31 @@ pub struct Answered {
     pub answer: Said,
 }
 
-/// The pair that a study asks for, newest first, computed outside any transaction.
-async fn question(db: &mut Connection, study: StudyId) -> Result<(u64, Option<(TrialId, TrialId)>), Error> {
+/// What a study asks, computed outside any transaction.
+struct Question {
+    seed: u64,
+    /// The newer and the older gait; none: it asks for nothing.
+    pair: Option<(TrialId, TrialId)>,
+    /// When its gaits were found.
+    converged: Vec<Instant>,
+}
+
+async fn question(db: &mut Connection, study: StudyId) -> Result<Question, Error> {
     let study = studies::get(db, study).await?;
     consents::may_be_shown(db, study.id).await?;
     let (study_id, seed) = (study.id, study.plan.seed);
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
-        return Ok((seed, None));
+        return Ok(Question { seed, pair: None, converged: Vec::new() });
     }
     let standing = Standing::read(db, study).await?;
+    let found = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged);
+    let converged = found.filter_map(|trial| trial.finished_at).collect();
     let found = tokio::task::spawn_blocking(move || open_question(&standing))
         .await
         .map_err(|e| Error::Internal(e.to_string()))?;
     // What the learner says names bounds: it is logged, and the rater hears that the program failed.
-    Ok((seed, found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?))
+    let pair = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
+    Ok(Question { seed, pair, converged })
 }
 
 /// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
@@ -70,7 +83,7 @@ pub async fn next(
     caller: &Caller,
     study: StudyId,
 ) -> Result<(Writer, Option<Presentation>), Error> {
-    let (seed, question) = question(reader, study).await?;
+    let question = question(reader, study).await?;
     let mut writer = store.write().await?;
     let all = presentations::of_study(&mut writer, study).await?;
     let objections = Objections::read(&mut writer, study).await?;
@@ -87,8 +100,13 @@ pub async fn next(
     let is_closed = |pair: &(TrialId, TrialId)| {
         closed.contains(&pair.0) || closed.contains(&pair.1) || objections.is_skipped(*pair)
     };
-    let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
-    let drawn = draw(seed, &caller.name, pair, &own, &closed);
+    let Some(pair) = question.pair.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
+    let waits = hold::waits(&all, &question.converged);
+    let lot = draw::lot(question.seed, &caller.name, &own);
+    if hold::until(own.last(), &waits, lot).is_some_and(|until| now() < until) {
+        return Ok((writer, None));
+    }
+    let drawn = draw(question.seed, &caller.name, pair, &own, (&closed, !waits.is_empty()));
     let token = secret::fresh()?;
     let new = NewPresentation {
         token: token.clone(),
