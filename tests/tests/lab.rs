@@ -296,6 +296,14 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     let (folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    for walk in 2..=3 {
+        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+    }
+    for (number, answer) in [(1, "first"), (2, "unsafe_first")] {
+        let said = json!({"number": number, "answer": answer});
+        service.post(&format!("/api/v1/lab/{}/answers", id(&session)), &said).await;
+        service.post(&format!("/api/v1/lab/{}/take-back", id(&session)), &json!({})).await;
+    }
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
     service.post(&format!("{api}/electromyograms"), &with_heel(1, &electromyogram(1.0))).await;
     let emg = service.post(&format!("{api}/emg-results"), &json!({})).await.json();
@@ -305,6 +313,7 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     let other = Store::open(&folder.path().join("b.db")).await.unwrap();
     import(&other, &archive::open(&file).unwrap()).await.unwrap();
     assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
+    assert_eq!(before[0].answers.iter().map(|answer| answer.taken_back).collect::<Vec<_>>(), [true, false]);
     // From the files in the archive the same curves are made again.
     let mut reader = other.read().await.unwrap();
     let anew = lab::compute(&mut reader, before[0].id, EmgSettings::default()).await.unwrap();
