@@ -243,7 +243,7 @@ async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
     let remarks = service.fetch(&format!("/api/v1/studies/{study}/remarks")).await.json();
     assert_eq!((&remarks[0]["answer"], &remarks[0]["note"]), (&json!("unsafe_second"), &json!("stumbled")));
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert_eq!(page.matches("was called unsafe by").count(), 1, "{page}");
+    assert_eq!(page.matches(">unsafe</a> by ").count(), 1, "{page}");
     service.stop().await;
 }
 
