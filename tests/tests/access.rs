@@ -65,7 +65,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 57] = [
+const PAGES: [(&str, Option<Right>); 59] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -110,6 +110,8 @@ const PAGES: [(&str, Option<Right>); 57] = [
     ("get /lab", Some(Right::Rate)),
     ("get /lab/{id}", Some(Right::Rate)),
     ("post /lab/{id}", Some(Right::Rate)),
+    ("post /lab/{id}/answer", Some(Right::Rate)),
+    ("post /lab/{id}/take-back", Some(Right::Rate)),
     ("get /people", Some(Right::Administer)),
     ("post /people", Some(Right::Administer)),
     ("get /audit", Some(Right::Administer)),

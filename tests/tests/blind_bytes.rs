@@ -183,7 +183,7 @@ async fn a_control_looks_like_a_question_even_where_others_answer_the_same() {
     let (rater, clinician) = (signed_in(&service, Role::Rater).await, signed_in(&service, Role::Clinician).await);
     let mut looks = BTreeSet::new();
     let mut kinds = Vec::new();
-    for turn in 0..400 {
+    for turn in 0..4000 {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
         if present.state == StudyState::Finished {
             break;

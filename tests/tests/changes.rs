@@ -121,6 +121,11 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let given = scene.one(done, "post /studies/{id}/preferences", &give, answer).await;
     let retract = format!("{api}/preferences/{}/retract", text(&given["id"]));
     scene.one(done, "post /preferences/{id}/retract", &retract, json!({"reason": "r"})).await;
+    let unsafe_one = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_first"});
+    let made = format!("{api}/studies/{finished}/remarks");
+    let made = scene.one(done, "post /studies/{id}/remarks", &made, unsafe_one).await;
+    let retract = format!("{api}/remarks/{}/retract", text(&made["id"]));
+    scene.one(done, "post /remarks/{id}/retract", &retract, json!({"reason": "r"})).await;
 
     let better = json!({"over": trials[0].id, "bounds": {"a6": elsewhere(&trials[0])}});
     let suggest = format!("{api}/studies/{finished}/suggestions");
@@ -162,6 +167,12 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let session = scene.one(done, "post /studies/{id}/lab-sessions", &plan, pair).await;
     let (session, lab) = (format!("{api}/lab-sessions/{}", text(&session["id"])), text(&session["id"]).to_owned());
     scene.one(done, "post /lab/{id}/walks", &format!("{api}/lab/{lab}/walks"), json!({"walk": 1})).await;
+    for walk in 2..=3 {
+        scene.service.post(&format!("{api}/lab/{lab}/walks"), &json!({"walk": walk})).await;
+    }
+    let said = json!({"number": 1, "answer": "first"});
+    scene.one(done, "post /lab/{id}/answers", &format!("{api}/lab/{lab}/answers"), said).await;
+    scene.one(done, "post /lab/{id}/take-back", &format!("{api}/lab/{lab}/take-back"), json!({})).await;
     let emg = json!({"walk": 1, "recording": electromyogram(1.0), "reading": {"heel_strike_column": "heel"}});
     scene.one(done, "post /lab-sessions/{id}/electromyograms", &format!("{session}/electromyograms"), emg).await;
     scene.one(done, "post /lab-sessions/{id}/emg-results", &format!("{session}/emg-results"), json!({})).await;

@@ -28,7 +28,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
-    let running = service.study(|new| new.trial_budget = 50).await;
+    let running = service.study(|new| new.trial_budget = 300).await;
     while !service.trials(running).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
@@ -46,6 +46,9 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let measured = json!({"walk": 1, "recording": motion()});
     let recording = service.post(&format!("/api/v1/lab-sessions/{session}/motions"), &measured).await;
     assert_eq!(recording.status, StatusCode::CREATED, "{}", recording.text);
+    let remark = json!({"first": converged[0].id, "second": converged[1].id, "answer": "cannot_tell"});
+    let remark = service.post(&format!("/api/v1/studies/{finished}/remarks"), &remark).await.json();
+    let remark = remark["id"].as_str().unwrap().to_owned();
     let before = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap().len();
     let withdraw = json!({"reason": "moved away"});
     let withdrawn = service.post(&format!("{of_subject}/withdraw"), &withdraw).await;
@@ -68,7 +71,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     for (path, body) in [
         ("/api/v1/studies".to_owned(), json!({"subject_id": person})),
         (format!("/api/v1/studies/{finished}/fork"), json!({})),
-        (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 60})),
+        (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 310})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
         (format!("/api/v1/studies/{human}/blind/next"), json!({})),
@@ -77,6 +80,13 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("{of_subject}/muscles"), json!({})),
         (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
         (format!("/api/v1/lab/{session}/walks"), json!({"walk": 2})),
+        (format!("/api/v1/lab/{session}/answers"), json!({"number": 1, "answer": "first"})),
+        (format!("/api/v1/lab/{session}/take-back"), json!({})),
+        (
+            format!("/api/v1/studies/{finished}/remarks"),
+            json!({"first": trials[0].id, "second": trials[1].id, "answer": "cannot_tell"}),
+        ),
+        (format!("/api/v1/remarks/{remark}/retract"), json!({"reason": "r"})),
         (format!("/api/v1/lab-sessions/{session}/close"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/emg-results"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/unblind"), json!({"reason": "r"})),
@@ -102,6 +112,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         ("/studies/{id}", finished.to_string()),
         ("/trials/{id}", trials[0].id.to_string()),
         ("/preferences/{id}", heard_id.to_string()),
+        ("/remarks/{id}", remark.clone()),
         ("/blind/{token}", token.clone()),
         ("/lab/{id}", session.clone()),
         ("/lab-sessions/{id}", session.clone()),

@@ -61,6 +61,8 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
         (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 5 + 2 + 7),
         (format!("/trials/{}", gaits[0].id), 1 + 6 + 2 + 6 + 6 + 2 + 7 + 1),
         (format!("/lab-sessions/{session}"), 6 + 2),
+        (format!("/studies/{}/belief?right=a5&down=a6", studies[0]), 8 + 2),
+        (format!("/references/{}", service.reference().await), 5),
     ] {
         let shown = service.fetch(&page).await;
         assert_eq!(shown.status, StatusCode::OK, "{}", shown.text);

@@ -177,7 +177,7 @@ async fn an_answer_is_taken_back_in_its_own_study_only() {
     let body = json!({"trial_a": a, "trial_b": b, "answer": "a"});
     let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await.json();
     let id = given["id"].as_str().unwrap();
-    let form = format!("feedback={id}&author=K&reason=typo");
+    let form = format!("saved={id}&author=K&reason=typo");
     for elsewhere in [UNKNOWN.to_owned(), other.to_string()] {
         let answer = service.post_text(&format!("/studies/{elsewhere}/retract"), FORM, &form).await;
         is_page(&answer, StatusCode::NOT_FOUND, "does not exist");
@@ -342,8 +342,9 @@ async fn a_gait_page_explains_its_lines() {
     let page = service.fetch(&format!("/trials/{a}")).await.text;
     for name in ["DS2", "DS3", "SS2", "SS1"] {
         assert!(page.contains(&format!("<dt>{name}</dt>")), "{name} is explained");
-        assert!(page.contains(&format!(">{name}_R</text>")) && page.contains(&format!(">{name}_L</text>")), "{name}");
     }
+    // Phases of an eighth of the stride each have no room for their names: shades and lines say where they begin.
+    assert!(page.contains("class=\"span\"") && page.contains("class=\"mark\""));
     assert!(page.contains(">cost</text>"), "the phases of the solve are marked");
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("reference gait: ") && page.contains("paper-1</a> (1.727 m"));

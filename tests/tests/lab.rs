@@ -5,6 +5,7 @@
 use axum::http::StatusCode;
 use gait_optimizer::emg::EmgSettings;
 use gaitwright::cli::study::import;
+use gaitwright::store::feedback::{FeedbackRow, Said, Source};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::{Trial, TrialState};
 use gaitwright::store::{LabSessionId, Store, StudyId, archive, audit, lab_sessions};
@@ -91,6 +92,12 @@ async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
     service.stop().await;
 }
 
+fn without_times(page: &str) -> String {
+    let mut parts = page.split("<time");
+    let first = parts.next().unwrap().to_owned();
+    parts.fold(first, |text, part| text + part.split_once("</time>").unwrap().1)
+}
+
 #[tokio::test]
 async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
     let (_folder, service, study, trials) = finished().await;
@@ -116,11 +123,16 @@ async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
     let mut seen = Vec::new();
     for _ in 0..4 {
         let session = planned(&service, study, &trials).await;
+        let lab = format!("/api/v1/lab/{}", id(&session));
+        for walk in 1..=3 {
+            service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
+        }
+        service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "second"})).await;
         let mut reader = service.store.read().await.unwrap();
         let order = lab_sessions::get(&mut reader, id(&session).parse().unwrap()).await.unwrap().gait_one_first;
         let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
         let page = page.replace(id(&session), "ID").replace(&format!("session {}", session["number"]), "session N");
-        seen.push((order, page));
+        seen.push((order, without_times(&page)));
     }
     assert!(seen.iter().any(|(order, _)| *order) && seen.iter().any(|(order, _)| !*order), "balanced");
     assert!(seen.iter().all(|(_, page)| *page == seen[0].1), "{seen:?}");
@@ -140,6 +152,98 @@ async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
         "{}",
         none.text
     );
+    service.stop().await;
+}
+
+async fn walked(service: &Service, study: StudyId, trials: &[Trial]) -> (String, String) {
+    let session = planned(service, study, trials).await;
+    let lab = format!("/api/v1/lab/{}", id(&session));
+    let early = service.post(&format!("{lab}/answers"), &json!({"number": 1, "answer": "first"})).await;
+    assert!(early.status == StatusCode::CONFLICT && early.text.contains("walk 1 was not recorded"), "{}", early.text);
+    for walk in 1..=3 {
+        service.post(&format!("{lab}/walks"), &json!({"walk": walk})).await;
+    }
+    (lab, format!("/api/v1/lab-sessions/{}", id(&session)))
+}
+
+/// What people said, as heard by the learner.
+async fn heard(service: &Service, study: StudyId) -> Vec<FeedbackRow> {
+    let mut rows = service.feedback(study).await;
+    rows.retain(|row| row.source == Source::Subject);
+    rows
+}
+
+#[tokio::test]
+async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
+    let (_folder, service, study, trials) = finished().await;
+    let (lab, session) = walked(&service, study, &trials).await;
+    assert_eq!(service.fetch(&lab).await.json()["asks"], 1);
+    let answers = format!("{lab}/answers");
+    for (body, status) in [
+        (json!({"number": 1, "answer": "withdrawn"}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"number": 2, "answer": "first"}), StatusCode::CONFLICT),
+        (json!({"number": 1, "answer": "first"}), StatusCode::CREATED),
+        // Sent twice it counts once; another one does not replace it.
+        (json!({"number": 1, "answer": "first"}), StatusCode::CREATED),
+        (json!({"number": 1, "answer": "second"}), StatusCode::CONFLICT),
+    ] {
+        let said = service.post(&answers, &body).await;
+        assert_eq!(said.status, status, "{body}: {}", said.text);
+    }
+    let back = service.post(&format!("{lab}/take-back"), &json!({})).await.json();
+    assert_eq!((&back["asks"], &back["answer"]), (&json!(2), &Value::Null));
+    let said = json!({"number": 2, "answer": "second", "note": "softer"});
+    let seen = service.post(&answers, &said).await.json();
+    assert_eq!((&seen["answer"]["answer"], &seen["can_be_taken_back"]), (&json!("second"), &json!(true)));
+    assert!(heard(&service, study).await.is_empty(), "before the order is told");
+
+    service.post(&format!("{session}/unblind"), &json!({"reason": "all were walked"})).await;
+    let rows = heard(&service, study).await;
+    let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
+    let (first, second) = if row.gait_one_first { (row.gait_one, row.gait_two) } else { (row.gait_two, row.gait_one) };
+    assert_eq!(
+        rows.iter().map(|row| row.said).collect::<Vec<_>>(),
+        [Said::Preference { winner: second, loser: first }]
+    );
+    let pseudonym = service.fetch(&format!("/api/v1/studies/{study}")).await.json()["subject_id"].clone();
+    let pseudonym = service.fetch(&format!("/api/v1/subjects/{}", pseudonym.as_str().unwrap())).await.json();
+    assert_eq!((json!(rows[0].author), rows[0].note.as_str()), (pseudonym["pseudonym"].clone(), "softer"));
+    assert_eq!(service.post(&format!("{lab}/take-back"), &json!({})).await.status, StatusCode::CONFLICT);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
+    let (_folder, service, study, trials) = finished().await;
+    let (lab, session) = walked(&service, study, &trials).await;
+    let said = json!({"number": 1, "answer": "unsafe_second", "note": "stumbled"});
+    assert_eq!(service.post(&format!("{lab}/answers"), &said).await.status, StatusCode::CREATED);
+    assert_eq!(service.post(&format!("{lab}/take-back"), &json!({})).await.status, StatusCode::CONFLICT);
+    let gaits = converged(&trials);
+    let closed = async || {
+        let mut closed = Vec::new();
+        for gait in &gaits[..2] {
+            let page = service.fetch(&format!("/trials/{}", gait.id)).await.text;
+            closed.push(page.contains("do not walk with it"));
+        }
+        closed
+    };
+    assert_eq!(closed().await, [true, true]);
+    let pair = json!({"trial_a": gaits[0].id, "trial_b": gaits[2].id, "answer": "a", "author": "K"});
+    let refused = service.post(&format!("/api/v1/studies/{study}/preferences"), &pair).await;
+    assert!(refused.text.contains("a gait that nobody called unsafe"), "{}", refused.text);
+    let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[2].id});
+    let refused = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await;
+    assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("gait_one")));
+
+    service.post(&format!("{session}/unblind"), &json!({"reason": "a stumble"})).await;
+    let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
+    let of_walk_three = if row.gait_one_first { row.gait_two } else { row.gait_one };
+    assert_eq!(closed().await, [gaits[0].id == of_walk_three, gaits[1].id == of_walk_three]);
+    let remarks = service.fetch(&format!("/api/v1/studies/{study}/remarks")).await.json();
+    assert_eq!((&remarks[0]["answer"], &remarks[0]["note"]), (&json!("unsafe_second"), &json!("stumbled")));
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert_eq!(page.matches(">unsafe</a> by ").count(), 1, "{page}");
     service.stop().await;
 }
 
@@ -192,6 +296,14 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     let (folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
     service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    for walk in 2..=3 {
+        service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": walk})).await;
+    }
+    for (number, answer) in [(1, "first"), (2, "unsafe_first")] {
+        let said = json!({"number": number, "answer": answer});
+        service.post(&format!("/api/v1/lab/{}/answers", id(&session)), &said).await;
+        service.post(&format!("/api/v1/lab/{}/take-back", id(&session)), &json!({})).await;
+    }
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
     service.post(&format!("{api}/electromyograms"), &with_heel(1, &electromyogram(1.0))).await;
     let emg = service.post(&format!("{api}/emg-results"), &json!({})).await.json();
@@ -201,6 +313,7 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     let other = Store::open(&folder.path().join("b.db")).await.unwrap();
     import(&other, &archive::open(&file).unwrap()).await.unwrap();
     assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
+    assert_eq!(before[0].answers.iter().map(|answer| answer.taken_back).collect::<Vec<_>>(), [true, false]);
     // From the files in the archive the same curves are made again.
     let mut reader = other.read().await.unwrap();
     let anew = lab::compute(&mut reader, before[0].id, EmgSettings::default()).await.unwrap();

@@ -44,6 +44,11 @@ async fn filled() -> (TempDir, PathBuf) {
         "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, actor, created_at) \
          select 'L', study_id, 1, min(id), max(id), 1, 'K', '' from trials group by study_id",
         "insert into lab_acts (session_id, act, actor, created_at) values ('L', 'walk_1', 'K', '')",
+        "insert into lab_answers (session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
+        "insert into lab_answer_retractions (session_id, number, actor, created_at) values ('L', 1, 'K', '')",
+        "insert into remarks (id, study_id, first, second, answer, source, author, created_at) \
+         select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', '' from trials group by study_id",
+        "insert into remark_retractions (remark_id, author, reason, created_at) values ('M', 'K', 'r', '')",
         "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
          values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
         "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",

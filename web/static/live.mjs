@@ -85,7 +85,7 @@ if (live) {
     filtered();
   });
 
-  for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted"]) {
+  for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered"]) {
     source.addEventListener(kind, () => void refresh());
   }
 

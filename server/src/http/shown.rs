@@ -4,8 +4,8 @@ use super::AppState;
 use super::extract::Id;
 use crate::error::Error;
 use crate::store::{
-    Connection, FeedbackId, LabRecordingId, LabSessionId, StoreResult, StudyId, TrialId, consents, feedback,
-    lab_recordings, lab_sessions, trials,
+    Connection, FeedbackId, LabRecordingId, LabSessionId, RemarkId, StoreResult, StudyId, TrialId, consents, feedback,
+    lab_recordings, lab_sessions, remarks, trials,
 };
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
@@ -38,6 +38,12 @@ impl OfStudy for TrialId {
 impl OfStudy for FeedbackId {
     async fn study(self, db: &mut Connection) -> StoreResult<StudyId> {
         Ok(feedback::get(db, self).await?.study_id)
+    }
+}
+
+impl OfStudy for RemarkId {
+    async fn study(self, db: &mut Connection) -> StoreResult<StudyId> {
+        Ok(remarks::get(db, self).await?.study_id)
     }
 }
 

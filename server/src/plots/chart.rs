@@ -90,13 +90,13 @@ const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 330.0;
 const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
-const TOP: f64 = 46.0;
+const TOP: f64 = 58.0;
 const BOTTOM: f64 = 60.0;
 /// Names of marks nearer to each other than this would touch: every other one is written this much lower.
 const MARK_DISTANCE: f64 = 24.0;
 const MARK_DROP: f64 = 56.0;
 /// What a character of a name above the axis takes where the style sheet writes it largest.
-const NAME_CHARACTER: f64 = 13.5;
+const NAME_CHARACTER: f64 = 16.0;
 /// What a logarithmic axis takes for nothing.
 const SMALLEST: f64 = 1e-16;
 
@@ -196,6 +196,29 @@ impl Chart {
             write!(svg, "<path class=\"grid\" d=\"M{at:.1} {bottom}v5\"/>")?;
             write!(svg, "<text class=\"tick x\" x=\"{at:.1}\" y=\"{}\">{}</text>", bottom + 27.0, x.text(tick))?;
         }
+        write!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>")?;
+        for band in &self.bands {
+            band.draw(svg, &px, &py)?;
+        }
+        for series in &self.series {
+            series.draw(svg, &px, &py)?;
+        }
+        self.draw_marks(svg, &px)?;
+        write!(
+            svg,
+            "<text class=\"label\" x=\"{:.1}\" y=\"{}\">{}</text>",
+            f64::midpoint(LEFT, right),
+            HEIGHT - 8.0,
+            escape(&self.x_label)
+        )?;
+        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.y_label))
+    }
+}
+
+impl Chart {
+    /// Over the lines: they often begin where a mark has its name.
+    fn draw_marks(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
+        let bottom = HEIGHT - BOTTOM;
         let (mut last, mut drop) = (f64::NEG_INFINITY, 0.0);
         for (value, name) in &self.marks {
             let at = px(*value);
@@ -213,25 +236,9 @@ impl Chart {
                 escape(name)
             )?;
         }
-        write!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{right}\"/>")?;
-        for band in &self.bands {
-            band.draw(svg, &px, &py)?;
-        }
-        for series in &self.series {
-            series.draw(svg, &px, &py)?;
-        }
-        write!(
-            svg,
-            "<text class=\"label\" x=\"{:.1}\" y=\"{}\">{}</text>",
-            f64::midpoint(LEFT, right),
-            HEIGHT - 8.0,
-            escape(&self.x_label)
-        )?;
-        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.y_label))
+        Ok(())
     }
-}
 
-impl Chart {
     fn draw_spans(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
         let bottom = HEIGHT - BOTTOM;
         for span in &self.spans {

@@ -2,6 +2,7 @@
 
 use super::chart::Chart;
 use super::gait_tiles;
+use super::heat_map::HeatMap;
 use super::standalone::{self, Inside};
 use gait_optimizer::walking::stick_figure::StickFigure;
 use resvg::usvg::fontdb::Source;
@@ -28,6 +29,8 @@ pub enum Drawing {
     Chart(Chart),
     /// A stride as a row of stick figures, under a title.
     Tiles(String, Vec<StickFigure>),
+    /// A shaded table.
+    Map(HeatMap),
 }
 
 /// Why there is no PNG.
@@ -47,6 +50,11 @@ impl Figure {
         Self { name: file_name(group, &chart.title), drawing: Drawing::Chart(chart) }
     }
 
+    /// A shaded table; `group` tells maps of the same title apart.
+    pub fn map(group: &str, map: HeatMap) -> Self {
+        Self { name: file_name(group, &map.title), drawing: Drawing::Map(map) }
+    }
+
     /// The stride as a row of pictures.
     pub fn tiles(title: &str, figures: Vec<StickFigure>) -> Self {
         Self { name: file_name("", title), drawing: Drawing::Tiles(title.to_owned(), figures) }
@@ -57,6 +65,7 @@ impl Figure {
         match &self.drawing {
             Drawing::Chart(chart) => &chart.title,
             Drawing::Tiles(title, _) => title,
+            Drawing::Map(map) => &map.title,
         }
     }
 
@@ -74,6 +83,10 @@ impl Figure {
             Drawing::Tiles(title, figures) => {
                 let inside = Inside { class: "tiles", size: gait_tiles::SIZE, body: gait_tiles::body(figures) };
                 standalone::svg(title, &inside, &[])
+            }
+            Drawing::Map(map) => {
+                let inside = Inside { class: "chart map", size: map.size(), body: map.body() };
+                standalone::svg(self.title(), &inside, &[])
             }
         }
     }
@@ -102,6 +115,7 @@ impl Figure {
         let _ = match &self.drawing {
             Drawing::Chart(chart) => chart_csv(&mut text, chart),
             Drawing::Tiles(_, figures) => tiles_csv(&mut text, figures),
+            Drawing::Map(map) => map_csv(&mut text, map),
         };
         text
     }
@@ -141,6 +155,17 @@ fn tiles_csv(text: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
     Ok(())
 }
 
+fn map_csv(text: &mut String, map: &HeatMap) -> std::fmt::Result {
+    let (columns, rows) = (&map.columns, &map.rows);
+    writeln!(text, "{},{},{},beside it", cell(&rows.0), cell(&columns.0), cell(&map.title))?;
+    for (row, cells) in rows.1.iter().zip(&map.cells) {
+        for (column, value) in columns.1.iter().zip(cells) {
+            writeln!(text, "{row},{column},{},{}", value.value, cell(&value.below))?;
+        }
+    }
+    Ok(())
+}
+
 /// A cell of a table: in quotes where it has a comma or a quote.
 fn cell(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
@@ -156,7 +181,7 @@ fn file_name(group: &str, title: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plots::Stroke;
+    use crate::plots::{Cell, Stroke};
 
     fn figure() -> Figure {
         let chart = Chart::new("Knee, \"left\" <a>", "cycle, %", "angle, °")
@@ -175,6 +200,26 @@ mod tests {
         assert_eq!(figure().name, "angles-knee-left-a");
         let tree = resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).unwrap();
         assert!(tree.size().width() > 600.0);
+    }
+
+    #[test]
+    fn a_map_stands_alone_and_gives_its_numbers() {
+        let one = |value: f64| Cell { value, text: format!("{value:+.2}"), below: "± 0.10".to_owned(), framed: true };
+        let map = HeatMap {
+            title: "Utility".to_owned(),
+            columns: ("a5: clearance, m".to_owned(), vec![0.0, 0.013]),
+            rows: ("a6: lean, rad".to_owned(), vec![0.1]),
+            cells: vec![vec![one(0.25), one(-0.5)]],
+            range: (-0.5, 0.25),
+        };
+        let figure = Figure::map("a5-a6", map);
+        assert_eq!(figure.name, "a5-a6-utility");
+        let svg = figure.svg();
+        assert!(svg.contains(".chart.map .value") && svg.contains("fill-opacity") && !svg.contains("var(--"), "{svg}");
+        resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).unwrap();
+        let expected =
+            "\"a6: lean, rad\",\"a5: clearance, m\",Utility,beside it\n0.1,0,0.25,± 0.10\n0.1,0.013,-0.5,± 0.10\n";
+        assert_eq!(figure.csv(), expected);
     }
 
     #[test]

@@ -43,22 +43,35 @@ const DARKEST: f64 = 0.5;
 impl HeatMap {
     /// The map as an SVG element.
     pub fn svg(&self) -> String {
+        let label = escape(&format!("{}: {} by {}", self.title, self.rows.0, self.columns.0));
+        let ((width, height), body) = (self.size(), self.body());
+        format!(
+            "<svg class=\"chart map\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{label}\">{body}</svg>"
+        )
+    }
+
+    /// Width and height of the drawing.
+    pub(super) fn size(&self) -> (f64, f64) {
+        (WIDTH, self.bottom() + BOTTOM)
+    }
+
+    /// The elements of the drawing.
+    pub(super) fn body(&self) -> String {
         let mut svg = String::with_capacity(8 * 1024);
         // Writing to a String cannot fail.
         let _ = self.draw(&mut svg);
         svg
     }
 
+    /// Where the cells end.
+    fn bottom(&self) -> f64 {
+        TOP + ROW * self.cells.len() as f64
+    }
+
     fn draw(&self, svg: &mut String) -> std::fmt::Result {
-        let bottom = TOP + ROW * self.cells.len() as f64;
+        let bottom = self.bottom();
         let width = (WIDTH - LEFT - 8.0) / self.columns.1.len().max(1) as f64;
         let (low, high) = self.range;
-        let label = escape(&format!("{}: {} by {}", self.title, self.rows.0, self.columns.0));
-        write!(
-            svg,
-            "<svg class=\"chart map\" viewBox=\"0 0 {WIDTH} {}\" role=\"img\" aria-label=\"{label}\">",
-            bottom + BOTTOM
-        )?;
         for (row, (cells, level)) in self.cells.iter().zip(&self.rows.1).enumerate() {
             let y = TOP + ROW * row as f64;
             let middle = y + ROW / 2.0;
@@ -104,7 +117,7 @@ impl HeatMap {
             bottom + 50.0,
             escape(&self.columns.0)
         )?;
-        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text></svg>", escape(&self.rows.0))
+        write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.rows.0))
     }
 }
 

@@ -17,7 +17,7 @@ const READ: [&str; 2] = ["gaitwright study 1", FORMAT];
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 19] = [
+const TABLES: [(&str, &str); 23] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -33,8 +33,12 @@ const TABLES: [(&str, &str); 19] = [
     ("presentation_answers", "presentation_id in (select id from presentations where study_id = ?)"),
     ("presentation_retractions", "presentation_id in (select id from presentations where study_id = ?)"),
     ("unblindings", "study_id = ? order by seq"),
+    ("remarks", "study_id = ? order by id"),
+    ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_acts", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_answer_retractions", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_recordings", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
     ("emg_results", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
 ];

@@ -12,7 +12,8 @@ pub struct Event {
     pub seq: i64,
     /// The study.
     pub study_id: StudyId,
-    /// `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`, `feedback_retracted`.
+    /// `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`, `feedback_retracted`,
+    /// `lab_session_answered`.
     pub kind: String,
     /// What exactly, as JSON.
     pub payload: serde_json::Value,

@@ -3,8 +3,8 @@
 use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use gait_learner::ActionIndex;
 use serde::{Deserialize, Serialize};
-use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
@@ -100,6 +100,8 @@ pub struct FeedbackRow {
     pub author: String,
     /// Free text.
     pub note: String,
+    /// Whether a rater said so, in a blind comparison.
+    pub by_rater: bool,
     /// When it was written.
     pub created_at: Instant,
     /// Set when it was taken back.
@@ -115,6 +117,17 @@ pub struct Retraction {
     pub reason: String,
     /// When.
     pub created_at: Instant,
+}
+
+impl Retraction {
+    /// That of a row with the columns `retracted_by`, `retracted_because`, `retracted_at`.
+    pub(super) fn from_row(row: &SqliteRow) -> StoreResult<Option<Self>> {
+        let at: Option<Instant> = row.try_get("retracted_at")?;
+        let retraction = |created_at| -> StoreResult<Self> {
+            Ok(Self { author: row.try_get("retracted_by")?, reason: row.try_get("retracted_because")?, created_at })
+        };
+        at.map(retraction).transpose()
+    }
 }
 
 /// Who says something.
@@ -180,18 +193,22 @@ pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reaso
     Ok(done.rows_affected() == 1)
 }
 
+/// A row with what became of it, and whether a rater said so.
+const SELECT: &str = "select f.*, r.author as retracted_by, r.reason as retracted_because, \
+                      r.created_at as retracted_at, \
+                      exists (select 1 from presentation_answers p where p.feedback_id = f.id) as by_rater \
+                      from feedback f left join retractions r on r.feedback_seq = f.seq ";
+
+fn select(rest: &str) -> AssertSqlSafe<String> {
+    AssertSqlSafe(format!("{SELECT} {rest}"))
+}
+
 /// The row with this identifier.
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
 pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow> {
-    let row = sqlx::query(
-        "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
-         from feedback f left join retractions r on r.feedback_seq = f.seq where f.id = ?",
-    )
-    .bind(id)
-    .fetch_optional(db)
-    .await?;
+    let row = sqlx::query(select("where f.id = ?")).bind(id).fetch_optional(db).await?;
     row.as_ref()
         .map(from_row)
         .transpose()?
@@ -203,15 +220,8 @@ pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow
 /// # Errors
 /// What the database reports.
 pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreResult<Vec<FeedbackRow>> {
-    let rows = sqlx::query(
-        "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
-         from feedback f left join retractions r on r.feedback_seq = f.seq \
-         where f.study_id = ? and f.seq > ? order by f.seq",
-    )
-    .bind(study)
-    .bind(after)
-    .fetch_all(db)
-    .await?;
+    let query = sqlx::query(select("where f.study_id = ? and f.seq > ? order by f.seq")).bind(study).bind(after);
+    let rows = query.fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
@@ -238,11 +248,9 @@ async fn answers(
     after: i64,
     limit: u32,
 ) -> StoreResult<Vec<FeedbackRow>> {
-    let rows = sqlx::query(
-        "select f.*, r.author as retracted_by, r.reason as retracted_because, r.created_at as retracted_at \
-         from feedback f left join retractions r on r.feedback_seq = f.seq \
-         where f.study_id = ? and f.kind <> 'label' and (f.kind = 'suggestion') = ? and f.seq > ? order by f.seq limit ?",
-    )
+    let rows = sqlx::query(select(
+        "where f.study_id = ? and f.kind <> 'label' and (f.kind = 'suggestion') = ? and f.seq > ? order by f.seq limit ?",
+    ))
     .bind(study)
     .bind(suggestions)
     .bind(after)
@@ -257,17 +265,14 @@ async fn answers(
 /// # Errors
 /// What the database reports.
 pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
-    let rows = sqlx::query(
-        "select * from (select f.*, r.author as retracted_by, r.reason as retracted_because, \
-         r.created_at as retracted_at from feedback f left join retractions r on r.feedback_seq = f.seq \
-         where f.study_id = ? and f.source in ('subject', 'clinician', 'script') order by f.seq desc limit ?) \
-         order by seq",
-    )
+    let rows = sqlx::query(select(
+        "where f.study_id = ? and f.source in ('subject', 'clinician', 'script') order by f.seq desc limit ?",
+    ))
     .bind(study)
     .bind(limit)
     .fetch_all(db)
     .await?;
-    rows.iter().map(from_row).collect()
+    rows.iter().rev().map(from_row).collect()
 }
 
 /// At most `limit` comparisons of two trials, whichever was named first, by people and scripts other than `author`, that
@@ -281,12 +286,10 @@ pub async fn by_others(
     author: &str,
     limit: u32,
 ) -> StoreResult<Vec<FeedbackRow>> {
-    let rows = sqlx::query(
-        "select f.*, null as retracted_by, null as retracted_because, null as retracted_at from feedback f \
-         where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and f.author <> ?3 \
-         and f.source in ('subject', 'clinician', 'script') and f.seq not in (select feedback_seq from retractions) \
-         order by f.seq desc limit ?4",
-    )
+    let rows = sqlx::query(select(
+        "where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and f.author <> ?3 \
+         and f.source in ('subject', 'clinician', 'script') and r.feedback_seq is null order by f.seq desc limit ?4",
+    ))
     .bind(a)
     .bind(b)
     .bind(author)
@@ -349,15 +352,6 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         }
         _ => return Err(StoreError::Damaged { what: "feedback", reason: format!("a {kind} with other columns") }),
     };
-    let retracted_at: Option<Instant> = row.try_get("retracted_at")?;
-    let retraction = match retracted_at {
-        None => None,
-        Some(created_at) => Some(Retraction {
-            author: row.try_get("retracted_by")?,
-            reason: row.try_get("retracted_because")?,
-            created_at,
-        }),
-    };
     Ok(FeedbackRow {
         seq: row.try_get("seq")?,
         id: row.try_get("id")?,
@@ -366,7 +360,8 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         source: row.try_get::<&str, _>("source")?.parse()?,
         author: row.try_get("author")?,
         note: row.try_get("note")?,
+        by_rater: row.try_get("by_rater")?,
         created_at: row.try_get("created_at")?,
-        retraction,
+        retraction: Retraction::from_row(row)?,
     })
 }

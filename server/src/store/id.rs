@@ -76,6 +76,7 @@ identifier!(JobId, "job");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(PresentationId, "presentation");
+identifier!(RemarkId, "remark");
 identifier!(LabSessionId, "lab session");
 identifier!(LabRecordingId, "recording of a lab session");
 identifier!(EmgResultId, "result of electromyograms");

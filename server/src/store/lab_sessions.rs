@@ -1,6 +1,7 @@
 //! Lab sessions: who walks with which two gaits in which order, and what happened to them.
 
 use super::audit::Actor;
+use super::lab_answers::{self, LabAnswer};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::Serialize;
 use sqlx::Row;
@@ -77,12 +78,24 @@ pub struct LabSession {
     pub created_at: Instant,
     /// What happened, in order.
     pub acts: Vec<(Act, Done)>,
+    /// What the person who walked said of the two gaits, in order.
+    pub answers: Vec<LabAnswer>,
 }
 
 impl LabSession {
     /// Whether this happened, and how.
     pub fn done(&self, act: Act) -> Option<&Done> {
         self.acts.iter().find(|(known, _)| *known == act).map(|(_, done)| done)
+    }
+
+    /// The answer that stands.
+    pub fn answer(&self) -> Option<&LabAnswer> {
+        self.answers.last().filter(|answer| !answer.taken_back)
+    }
+
+    /// The gaits of walks 2 and 3.
+    pub fn walked(&self) -> (TrialId, TrialId) {
+        if self.gait_one_first { (self.gait_one, self.gait_two) } else { (self.gait_two, self.gait_one) }
     }
 }
 
@@ -193,7 +206,8 @@ async fn all(db: &mut Connection, rows: &[SqliteRow]) -> StoreResult<Vec<LabSess
 
 async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> {
     let id: LabSessionId = row.try_get("id")?;
-    let acts = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id).fetch_all(db).await?;
+    let acts = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
+    let acts = acts.fetch_all(&mut *db).await?;
     let act = |row: &SqliteRow| -> StoreResult<(Act, Done)> {
         let done = Done { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
         Ok((row.try_get::<&str, _>("act")?.parse()?, done))
@@ -209,5 +223,6 @@ async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> 
         actor: row.try_get("actor")?,
         created_at: row.try_get("created_at")?,
         acts: acts.iter().map(act).collect::<StoreResult<_>>()?,
+        answers: lab_answers::of_session(db, id).await?,
     })
 }

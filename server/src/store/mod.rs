@@ -19,12 +19,14 @@ mod id;
 pub mod idempotency;
 pub mod jobs;
 mod json;
+pub mod lab_answers;
 pub mod lab_recordings;
 pub mod lab_sessions;
 pub mod listing;
 mod migrations;
 pub mod presentations;
 pub mod reference_gaits;
+pub mod remarks;
 pub mod restore;
 pub mod results;
 pub mod schema;
@@ -41,8 +43,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, StudyId,
-    SubjectId, TokenId, TrialId, UserId,
+    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, RemarkId,
+    StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use time::{Instant, now};
 pub use writing::Writer;

@@ -1,6 +1,8 @@
 //! Presentations: which two gaits a rater was shown, and what the rater said.
 
-use super::{Connection, FeedbackId, Instant, PresentationId, StoreError, StoreResult, StudyId, TrialId, now};
+use super::{
+    Connection, FeedbackId, Instant, PresentationId, StoreError, StoreResult, StudyId, TrialId, feedback, now,
+};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -76,6 +78,36 @@ impl Said {
         Self::Withdrawn,
     ];
 
+    /// What the learner hears of it. That a gait is unsafe says that the other is better.
+    pub fn heard(self, (first, second): (TrialId, TrialId)) -> Option<feedback::Said> {
+        match self {
+            Self::First | Self::UnsafeSecond => Some(feedback::Said::Preference { winner: first, loser: second }),
+            Self::Second | Self::UnsafeFirst => Some(feedback::Said::Preference { winner: second, loser: first }),
+            Self::NoDifference => Some(feedback::Said::Tie { a: first, b: second }),
+            Self::CannotTell | Self::UnsafeBoth | Self::Withdrawn => None,
+        }
+    }
+
+    /// Whether it says that a gait must not be walked.
+    pub fn is_about_safety(self) -> bool {
+        matches!(self, Self::UnsafeFirst | Self::UnsafeSecond | Self::UnsafeBoth)
+    }
+
+    /// Whether a person says so, and not which gait is better.
+    pub fn is_remark(self) -> bool {
+        self == Self::CannotTell || self.is_about_safety()
+    }
+
+    /// The gaits that must not be walked.
+    pub fn unsafe_of(self, (first, second): (TrialId, TrialId)) -> Vec<TrialId> {
+        match self {
+            Self::UnsafeFirst => vec![first],
+            Self::UnsafeSecond => vec![second],
+            Self::UnsafeBoth => vec![first, second],
+            _ => Vec::new(),
+        }
+    }
+
     /// As stored and shown.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -131,6 +163,13 @@ pub struct Presentation {
     pub answer: Option<Said>,
     /// When.
     pub answered_at: Option<Instant>,
+}
+
+impl Presentation {
+    /// The gaits, in the order in which they were shown.
+    pub fn pair(&self) -> (TrialId, TrialId) {
+        (self.shown_first, self.shown_second)
+    }
 }
 
 /// A presentation to write.

@@ -29,7 +29,7 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 22] = [
+pub const TABLES: [Sealed; 26] = [
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
@@ -46,8 +46,12 @@ pub const TABLES: [Sealed; 22] = [
     sealed("presentation_answers", &["presentation_id"]),
     sealed("presentation_retractions", &["presentation_id"]),
     sealed("unblindings", &["seq"]),
+    sealed("remarks", &["id"]),
+    sealed("remark_retractions", &["remark_id"]),
     sealed("lab_sessions", &["id"]),
     sealed("lab_acts", &["session_id", "act"]),
+    sealed("lab_answers", &["session_id", "number"]),
+    sealed("lab_answer_retractions", &["session_id", "number"]),
     sealed("lab_recordings", &["id"]),
     sealed("emg_results", &["id"]),
     sealed("users", &["id"]),

@@ -7,6 +7,7 @@ use crate::store::audit;
 use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies, trials};
+use crate::studies::objections::Objections;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -59,6 +60,10 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     }
     comparable(writer, study.id, "trial_a", answer.trial_a).await?;
     comparable(writer, study.id, "trial_b", answer.trial_b).await?;
+    let objections = Objections::read(writer, study.id).await?;
+    for (field, id) in [("trial_a", answer.trial_a), ("trial_b", answer.trial_b)] {
+        objections.refuse(field, id)?;
+    }
     let voice = voice(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
     let said = match answer.answer {
@@ -66,11 +71,25 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
         Verdict::B => Said::Preference { winner: b, loser: a },
         Verdict::NoDifference => Said::Tie { a, b },
     };
-    let id = feedback::append(writer, study.id, &said, voice).await?;
-    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
+    let id = write(writer, study.id, &said, voice).await?;
     let detail =
         json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": voice.author });
     audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
+    Ok(id)
+}
+
+/// Lets the learner hear something, and pages that are open.
+///
+/// # Errors
+/// A violated constraint or trigger, or what the database reports.
+pub(super) async fn write(
+    writer: &mut Writer,
+    study: StudyId,
+    said: &Said,
+    voice: Voice<'_>,
+) -> Result<FeedbackId, Error> {
+    let id = feedback::append(writer, study, said, voice).await?;
+    events::append(writer, study, "feedback_given", &json!({ "feedback_id": id })).await?;
     Ok(id)
 }
 

@@ -4,7 +4,7 @@ use super::search;
 use super::seed::{Purpose, derive};
 use super::standing::Standing;
 use crate::store::TrialId;
-use crate::store::trials::{NewTrial, TrialState};
+use crate::store::trials::{NewTrial, Trial, TrialState};
 use gait_learner::{LearnerError, Posterior, ProposalReason, posterior, propose};
 use gait_optimizer::ModelError;
 use thiserror::Error;
@@ -53,8 +53,16 @@ pub fn next_trial(standing: &Standing) -> Result<NewTrial, ChoiceError> {
 /// # Errors
 /// When a trial's action is not in the search space.
 pub fn best_converged(standing: &Standing, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    highest(standing, belief, |_| true)
+}
+
+fn highest(
+    standing: &Standing,
+    belief: &Posterior,
+    counts: impl Fn(&Trial) -> bool,
+) -> Result<Option<TrialId>, LearnerError> {
     let mut best: Option<(TrialId, f64)> = None;
-    for trial in standing.trials.iter().filter(|trial| trial.state == TrialState::Converged) {
+    for trial in standing.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
         let mean = belief.mean(trial.action_index)?;
         if best.is_none_or(|(_, highest)| mean > highest) {
             best = Some((trial.id, mean));
@@ -63,14 +71,21 @@ pub fn best_converged(standing: &Standing, belief: &Posterior) -> Result<Option<
     Ok(best.map(|(id, _)| id))
 }
 
-/// The recommended trial: of the visited ones, that with the highest posterior mean.
+/// The recommended trial: of the visited ones, that with the highest posterior mean; a gait that somebody called unsafe is
+/// never recommended.
 ///
 /// # Errors
 /// When the learner refuses the log.
 pub fn best_trial(standing: &Standing) -> Result<Option<TrialId>, LearnerError> {
     let plan = &standing.study.plan;
     let belief = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
-    Ok(belief.best().and_then(|action| standing.trial_of(action)).map(|trial| trial.id))
+    let best = belief.best().and_then(|action| standing.trial_of(action)).map(|trial| trial.id);
+    match best {
+        Some(best) if standing.objections.closes(best) => {
+            highest(standing, &belief, |trial| !standing.objections.closes(trial.id))
+        }
+        best => Ok(best),
+    }
 }
 
 /// From so many trials on, pages show what the learner last believed instead of asking it anew.
@@ -82,7 +97,8 @@ pub const MANY: usize = 400;
 /// When the learner refuses the log.
 pub fn best_to_show(standing: &Standing) -> Result<Option<TrialId>, LearnerError> {
     if standing.trials.len() >= MANY {
-        return Ok(standing.trials.last().and_then(|newest| newest.best_before));
+        let best = standing.trials.last().and_then(|newest| newest.best_before);
+        return Ok(best.filter(|best| !standing.objections.closes(*best)));
     }
     best_trial(standing)
 }

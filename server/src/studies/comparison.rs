@@ -55,7 +55,7 @@ pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, 
     let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
     let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
     let mut pairs = open.filter_map(|q| Some((converged(q.action)?, converged(q.against)?)));
-    Ok(pairs.find(|(a, b)| !standing.skipped.iter().any(|pair| *pair == (*a, *b) || *pair == (*b, *a))))
+    Ok(pairs.find(|pair| !standing.objections.is_skipped(*pair)))
 }
 
 fn is_answered(log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {

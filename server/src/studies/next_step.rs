@@ -80,6 +80,7 @@ pub(super) fn likely_next(standing: &Standing) -> Result<Vec<NewTrial>, Error> {
             source: Source::Subject,
             author: String::new(),
             note: String::new(),
+            by_rater: false,
             created_at: now(),
             retraction: None,
         });

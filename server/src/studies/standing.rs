@@ -1,10 +1,10 @@
 //! Where a study stands, as its learner sees it: the log of results and answers, by action.
 
-use super::blind;
+use super::objections::Objections;
 use crate::store::feedback::{FeedbackRow, LogVersion, Said, Source};
 use crate::store::studies::{FeedbackMode, Study};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, StoreResult, TrialId, feedback, presentations, trials};
+use crate::store::{Connection, StoreResult, TrialId, feedback, trials};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use std::collections::{HashMap, HashSet};
 
@@ -19,10 +19,8 @@ pub struct Standing {
     pub feedback: Vec<FeedbackRow>,
     /// The version of the feedback: a decision is written only if it is still current.
     pub version: LogVersion,
-    /// Trials whose gait a rater called unsafe: nobody is asked about them.
-    pub closed: Vec<TrialId>,
-    /// Pairs of which a rater could not tell which is better: not asked again.
-    pub skipped: Vec<(TrialId, TrialId)>,
+    /// Gaits that nobody is asked about, and pairs that nobody is asked about again.
+    pub objections: Objections,
 }
 
 impl Standing {
@@ -34,9 +32,8 @@ impl Standing {
         let version = feedback::version(db, study.id).await?;
         let trials = trials::of_study(db, study.id).await?;
         let feedback = feedback::of_study(db, study.id, 0).await?;
-        let shown = presentations::of_study(db, study.id).await?;
-        let (closed, skipped) = (blind::unsafe_trials(&shown), blind::skipped_pairs(&shown));
-        Ok(Self { study, trials, feedback, version, closed, skipped })
+        let objections = Objections::read(db, study.id).await?;
+        Ok(Self { study, trials, feedback, version, objections })
     }
 
     /// The newest trials of a large study and the best one, for showing: the learner is not asked about it.
@@ -52,7 +49,8 @@ impl Standing {
             trials.insert(0, trials::get(db, best).await?);
         }
         let feedback = feedback::newest_of_people(db, study.id, limit).await?;
-        Ok(Self { study, trials, feedback, version, closed: Vec::new(), skipped: Vec::new() })
+        let objections = Objections::read(db, study.id).await?;
+        Ok(Self { study, trials, feedback, version, objections })
     }
 
     /// The trial with this identifier.
@@ -96,10 +94,10 @@ impl Standing {
         same.then(|| format!("the best action stayed the same over {limit} results"))
     }
 
-    /// Actions whose gaits can be shown to people: they exist, and no rater called them unsafe. What did not converge
+    /// Actions whose gaits can be shown to people: they exist, and nobody called them unsafe. What did not converge
     /// has no gait, and its label has said so already.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.closed.contains(&trial.id);
+        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.objections.closes(trial.id);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 

@@ -35,7 +35,30 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let joints = json!({"walk": 2, "recording": motion()});
     site.service.post(&format!("/api/v1/lab-sessions/{session}/motions"), &joints).await;
     site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
+    // One that waits for what the person who walked says, and one in which that was said.
+    let gaits = json!({"gait_one": converged[0].id, "gait_two": converged[1].id});
+    let mut walked = Vec::new();
+    for _ in 0..2 {
+        let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
+        let session = session["id"].as_str().unwrap().to_owned();
+        for walk in 1..=3 {
+            site.service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": walk})).await;
+        }
+        walked.push(session);
+    }
+    let said = json!({"number": 1, "answer": "second", "note": "softer at the heel"});
+    site.service.post(&format!("/api/v1/lab/{}/answers", walked[1]), &said).await;
+    let told = format!("/api/v1/lab-sessions/{}/unblind", walked[1]);
+    site.service.post(&told, &json!({"reason": "every walk was recorded"})).await;
+    let unsafe_one = converged[2].id;
+    let remark = json!({"first": unsafe_one, "second": converged[3].id, "answer": "unsafe_first", "author": "K1",
+        "note": "stumbled twice"});
+    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
     vec![
+        ("lab-question", format!("/lab/{}", walked[0])),
+        ("lab-answered", format!("/lab/{}", walked[1])),
+        ("lab-session-told", format!("/lab-sessions/{}", walked[1])),
+        ("unsafe-gait", format!("/trials/{unsafe_one}")),
         ("figures", format!("/studies/{study}/figures?other={other}")),
         ("lab-sessions", format!("/studies/{study}/lab")),
         ("lab-session", format!("/lab-sessions/{session}")),

@@ -6,6 +6,7 @@
 mod chromium;
 mod every_page;
 mod gait;
+mod lab;
 mod rater;
 mod sign_in;
 mod site;

@@ -3,12 +3,12 @@
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Params;
+use crate::http::extract::{Id, Params};
 use crate::http::may::May;
-use crate::http::pages::figures;
+use crate::http::pages::{belief, figures};
 use crate::http::shown::Shown;
 use crate::plots::Figure;
-use crate::store::{LabSessionId, StudyId, TrialId};
+use crate::store::{LabSessionId, ReferenceGaitId, StudyId, TrialId, reference_gaits};
 use axum::extract::{Path, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -20,7 +20,7 @@ pub(super) struct Beside {
     other: Option<StudyId>,
 }
 
-/// `GET /studies/{id}/figures/{file}`: those of the page *Figures* of a study.
+/// `GET /studies/{id}/figures/{file}`: those of the page with the figures of a study.
 #[utoipa::path(
     get,
     path = "/studies/{id}/figures/{file}",
@@ -83,6 +83,52 @@ pub(super) async fn of_session(
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Error> {
     answer(figures::of_session(&app, id).await?, file).await
+}
+
+/// `GET /studies/{id}/belief/figures/{file}`: what the learner believes, as on its page.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/belief/figures/{file}",
+    tag = "figures",
+    params(
+        ("id" = StudyId, Path, description = "The study"),
+        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
+        ("right" = Option<String>, Query, description = "The bound of the maps that runs to the right; by default the first one"),
+        ("down" = Option<String>, Query, description = "The one that runs downwards; by default the second one")
+    ),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_belief(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+    Path((_, file)): Path<(String, String)>,
+    Params(choice): Params<belief::Choice>,
+) -> Result<Response, Error> {
+    answer(belief::figures(&app, id, choice).await?, file).await
+}
+
+/// `GET /reference-gaits/{id}/figures/{file}`: the joint angles of a reference gait.
+#[utoipa::path(
+    get,
+    path = "/reference-gaits/{id}/figures/{file}",
+    tag = "figures",
+    params(
+        ("id" = ReferenceGaitId, Path, description = "The reference gait"),
+        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
+    ),
+    responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_reference(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id): Id<ReferenceGaitId>,
+    Path((_, file)): Path<(String, String)>,
+) -> Result<Response, Error> {
+    let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;
+    answer(figures::of_reference(&reference), file).await
 }
 
 /// One of the figures in the form that the name of the file says.

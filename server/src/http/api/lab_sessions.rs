@@ -6,10 +6,10 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
 use crate::http::may::May;
-use crate::http::once::OnceWith;
+use crate::http::once::{Once, OnceWith};
 use crate::http::shown::Shown;
 use crate::store::{LabSessionId, StudyId, lab_sessions, studies};
-use crate::studies::lab::{self, InTheLab, NewSession, RecordedWalk, SessionView};
+use crate::studies::lab::{self, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -155,7 +155,8 @@ pub(super) struct Told {
 }
 
 /// `POST /lab-sessions/{id}/unblind`: which walk is with which gait, from now on for everybody who may read. An act: it
-/// is in the audit trail, and what is walked from now on is marked.
+/// is in the audit trail, what is walked from now on is marked, and what the person who walked said of the gaits becomes
+/// a preference of the study.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/unblind",
@@ -216,4 +217,50 @@ pub(super) async fn walk(
     };
     let next = lab::record_walk(&mut writer, &once.actor, id, &walked).await?;
     once.finish(&app, writer, StatusCode::CREATED, None, &next).await
+}
+
+/// `POST /lab/{id}/answers`: which walk the person who walked found better. It is kept in terms of walks; the learner
+/// hears it when the order is told.
+#[utoipa::path(
+    post,
+    path = "/lab/{id}/answers",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = NewAnswer,
+    responses((status = 201, description = "Recorded, and read back", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn answer(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    OnceWith(once, new): OnceWith<Rate, NewAnswer>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let seen = lab::answer(&mut writer, &once.caller, id, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &seen).await
+}
+
+/// `POST /lab/{id}/take-back`: the answer that stands counts no more.
+#[utoipa::path(
+    post,
+    path = "/lab/{id}/take-back",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "Taken back; the question is open again", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn take_back(
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    once: Once<Rate>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let seen = lab::take_back(&mut writer, &once.caller, id).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &seen).await
 }

@@ -21,6 +21,7 @@ mod motion;
 mod preferences;
 mod recommendation;
 mod reference_gaits;
+mod remarks;
 mod scripts;
 mod studies;
 mod subjects;
@@ -91,6 +92,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_study))
         .routes(routes!(figures::of_trial))
         .routes(routes!(figures::of_session))
+        .routes(routes!(figures::of_belief))
+        .routes(routes!(figures::of_reference))
         // scripts of the lab
         .routes(routes!(scripts::ask))
         .routes(routes!(scripts::tell))
@@ -115,10 +118,15 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(lab_recordings::limit_cycles))
         .routes(routes!(lab_sessions::in_the_lab))
         .routes(routes!(lab_sessions::walk))
+        .routes(routes!(lab_sessions::answer))
+        .routes(routes!(lab_sessions::take_back))
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))
         .routes(routes!(suggestions::of_study, suggestions::create))
+        .routes(routes!(remarks::of_study, remarks::create))
+        .routes(routes!(remarks::get))
+        .routes(routes!(remarks::retract))
         // access
         .routes(routes!(users::me))
         .routes(routes!(users::list, users::create))

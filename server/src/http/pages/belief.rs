@@ -10,24 +10,25 @@ use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::{Cell, Chart, HeatMap, Stroke};
+use crate::plots::{Cell, Chart, Figure, HeatMap, Stroke};
 use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{StudyId, TrialId, studies, trials};
-use crate::studies::belief::{Belief, Beliefs, Comparison, MOST_ANSWERS};
+use crate::studies::belief::{Belief, Comparison, MOST_ANSWERS};
 use crate::studies::choice::MANY;
 use crate::studies::standing::Standing;
 use askama::Template;
 use axum::extract::State;
 use gait_learner::{Agreement, Dimension, LearnerError, Marginal, SearchSpace};
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// So many actions and answers are listed.
 const LISTED: usize = 12;
 
 /// Which two bounds the maps show.
 #[derive(Debug, Default, Deserialize)]
-pub(super) struct Choice {
+pub(crate) struct Choice {
     right: Option<String>,
     down: Option<String>,
 }
@@ -45,6 +46,8 @@ struct Everything {
     agreement: Agreement,
     marginals: Vec<Drawn>,
     maps: Maps,
+    /// The maps as shown.
+    charts: Vec<Drawn>,
     best: Vec<BestRow>,
     answers: Vec<AnswerRow>,
     more_answers: usize,
@@ -54,7 +57,7 @@ struct Everything {
 struct Maps {
     dimensions: Vec<DimensionChoice>,
     held: Option<(TrialId, u32)>,
-    charts: Vec<Drawn>,
+    figures: Vec<Figure>,
 }
 
 struct DimensionChoice {
@@ -86,46 +89,81 @@ pub(super) async fn get(
     Shown(id): Shown<StudyId>,
     Params(choice): Params<Choice>,
 ) -> Page {
+    let study = studies::get(&mut *app.read().await?, id).await?;
+    page(&match believed(&app, id).await? {
+        Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
+        Believed::There(standing, belief) => {
+            let shown = tokio::task::spawn_blocking(move || show(id, &standing, &belief, &choice))
+                .await
+                .map_err(|e| Error::Internal(e.to_string()))??;
+            BeliefPage { study, absent: None, shown: Some(shown) }
+        }
+    })
+}
+
+/// Every figure of the page; none: there is nothing to believe yet.
+///
+/// # Errors
+/// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or what the database and the learner report.
+pub(crate) async fn figures(app: &AppState, id: StudyId, choice: Choice) -> Result<Vec<Figure>, Error> {
+    let Believed::There(standing, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
+    let draw = move || {
+        let chosen = chosen(belief.posterior.space(), &choice)?;
+        let mut figures = marginals(&belief);
+        figures.extend(maps(&belief, &standing, chosen).map_err(Error::Learner)?.figures);
+        Ok(figures)
+    };
+    tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?
+}
+
+/// What the learner believes of a study, or why it is not told.
+enum Believed {
+    Absent(String),
+    There(Box<Standing>, Arc<Belief>),
+}
+
+async fn believed(app: &AppState, id: StudyId) -> Result<Believed, Error> {
+    let too_many = |what: String| {
+        Ok(Believed::Absent(format!("From {what} on the belief takes longer to compute than a page may.")))
+    };
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let total = trials::counts(&mut reader, id).await?.total as usize;
-    if total >= MANY {
-        return absent(study, format!("From {MANY} trials on the belief takes longer to compute than a page may."));
+    if trials::counts(&mut reader, id).await?.total as usize >= MANY {
+        return too_many(format!("{MANY} trials"));
     }
-    let standing = Standing::read(&mut reader, study.clone()).await?;
+    let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
     let answers = standing.log().feedback.len();
     if answers == 0 {
-        return absent(
-            study,
-            "Nothing was heard yet: the first result gives the learner something to believe.".to_owned(),
-        );
+        let why = "Nothing was heard yet: the first result gives the learner something to believe.";
+        return Ok(Believed::Absent(why.to_owned()));
     }
     if answers > MOST_ANSWERS {
-        return absent(
-            study,
-            format!("From {MOST_ANSWERS} answers on the belief takes longer to compute than a page may."),
-        );
+        return too_many(format!("{MOST_ANSWERS} answers"));
     }
     let beliefs = app.beliefs.clone();
-    let shown = tokio::task::spawn_blocking(move || show(&standing, &beliefs, &choice))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))??;
-    page(&BeliefPage { study, absent: None, shown: Some(shown) })
+    let compute = move || beliefs.of(&standing).map(|belief| Believed::There(Box::new(standing), belief));
+    let found = tokio::task::spawn_blocking(compute).await.map_err(|e| Error::Internal(e.to_string()))?;
+    found.map_err(Error::Learner)
 }
 
-fn absent(study: Study, why: String) -> Page {
-    page(&BeliefPage { study, absent: Some(why), shown: None })
-}
-
-fn show(standing: &Standing, beliefs: &Beliefs, choice: &Choice) -> Result<Everything, Error> {
-    let belief = beliefs.of(standing).map_err(Error::Learner)?;
+fn show(id: StudyId, standing: &Standing, belief: &Belief, choice: &Choice) -> Result<Everything, Error> {
     let chosen = chosen(belief.posterior.space(), choice)?;
+    let files = format!("/api/v1/studies/{id}/belief/figures");
+    let maps = maps(belief, standing, chosen).map_err(Error::Learner)?;
+    let names =
+        |asked: fn(&DimensionChoice) -> bool| maps.dimensions.iter().find(|d| asked(d)).map(|d| d.name.as_str());
+    let query = match (names(|d| d.right), names(|d| d.down)) {
+        (Some(right), Some(down)) => format!("?right={right}&down={down}"),
+        _ => String::new(),
+    };
+    let charts = maps.figures.iter().zip(MAP_NOTES);
     Ok(Everything {
         agreement: belief.agreement,
-        marginals: marginals(&belief),
-        maps: maps(&belief, standing, chosen).map_err(Error::Learner)?,
-        best: best(&belief, standing).map_err(Error::Learner)?,
+        marginals: marginals(belief).iter().map(|figure| Drawn::of(figure, &files, "")).collect(),
+        charts: charts.map(|(figure, note)| Drawn { note, ..Drawn::of(figure, &files, &query) }).collect(),
+        maps,
+        best: best(belief, standing).map_err(Error::Learner)?,
         answers: belief.comparisons.iter().take(LISTED).filter_map(|c| answer_row(c, standing)).collect(),
         more_answers: belief.comparisons.len().saturating_sub(LISTED),
     })
@@ -152,7 +190,7 @@ fn chosen(space: &SearchSpace, choice: &Choice) -> Result<Option<(usize, usize)>
 }
 
 /// All on one scale: what matters is which bound matters.
-fn marginals(belief: &Belief) -> Vec<Drawn> {
+fn marginals(belief: &Belief) -> Vec<Figure> {
     let ends =
         |m: &Marginal| [m.average.mean - m.average.standard_deviation, m.average.mean + m.average.standard_deviation];
     let all = || belief.marginals.iter().flatten().flat_map(ends);
@@ -169,7 +207,7 @@ fn marginals(belief: &Belief) -> Vec<Drawn> {
         );
         chart.y_range = Some(range);
         chart.x_ticks.clone_from(&dimension.values);
-        Drawn::new(&chart)
+        Figure::chart("utility", chart)
     };
     belief.posterior.space().dimensions().iter().zip(&belief.marginals).map(draw).collect()
 }
@@ -186,7 +224,7 @@ fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) ->
         })
         .collect();
     let (Some((right, down)), Some(best)) = (chosen, belief.posterior.best()) else {
-        return Ok(Maps { dimensions, held: None, charts: Vec::new() });
+        return Ok(Maps { dimensions, held: None, figures: Vec::new() });
     };
     let held = standing.trial_of(best).map(|trial| (trial.id, trial.number));
     let slice = belief.posterior.slice(down, right, best)?;
@@ -221,21 +259,19 @@ fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) ->
         let dimension = &space.dimensions()[place];
         (format!("{}: {}", dimension.name, meaning(&dimension.name)), dimension.values.clone())
     };
-    let draw = |title: &str, cells, range, note| {
-        let map = HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range };
-        Drawn { title: title.to_owned(), note, svg: map.svg(), legend: Vec::new(), files: Vec::new() }
+    let draw = |title: &str, cells, range| {
+        let group = format!("{} {}", space.dimensions()[right].name, space.dimensions()[down].name);
+        Figure::map(&group, HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range })
     };
-    let charts = vec![
-        draw("Utility", utility, range, "Mean and standard deviation. Framed: the best action tried."),
-        draw(
-            "Probability of converging",
-            converging,
-            (0.0, 1.0),
-            "Below: trials with these two values, whatever the others: converged, not converged.",
-        ),
-    ];
-    Ok(Maps { dimensions, held, charts })
+    let figures = vec![draw("Utility", utility, range), draw("Probability of converging", converging, (0.0, 1.0))];
+    Ok(Maps { dimensions, held, figures })
 }
+
+/// What stands below each map.
+const MAP_NOTES: [&str; 2] = [
+    "Mean and standard deviation. Framed: the best action tried.",
+    "Below: trials with these two values, whatever the others: converged, not converged.",
+];
 
 /// How many trials with these levels converged and how many did not.
 fn tried(standing: &Standing, space: &SearchSpace, levels: [(usize, usize); 2]) -> String {
@@ -269,7 +305,7 @@ fn best(belief: &Belief, standing: &Standing) -> Result<Vec<BestRow>, LearnerErr
 fn answer_row(comparison: &Comparison, standing: &Standing) -> Option<AnswerRow> {
     Some(AnswerRow {
         text: answer_in_words(&comparison.given, standing)?,
-        source: format::source(comparison.given.source),
+        source: format::source(&comparison.given),
         percent: percent(comparison.probability),
         agrees: comparison.probability > 0.5,
     })

@@ -3,7 +3,7 @@
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::gait_charts;
-use super::study::answer_in_words;
+use super::study::{answer_in_words, remark_in_words};
 use crate::access::{self, Caller, Read};
 use crate::error::Error;
 use crate::http::AppState;
@@ -16,17 +16,20 @@ use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::Study;
 use crate::store::trials::TrialState;
 use crate::store::{
-    Connection, FeedbackId, StoreError, StudyId, TrialId, commit, feedback, gaits, reference_gaits, studies, trials,
+    Connection, FeedbackId, RemarkId, StoreError, StudyId, TrialId, commit, feedback, gaits, presentations,
+    reference_gaits, remarks, studies, trials,
 };
 use crate::studies::answer::{self, Answer, Verdict};
 use crate::studies::choice::MANY;
 use crate::studies::comparison::open_question;
+use crate::studies::remark::{self, NewRemark};
 use crate::studies::standing::Standing;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
+use std::fmt;
 use std::str::FromStr;
 
 /// Which gaits to offer, and what was just saved.
@@ -34,8 +37,38 @@ use std::str::FromStr;
 pub(super) struct Choice {
     a: Option<TrialId>,
     b: Option<TrialId>,
-    saved: Option<FeedbackId>,
+    saved: Option<Recorded>,
 }
+
+/// What an answer is in the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+enum Recorded {
+    Preference(FeedbackId),
+    Remark(RemarkId),
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Preference(id) => id.fmt(f),
+            Self::Remark(id) => write!(f, "{REMARK}{id}"),
+        }
+    }
+}
+
+impl TryFrom<String> for Recorded {
+    type Error = Error;
+    fn try_from(text: String) -> Result<Self, Error> {
+        match text.strip_prefix(REMARK) {
+            Some(id) => Ok(Self::Remark(identifier("saved", id)?)),
+            None => Ok(Self::Preference(identifier("saved", &text)?)),
+        }
+    }
+}
+
+/// Before the identifier of a remark.
+const REMARK: &str = "remark-";
 
 #[derive(Template)]
 #[template(path = "compare.html")]
@@ -54,6 +87,16 @@ struct ComparePage {
     refused: Option<String>,
 }
 
+impl ComparePage {
+    /// What can be said besides a preference: value and words.
+    const REMARKS: [(&str, &str); 4] = [
+        ("cannot_tell", "Cannot tell"),
+        ("unsafe_a", "Gait A is unsafe"),
+        ("unsafe_b", "Gait B is unsafe"),
+        ("unsafe_both", "Both are unsafe"),
+    ];
+}
+
 /// A gait that can be compared.
 struct Offered {
     id: TrialId,
@@ -64,7 +107,7 @@ struct Offered {
 
 /// An answer as read back from the record.
 struct Saved {
-    id: FeedbackId,
+    id: Recorded,
     text: String,
     at: String,
     retracted: bool,
@@ -101,11 +144,7 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         Standing::read(&mut reader, study).await?
     };
     let saved = match choice.saved {
-        Some(saved) => {
-            let row = feedback::get(&mut reader, saved).await?;
-            let beside = answer::beside(&mut reader, &row).await?;
-            Some((row, beside))
-        }
+        Some(saved) => read_back(&mut reader, &standing, saved).await?,
         None => None,
     };
     let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
@@ -113,11 +152,11 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     let mut trials: Vec<Offered> = standing
         .trials
         .iter()
-        .filter(|trial| trial.state == TrialState::Converged)
+        .filter(|trial| trial.state == TrialState::Converged && !standing.objections.closes(trial.id))
         .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
         .collect();
     if refused.is_none() {
-        check(&mut reader, id, &choice).await?;
+        check(&mut reader, &standing, &choice).await?;
     }
     let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
     let (a, b) = match (choice.a, choice.b, question) {
@@ -147,16 +186,6 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         charts.iter().map(Drawn::new).collect()
     };
     let charts = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
-    let saved = saved.and_then(|(row, beside)| {
-        let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, &standing)?));
-        Some(Saved {
-            id: row.id,
-            text: answer_in_words(&row, &standing)?,
-            at: row.created_at.minute(),
-            retracted: row.retraction.is_some(),
-            beside: beside.into_iter().filter_map(said).collect(),
-        })
-    });
     page(&ComparePage {
         study: standing.study,
         trials,
@@ -171,11 +200,40 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     })
 }
 
+/// What the record holds; none when it speaks of trials that are not at hand.
+async fn read_back(db: &mut Connection, standing: &Standing, saved: Recorded) -> Result<Option<Saved>, Error> {
+    Ok(match saved {
+        Recorded::Preference(id) => {
+            let row = feedback::get(db, id).await?;
+            let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, standing)?));
+            let beside = answer::beside(db, &row).await?.into_iter().filter_map(said).collect();
+            answer_in_words(&row, standing).map(|text| Saved {
+                id: saved,
+                text,
+                at: row.created_at.minute(),
+                retracted: row.retraction.is_some(),
+                beside,
+            })
+        }
+        Recorded::Remark(id) => {
+            let remark = remarks::get(db, id).await?;
+            remark_in_words(&remark, standing).map(|text| Saved {
+                id: saved,
+                text,
+                at: remark.created_at.minute(),
+                retracted: remark.retraction.is_some(),
+                beside: Vec::new(),
+            })
+        }
+    })
+}
+
 /// Refuses what the address asks to compare and cannot be compared.
-async fn check(reader: &mut Connection, study: StudyId, choice: &Choice) -> Result<(), Error> {
+async fn check(reader: &mut Connection, standing: &Standing, choice: &Choice) -> Result<(), Error> {
     for (field, trial) in [("a", choice.a), ("b", choice.b)] {
         if let Some(trial) = trial {
-            answer::comparable(reader, study, field, trial).await?;
+            answer::comparable(reader, standing.study.id, field, trial).await?;
+            standing.objections.refuse(field, trial)?;
         }
     }
     if choice.a.is_some() && choice.a == choice.b {
@@ -199,25 +257,40 @@ pub(super) struct Submitted {
     key: String,
 }
 
+/// What a form says.
+enum Said {
+    Preference(Answer),
+    Remark(NewRemark),
+}
+
 impl Submitted {
-    fn read(&self) -> Result<(Answer, FeedbackId), Error> {
-        let verdict = match self.answer.as_str() {
-            "a" => Verdict::A,
-            "b" => Verdict::B,
-            "no_difference" => Verdict::NoDifference,
-            other => return Err(Error::invalid("answer", other, "a, b, no_difference: choose one")),
-        };
+    fn read(&self) -> Result<(Said, FeedbackId), Error> {
         let source = Source::from_str(&self.source)
             .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician, script"))?;
-        let answer = Answer {
-            trial_a: identifier("trial_a", &self.a)?,
-            trial_b: identifier("trial_b", &self.b)?,
-            answer: verdict,
-            source: Some(source),
-            author: Some(self.author.clone()),
-            note: self.note.clone(),
+        let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
+        let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
+        let preference = |answer| {
+            let (author, note) = (author.clone(), note.clone());
+            Said::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
         };
-        Ok((answer, identifier("key", &self.key)?))
+        let remark = |answer| {
+            let (author, note) = (author.clone(), note.clone());
+            Said::Remark(NewRemark { first: a, second: b, answer, source, author, note })
+        };
+        let said = match self.answer.as_str() {
+            "a" => preference(Verdict::A),
+            "b" => preference(Verdict::B),
+            "no_difference" => preference(Verdict::NoDifference),
+            "cannot_tell" => remark(presentations::Said::CannotTell),
+            "unsafe_a" => remark(presentations::Said::UnsafeFirst),
+            "unsafe_b" => remark(presentations::Said::UnsafeSecond),
+            "unsafe_both" => remark(presentations::Said::UnsafeBoth),
+            other => {
+                let allowed = "a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both: choose one";
+                return Err(Error::invalid("answer", other, allowed));
+            }
+        };
+        Ok((said, identifier("key", &self.key)?))
     }
 
     /// What tells this answer from another one with the same key.
@@ -235,9 +308,9 @@ fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
 /// What became of a submitted form.
 enum Given {
     /// It is recorded, now or before.
-    Saved(String),
+    Saved(Recorded),
     /// The same form was sent before with another answer: that one is recorded.
-    Before(String),
+    Before(Recorded),
 }
 
 /// `POST /studies/{id}/compare`.
@@ -254,7 +327,7 @@ pub(super) async fn post(
         Ok(Given::Before(saved)) => {
             let why = "This form was sent before with another answer. Recorded is the one above; this second one was \
                        not taken. To change the answer, take the first one back and save again.";
-            (saved.parse().ok(), StatusCode::CONFLICT, why.to_owned())
+            (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
             (None, Problem::from(&error).status(), error.to_string())
@@ -266,17 +339,21 @@ pub(super) async fn post(
 }
 
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
-    let (answer, key) = form.read()?;
+    let (said, key) = form.read()?;
     let mut writer = app.write().await?;
     // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
     let key = format!("form {key}");
     let request = form.fingerprint(id);
     if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
         let same = before.request == request;
-        return Ok(if same { Given::Saved(before.body) } else { Given::Before(before.body) });
+        let recorded = Recorded::try_from(before.body)?;
+        return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
     }
-    let saved = answer::give(&mut writer, caller, id, &answer).await?.to_string();
-    let kept = Kept { request, status: 303, location: None, body: saved.clone() };
+    let saved = match said {
+        Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
+        Said::Remark(new) => Recorded::Remark(remark::give(&mut writer, caller, id, &new).await?),
+    };
+    let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
     idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
     commit(writer).await?;
     app.director.changed();
@@ -286,7 +363,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
 /// Taking an answer back.
 #[derive(Debug, Deserialize)]
 pub(super) struct Retract {
-    feedback: FeedbackId,
+    saved: Recorded,
     author: String,
     reason: String,
 }
@@ -299,8 +376,16 @@ pub(super) async fn retract(
     Form(form): Form<Retract>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    answer::retract(&mut writer, &may.caller, Some(id), form.feedback, Some(&form.author), &form.reason).await?;
+    let author = Some(form.author.as_str());
+    match form.saved {
+        Recorded::Preference(given) => {
+            answer::retract(&mut writer, &may.caller, Some(id), given, author, &form.reason).await?;
+        }
+        Recorded::Remark(made) => {
+            remark::retract(&mut writer, &may.caller, Some(id), made, (author, &form.reason)).await?;
+        }
+    }
     commit(writer).await?;
     app.director.changed();
-    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.feedback)))
+    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))
 }

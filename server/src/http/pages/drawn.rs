@@ -23,16 +23,11 @@ impl Drawn {
     pub(super) fn of(figure: &Figure, folder: &str, query: &str) -> Self {
         let address = |ending: &str| format!("{folder}/{}.{ending}{query}", figure.name);
         let files = vec![("SVG", address("svg")), ("PNG", address("png")), ("CSV", address("csv"))];
-        let drawn = match &figure.drawing {
-            Drawing::Chart(chart) => Self::new(chart),
-            Drawing::Tiles(title, stick_figures) => Self {
-                title: title.clone(),
-                note: "",
-                svg: gait_tiles(stick_figures),
-                legend: Vec::new(),
-                files: Vec::new(),
-            },
+        let (svg, legend) = match &figure.drawing {
+            Drawing::Chart(chart) => return Self { files, ..Self::new(chart) },
+            Drawing::Tiles(_, stick_figures) => (gait_tiles(stick_figures), Vec::new()),
+            Drawing::Map(map) => (map.svg(), Vec::new()),
         };
-        Self { files, ..drawn }
+        Self { title: figure.title().to_owned(), note: "", svg, legend, files }
     }
 }

@@ -180,6 +180,12 @@ pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>,
     .map_err(|e| Error::Internal(e.to_string()))?
 }
 
+/// Every figure of a reference gait.
+pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
+    let charts = gait_charts::of_reference(reference).into_iter();
+    charts.map(|chart| Figure::chart("reference", chart)).collect()
+}
+
 /// Every figure of a lab session.
 ///
 /// # Errors

@@ -1,7 +1,8 @@
 //! Numbers as people read them.
 
 use crate::plots::power_of_ten;
-use crate::store::feedback::Source;
+use crate::store::feedback::{FeedbackRow, Source};
+use crate::store::presentations::Said;
 use crate::store::studies::FeedbackMode;
 use gait_optimizer::TunedBounds;
 
@@ -102,8 +103,28 @@ pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
     if mode == FeedbackMode::Human { ", and the time people take to answer" } else { "" }
 }
 
+/// What the person who walked said in a lab session: first is walk 2.
+pub(super) fn walks_in_words(said: Said) -> &'static str {
+    match said {
+        Said::First => "walk 2 was better, the first with the device",
+        Said::Second => "walk 3 was better, the second with the device",
+        Said::NoDifference => "no difference between walk 2 and walk 3",
+        Said::CannotTell => "cannot tell which walk was better",
+        Said::UnsafeFirst => "walk 2 was unsafe",
+        Said::UnsafeSecond => "walk 3 was unsafe",
+        Said::UnsafeBoth => "walk 2 and walk 3 were unsafe",
+        Said::Withdrawn => "taken back",
+    }
+}
+
 /// Where an answer comes from.
-pub(super) fn source(source: Source) -> &'static str {
+pub(super) fn source(row: &FeedbackRow) -> &'static str {
+    // Raters may be anybody: what is known is that they did not know which gait is which.
+    if row.by_rater { "a rater" } else { person(row.source) }
+}
+
+/// The same of what no rater said.
+pub(super) fn person(source: Source) -> &'static str {
     match source {
         Source::Convergence => "the solver",
         Source::GaitRmse => "Gait RMSE",

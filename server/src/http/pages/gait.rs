@@ -15,6 +15,7 @@ use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
 use crate::store::{StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
+use crate::studies::objections::{Closed, Objections};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
@@ -47,6 +48,8 @@ struct GaitPage {
     /// The command that looks for the bound that must give way.
     explain: String,
     phases: [(&'static str, &'static str); 4],
+    /// Who called it unsafe.
+    unsafe_by: Vec<Closed>,
     trial: Trial,
 }
 
@@ -72,6 +75,8 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         Err(error) => return Err(error.into()),
     };
     let iterations = if gait.is_some() { gaits::iterations(&mut reader, id).await? } else { Vec::new() };
+    let mut unsafe_by = Objections::read(&mut reader, study.id).await?.closed;
+    unsafe_by.retain(|closed| closed.trial == id);
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     drop(reader);
     let has_gait = gait.is_some();
@@ -99,6 +104,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         solve: drawn.solve,
         tiles: drawn.tiles,
         phases: gait_charts::PHASES,
+        unsafe_by,
         trial,
         study,
     })

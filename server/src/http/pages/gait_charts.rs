@@ -32,6 +32,9 @@ const MUSCLE_GROUPS: [(&str, &[usize]); 3] =
 const COORDINATES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
+/// Colour of the right leg, as in the stick figures; the left one has the first colour.
+const RIGHT: usize = 3;
+
 /// Figures that belong together.
 pub(super) struct Group {
     pub(super) id: &'static str,
@@ -129,11 +132,12 @@ fn progress_of(cycle: &Cycle<'_>, gait: &Gait) -> Result<Group, Error> {
 fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
     let draw = |&(title, q, column): &(&str, usize, usize)| {
         let chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);
-        cycle.marked(chart.with("this gait", 0, Stroke::Solid, cycle.over(|p| p.q[q].to_degrees())))
+        let colour = if q >= 6 { RIGHT } else { 0 };
+        cycle.marked(chart.with("this gait", colour, Stroke::Solid, cycle.over(|p| p.q[q].to_degrees())))
     };
     let prosthesis = Chart::new("Prosthesis", CYCLE, "angle, °")
-        .with("right knee", 0, Stroke::Solid, cycle.over(|p| p.q[7].to_degrees()))
-        .with("right ankle", 1, Stroke::Dashed, cycle.over(|p| p.q[8].to_degrees()));
+        .with("right knee", RIGHT, Stroke::Solid, cycle.over(|p| p.q[7].to_degrees()))
+        .with("right ankle", RIGHT, Stroke::Dashed, cycle.over(|p| p.q[8].to_degrees()));
     let mut charts: Vec<Chart> = ANGLES.iter().map(draw).collect();
     charts.push(cycle.marked(prosthesis));
     let hint = format!(
@@ -149,7 +153,7 @@ fn forces(cycle: &Cycle<'_>) -> Group {
             .with("left foot", 0, Stroke::Solid, cycle.over(|p| p.forces[axis] + p.forces[2 + axis]))
             .with(
                 "right foot (prosthesis)",
-                1,
+                RIGHT,
                 Stroke::Dashed,
                 cycle.over(|p| p.forces[4 + axis] + p.forces[6 + axis]),
             );
@@ -167,7 +171,7 @@ fn torques(cycle: &Cycle<'_>, gait: &Gait) -> Group {
         let limit = vec![(0.0, high), (100.0, high), (f64::NAN, f64::NAN), (0.0, low), (100.0, low)];
         let chart = Chart::new(name, CYCLE, "torque, N m").with("limits", 7, Stroke::Dashed, limit).with(
             "torque",
-            joint / 3,
+            if joint < 3 { 0 } else { RIGHT },
             Stroke::Solid,
             cycle.over(|p| p.u[joint]),
         );
@@ -201,7 +205,7 @@ fn portraits(cycle: &Cycle<'_>) -> Group {
     let draw = |(place, name): (usize, &&str)| {
         let q = place + 2;
         let line = cycle.line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees());
-        let colour = usize::from(q >= 6);
+        let colour = if q >= 6 { RIGHT } else { 0 };
         Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, line)
     };
     let charts = COORDINATES.iter().enumerate().map(draw).collect();

@@ -145,6 +145,8 @@ struct SessionPage {
     measured: Option<Measured>,
     portraits: Vec<Drawn>,
     refused: Option<String>,
+    /// What the person who walked said, in words.
+    said: &'static str,
     session: SessionView,
 }
 
@@ -260,6 +262,7 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, mut forms: Form
             .map(|emg| Measured::of(&session, emg, drawn(&lab_charts::electromyograms(&session, emg)))),
         portraits: drawn(&portraits),
         refused,
+        said: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
         session,
     })
 }
@@ -307,6 +310,8 @@ pub(super) async fn unblind(
         Ok(_) => Ok(commit(writer).await?),
         Err(error) => Err(error),
     };
+    // The learner may have heard something.
+    app.director.changed();
     answer(&app, id, &may.caller, done, Forms::default()).await
 }
 

@@ -1,15 +1,18 @@
-//! The pages in the lab: which walk is next. Nothing here can name a gait.
+//! The pages in the lab: which walk is next, and which one was better. Nothing here can name a gait.
 
 use super::error::{Page, PageError, page};
+use super::format::walks_in_words;
 use crate::access::Rate;
+use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id};
 use crate::http::may::May;
+use crate::http::problem::Problem;
 use crate::store::{LabSessionId, commit, lab_sessions};
-use crate::studies::lab::{self, InTheLab, RecordedWalk};
+use crate::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
 use askama::Template;
 use axum::extract::State;
-use axum::response::Redirect;
+use axum::response::{IntoResponse, Redirect, Response};
 
 /// So many of the newest open sessions are listed.
 const LISTED: u32 = 100;
@@ -25,7 +28,10 @@ struct LabPage {
 #[template(path = "lab_walk.html")]
 struct WalkPage {
     name: String,
+    /// The answer that stands.
+    said: &'static str,
     seen: InTheLab,
+    refused: Option<String>,
 }
 
 /// `GET /lab`.
@@ -36,8 +42,13 @@ pub(super) async fn list(_: May<Rate>, State(app): State<AppState>) -> Page {
 
 /// `GET /lab/{id}`.
 pub(super) async fn get(_: May<Rate>, State(app): State<AppState>, Id(id): Id<LabSessionId>) -> Page {
+    show(&app, id, None).await
+}
+
+async fn show(app: &AppState, id: LabSessionId, refused: Option<String>) -> Page {
     let seen = lab::in_the_lab(&mut *app.read().await?, id).await?;
-    page(&WalkPage { name: id.short(), seen })
+    let said = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
+    page(&WalkPage { name: id.short(), said, seen, refused })
 }
 
 /// `POST /lab/{id}`.
@@ -46,9 +57,57 @@ pub(super) async fn record(
     State(app): State<AppState>,
     Id(id): Id<LabSessionId>,
     Form(walked): Form<RecordedWalk>,
-) -> Result<Redirect, PageError> {
-    let mut writer = app.write().await?;
-    lab::record_walk(&mut writer, &may.caller.actor, id, &walked).await?;
-    commit(writer).await?;
-    Ok(Redirect::to(&format!("/lab/{id}")))
+) -> Result<Response, PageError> {
+    let recorded = async {
+        let mut writer = app.write().await?;
+        if !lab::was_recorded(&mut writer, id, &walked).await? {
+            lab::record_walk(&mut writer, &may.caller.actor, id, &walked).await?;
+            commit(writer).await?;
+        }
+        Ok(())
+    };
+    read_back(&app, id, recorded.await).await
+}
+
+/// `POST /lab/{id}/answer`.
+pub(super) async fn answer(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+    Form(new): Form<NewAnswer>,
+) -> Result<Response, PageError> {
+    let answered = async {
+        let mut writer = app.write().await?;
+        lab::answer(&mut writer, &may.caller, id, &new).await?;
+        commit(writer).await?;
+        app.director.changed();
+        Ok(())
+    };
+    read_back(&app, id, answered.await).await
+}
+
+/// `POST /lab/{id}/take-back`.
+pub(super) async fn take_back(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Id(id): Id<LabSessionId>,
+) -> Result<Response, PageError> {
+    let taken_back = async {
+        let mut writer = app.write().await?;
+        lab::take_back(&mut writer, &may.caller, id).await?;
+        Ok(commit(writer).await?)
+    };
+    read_back(&app, id, taken_back.await).await
+}
+
+/// What the record says now; what was refused, with the reason.
+async fn read_back(app: &AppState, id: LabSessionId, done: Result<(), Error>) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/lab/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let shown = show(app, id, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
 }

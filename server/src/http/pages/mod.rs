@@ -1,7 +1,7 @@
 //! Pages for people: rendered on the server, usable without scripts.
 
 mod audit;
-mod belief;
+pub(super) mod belief;
 mod bound_use;
 mod certificate;
 mod compare;
@@ -74,6 +74,8 @@ pub fn routes() -> Router<AppState> {
         .route("/lab-sessions/{id}/process", post(lab_recordings::process))
         .route("/lab", get(lab_walk::list))
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
+        .route("/lab/{id}/answer", post(lab_walk::answer))
+        .route("/lab/{id}/take-back", post(lab_walk::take_back))
         .route("/people", get(people::get).post(people::post))
         .route("/audit", get(audit::get))
         .route("/system", get(system::get))

@@ -87,10 +87,10 @@ fn described(document: &Value, path: &str, method: &str, operation: &Value) -> O
     }
 }
 
-/// Without the `` `GET /me`: `` that a description begins with: the page says it already.
+/// Without the `` `GET /me`: `` that a description begins with, which the page says already, and without marks of code.
 fn without_address(summary: &str) -> String {
     let rest = summary.strip_prefix('`').and_then(|rest| rest.split_once('`')).map_or(summary, |(_, rest)| rest);
-    rest.trim_start_matches([':', '.', ' ']).to_owned()
+    rest.trim_start_matches([':', '.', ' ']).replace('`', "")
 }
 
 /// A document of the shape that a schema asks for: required fields alone.

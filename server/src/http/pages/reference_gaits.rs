@@ -2,7 +2,7 @@
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
-use super::gait_charts;
+use super::figures;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
@@ -153,7 +153,10 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<Re
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
-        charts: gait_charts::of_reference(&reference.definition).iter().map(Drawn::new).collect(),
+        charts: figures::of_reference(&reference.definition)
+            .iter()
+            .map(|figure| Drawn::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
+            .collect(),
         reference,
     })
 }

@@ -75,8 +75,7 @@ fn of_rater(rater: &str, all: &[Presentation]) -> RaterFigures {
         let earlier = own.iter().find(|other| Some(other.id) == shown.repeats);
         earlier.is_some_and(|earlier| swapped(earlier.answer) == shown.answer)
     };
-    let is_unsafe =
-        |shown: &Presentation| matches!(shown.answer, Some(Said::UnsafeFirst | Said::UnsafeSecond | Said::UnsafeBoth));
+    let is_unsafe = |shown: &Presentation| shown.answer.is_some_and(Said::is_about_safety);
     RaterFigures {
         rater: rater.to_owned(),
         shown: count(&|_| true),

@@ -1,7 +1,7 @@
 //! What a rater does: takes the next pair, answers it. And the act that ends blindness.
 
-use super::draw::draw;
-use super::{skipped_pairs, unsafe_trials};
+use super::draw::{self, draw};
+use super::hold;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
@@ -9,9 +9,11 @@ use crate::store::audit;
 use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
-use crate::store::{Connection, StudyId, TrialId, Writer, consents, events, studies};
+use crate::store::trials::TrialState;
+use crate::store::{Connection, Instant, StudyId, TrialId, Writer, consents, events, now, studies};
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
+use crate::studies::objections::Objections;
 use crate::studies::standing::Standing;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -42,20 +44,31 @@ pub struct Answered {
     pub answer: Said,
 }
 
-/// The pair that a study asks for, newest first, computed outside any transaction.
-async fn question(db: &mut Connection, study: StudyId) -> Result<(u64, Option<(TrialId, TrialId)>), Error> {
+/// What a study asks, computed outside any transaction.
+struct Question {
+    seed: u64,
+    /// The newer and the older gait; none: it asks for nothing.
+    pair: Option<(TrialId, TrialId)>,
+    /// When its gaits were found.
+    converged: Vec<Instant>,
+}
+
+async fn question(db: &mut Connection, study: StudyId) -> Result<Question, Error> {
     let study = studies::get(db, study).await?;
     consents::may_be_shown(db, study.id).await?;
     let (study_id, seed) = (study.id, study.plan.seed);
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
-        return Ok((seed, None));
+        return Ok(Question { seed, pair: None, converged: Vec::new() });
     }
     let standing = Standing::read(db, study).await?;
+    let found = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged);
+    let converged = found.filter_map(|trial| trial.finished_at).collect();
     let found = tokio::task::spawn_blocking(move || open_question(&standing))
         .await
         .map_err(|e| Error::Internal(e.to_string()))?;
     // What the learner says names bounds: it is logged, and the rater hears that the program failed.
-    Ok((seed, found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?))
+    let pair = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
+    Ok(Question { seed, pair, converged })
 }
 
 /// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
@@ -70,10 +83,11 @@ pub async fn next(
     caller: &Caller,
     study: StudyId,
 ) -> Result<(Writer, Option<Presentation>), Error> {
-    let (seed, question) = question(reader, study).await?;
+    let question = question(reader, study).await?;
     let mut writer = store.write().await?;
     let all = presentations::of_study(&mut writer, study).await?;
-    let closed = unsafe_trials(&all);
+    let objections = Objections::read(&mut writer, study).await?;
+    let closed: Vec<TrialId> = objections.closed.iter().map(|closed| closed.trial).collect();
     let own: Vec<Presentation> = all.iter().filter(|shown| shown.rater == caller.name).cloned().collect();
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
         if !closed.contains(&open.shown_first) && !closed.contains(&open.shown_second) {
@@ -84,12 +98,15 @@ pub async fn next(
         presentations::answer(&mut writer, open.id, withdrawn).await?;
     }
     let is_closed = |pair: &(TrialId, TrialId)| {
-        closed.contains(&pair.0)
-            || closed.contains(&pair.1)
-            || skipped_pairs(&all).iter().any(|(a, b)| (*a, *b) == *pair || (*b, *a) == *pair)
+        closed.contains(&pair.0) || closed.contains(&pair.1) || objections.is_skipped(*pair)
     };
-    let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
-    let drawn = draw(seed, &caller.name, pair, &own, &closed);
+    let Some(pair) = question.pair.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
+    let waits = hold::waits(&all, &question.converged);
+    let lot = draw::lot(question.seed, &caller.name, &own);
+    if hold::until(own.last(), &waits, lot).is_some_and(|until| now() < until) {
+        return Ok((writer, None));
+    }
+    let drawn = draw(question.seed, &caller.name, pair, &own, (&closed, !waits.is_empty()));
     let token = secret::fresh()?;
     let new = NewPresentation {
         token: token.clone(),
@@ -133,7 +150,9 @@ pub async fn answer(
     }
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let voice = Voice { source, author: &caller.name, note: &given.note };
-    let heard = match heard(&shown, given.answer) {
+    // What is shown twice, or beside itself, says how the rater judges, and nothing of gaits.
+    let heard = if shown.kind == Kind::New { given.answer.heard(shown.pair()) } else { None };
+    let heard = match heard {
         Some(said) => Some(feedback::append(writer, shown.study_id, &said, voice).await?),
         None => None,
     };
@@ -186,20 +205,6 @@ pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Re
     }
     consents::may_be_shown(db, shown.study_id).await?;
     Ok(shown)
-}
-
-/// What the learner hears of an answer: pairs of the study alone. That a gait is unsafe says that the other is better.
-fn heard(shown: &Presentation, said: Said) -> Option<feedback::Said> {
-    let (first, second) = (shown.shown_first, shown.shown_second);
-    if shown.kind != Kind::New {
-        return None;
-    }
-    match said {
-        Said::First | Said::UnsafeSecond => Some(feedback::Said::Preference { winner: first, loser: second }),
-        Said::Second | Said::UnsafeFirst => Some(feedback::Said::Preference { winner: second, loser: first }),
-        Said::NoDifference => Some(feedback::Said::Tie { a: first, b: second }),
-        Said::CannotTell | Said::UnsafeBoth | Said::Withdrawn => None,
-    }
 }
 
 /// Tells which gaits a rater was shown; from now on the rater's pairs are marked.

@@ -2,17 +2,20 @@
 //!
 //! Walk 1 is the one without the device, which nobody can be blind to. The order of the two gaits is drawn from the
 //! study's seed in balanced blocks and kept; it is given out by an act of an administrator alone, as in blind
-//! comparisons. What is measured is known by the number of its walk until then.
+//! comparisons. What is measured is known by the number of its walk until then, and so is what the person says of it: the
+//! learner hears that when the order is told.
 
+mod answer;
 mod measured;
 mod recording;
 mod session;
 
+pub use answer::{AnswerView, NewAnswer, give as answer, take_back};
 pub use measured::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
 };
 pub use recording::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, keep};
 pub use session::{
     Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
-    gait_of, in_the_lab, plan, record_walk, still_open, unblind,
+    gait_of, in_the_lab, plan, record_walk, still_open, unblind, was_recorded,
 };

@@ -1,5 +1,6 @@
 //! The life of a session: planned, walk after walk recorded, closed; and who may see what of it.
 
+use super::answer::{self, AnswerView};
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
@@ -9,6 +10,7 @@ use crate::store::{
     Connection, Instant, LabSessionId, StoreError, StudyId, TrialId, Writer, consents, studies, trials,
 };
 use crate::studies::balance::comes_first;
+use crate::studies::objections::Objections;
 use crate::studies::seed::{Purpose, derive};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -110,6 +112,8 @@ pub struct SessionView {
     pub notes: String,
     /// Its three walks.
     pub walks: Vec<WalkView>,
+    /// What the person who walked said of the two gaits; none: nothing that stands.
+    pub answer: Option<AnswerView>,
     /// Who was told the order and why; none: nobody was.
     pub unblinded: Option<Done>,
     /// That it was closed.
@@ -142,6 +146,7 @@ impl From<&LabSession> for SessionView {
             gait_two: session.gait_two,
             notes: session.notes.clone(),
             walks: (1..=WALKS).map(walk).collect(),
+            answer: session.answer().map(AnswerView::from),
             closed: session.done(Act::Closed).cloned(),
             planned_by: session.actor.clone(),
             created_at: session.created_at,
@@ -195,6 +200,9 @@ pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewS
             return Err(Error::invalid(field, id.to_string(), "a converged trial of this study"));
         }
     }
+    let objections = Objections::read(writer, study).await?;
+    objections.refuse("gait_one", new.gait_one)?;
+    objections.refuse("gait_two", new.gait_two)?;
     if new.gait_one == new.gait_two {
         return Err(Error::invalid("gait_two", new.gait_two.to_string(), "another gait than gait_one"));
     }
@@ -223,6 +231,14 @@ pub struct InTheLab {
     pub walk: Option<u8>,
     /// Of how many.
     pub walks: u8,
+    /// When the last walk was recorded.
+    pub last_recorded: Option<Instant>,
+    /// Which walk was better is asked now, under this number: every walk was recorded, and no answer stands.
+    pub asks: Option<u32>,
+    /// The answer that stands.
+    pub answer: Option<AnswerView>,
+    /// Whether that answer can be taken back here.
+    pub can_be_taken_back: bool,
     /// Whether nothing is recorded any more.
     pub closed: bool,
 }
@@ -234,11 +250,19 @@ pub struct InTheLab {
 pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLab, Error> {
     let session = still_shown(db, id).await?;
     let closed = session.done(Act::Closed).is_some();
-    let walk = next_walk(&session).filter(|_| !closed);
-    Ok(InTheLab { session: id, walk, walks: WALKS, closed })
+    Ok(InTheLab {
+        session: id,
+        walk: next_walk(&session).filter(|_| !closed),
+        walks: WALKS,
+        last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(Act::Walk(walk))).map(|done| done.at),
+        asks: answer::asks(&session),
+        answer: session.answer().map(AnswerView::from),
+        can_be_taken_back: answer::can_be_taken_back(&session),
+        closed,
+    })
 }
 
-fn next_walk(session: &LabSession) -> Option<u8> {
+pub(super) fn next_walk(session: &LabSession) -> Option<u8> {
     (1..=WALKS).find(|walk| session.done(Act::Walk(*walk)).is_none())
 }
 
@@ -279,6 +303,15 @@ pub async fn record_walk(
     in_the_lab(writer, id).await
 }
 
+/// Whether this very walk was recorded, with this note: a form that was sent twice.
+///
+/// # Errors
+/// [`Error::NotFound`], a conflict when the subject withdrew, or what the database reports.
+pub async fn was_recorded(db: &mut Connection, id: LabSessionId, walked: &RecordedWalk) -> Result<bool, Error> {
+    let session = still_shown(db, id).await?;
+    Ok(session.done(Act::Walk(walked.walk)).is_some_and(|done| done.note == walked.note))
+}
+
 /// The session, if its subject did not withdraw.
 ///
 /// # Errors
@@ -314,7 +347,8 @@ pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &
     Ok(lab_sessions::get(writer, id).await?)
 }
 
-/// Tells which walk is with which gait, from now on everybody who may read.
+/// Tells which walk is with which gait, from now on everybody who may read. The learner then hears what the person who
+/// walked said.
 ///
 /// # Errors
 /// [`Error::Invalid`] without a reason, [`Error::Conflict`] when that was told before.
@@ -326,5 +360,7 @@ pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reaso
     }
     let detail = json!({ "reason": reason });
     audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;
-    Ok(lab_sessions::get(writer, id).await?)
+    let session = lab_sessions::get(writer, id).await?;
+    answer::hear(writer, &session).await?;
+    Ok(session)
 }

@@ -14,15 +14,19 @@ use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, tree};
-use crate::store::feedback::{FeedbackRow, Said, Source};
+use crate::store::feedback::{FeedbackRow, Retraction, Said, Source};
+use crate::store::remarks::{self, Remark};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
-use crate::store::{StudyId, TrialId, commit, consents, devices, events, reference_gaits, studies, trials};
+use crate::store::{
+    Instant, StudyId, TrialId, commit, consents, devices, events, presentations, reference_gaits, studies, trials,
+};
 use crate::studies::choice::{MANY, best_trial};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
+use crate::studies::objections::Closed;
 use crate::studies::standing::Standing;
 use crate::studies::{command, lifecycle};
 use crate::workers::Track;
@@ -31,6 +35,7 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
 #[derive(Template)]
@@ -74,6 +79,7 @@ struct Live {
     /// Which gait grew out of which.
     tree: Option<String>,
     answers: Vec<AnswerRow>,
+    unsafe_gaits: Vec<UnsafeGait>,
     question: bool,
     can_compare: bool,
 }
@@ -81,6 +87,10 @@ struct Live {
 impl Live {
     fn is_best(&self, row: &TrialRow) -> bool {
         self.best.as_ref().is_some_and(|best| best.id == row.id)
+    }
+
+    fn is_unsafe(&self, row: &TrialRow) -> bool {
+        self.unsafe_gaits.iter().any(|gait| gait.id == row.id)
     }
 }
 
@@ -106,10 +116,21 @@ struct Best {
 }
 
 struct AnswerRow {
-    row: FeedbackRow,
     text: String,
-    source: &'static str,
-    at: String,
+    /// Where it comes from, and who said it.
+    by: String,
+    note: String,
+    /// Why it was taken back.
+    retracted: Option<String>,
+    at: Instant,
+}
+
+/// A gait that somebody called unsafe.
+struct UnsafeGait {
+    id: TrialId,
+    number: u32,
+    by: String,
+    at: Instant,
 }
 
 /// So many of the newest trials of a large study are in the chart, and the newest answers in the list.
@@ -232,6 +253,7 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
         Standing::read(&mut reader, study).await?
     };
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
+    let remarks = remarks::of_study(&mut reader, id).await?;
     drop(reader);
     let (standing, figures) = tokio::task::spawn_blocking(move || {
         let figures = figures(&standing, large);
@@ -246,7 +268,8 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
         .filter(|trial| trial.state == TrialState::Running)
         .map(|trial| running_row(trial, app.director.board().track(trial.id).as_ref()))
         .collect();
-    Ok(view(standing, counts, &figures, running, table, caller.may(Run::NEEDED)))
+    let answers = answers(&standing, &remarks);
+    Ok(view(standing, counts, &figures, running, table, answers, caller.may(Run::NEEDED)))
 }
 
 pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
@@ -285,6 +308,7 @@ fn view(
     figures: &Figures,
     running: Vec<RunningRow>,
     table: TrialsTable,
+    answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
     let best = figures.best.and_then(|id| standing.trial(id)).map(|trial| Best {
@@ -295,7 +319,11 @@ fn view(
         bounds: format::bounds(&trial.action),
         has_gait: trial.state == TrialState::Converged,
     });
-    let answers = standing.feedback.iter().rev().filter_map(|row| answer_row(row, &standing)).collect();
+    let unsafe_gait = |closed: &Closed| {
+        let number = standing.trial(closed.trial)?.number;
+        Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at })
+    };
+    let unsafe_gaits = standing.objections.closed.iter().filter_map(unsafe_gait).collect();
     let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
     let acts = if may_run { acts_of_people(standing.study.state) } else { Vec::new() };
     Live {
@@ -313,6 +341,7 @@ fn view(
         table,
         tree: warm_starts(&standing, figures.best),
         answers,
+        unsafe_gaits,
         question: figures.question && standing.study.state != StudyState::Stopped,
         can_compare: converged >= 2,
         study: standing.study,
@@ -332,17 +361,35 @@ fn warm_starts(standing: &Standing, best: Option<TrialId>) -> Option<String> {
     nodes.iter().any(|node| node.parent.is_some()).then(|| tree("Which trial started from which", &nodes))
 }
 
-/// Answers that people gave; those of Gait RMSE are in the table of trials already.
-fn answer_row(row: &FeedbackRow, standing: &Standing) -> Option<AnswerRow> {
-    if matches!(row.source, Source::GaitRmse | Source::Convergence) {
-        return None;
-    }
-    Some(AnswerRow {
-        text: answer_in_words(row, standing)?,
-        source: format::source(row.source),
-        at: row.created_at.minute(),
-        row: row.clone(),
-    })
+/// What people said, the newest first; what Gait RMSE says is in the table of trials already.
+fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
+    let of_remark = |id| remarks.iter().any(|remark| remark.feedback_id == Some(id));
+    let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
+    let why = |retraction: &Option<Retraction>| retraction.as_ref().map(|retraction| retraction.reason.clone());
+    let preference = |row: &FeedbackRow| {
+        Some(AnswerRow {
+            text: answer_in_words(row, standing)?,
+            by: format!("{}, {}", format::source(row), row.author),
+            note: row.note.clone(),
+            retracted: why(&row.retraction),
+            at: row.created_at,
+        })
+    };
+    let remark = |remark: &Remark| {
+        Some(AnswerRow {
+            text: remark_in_words(remark, standing)?,
+            by: format!("{}, {}", format::person(remark.source), remark.author),
+            note: remark.note.clone(),
+            retracted: why(&remark.retraction),
+            at: remark.created_at,
+        })
+    };
+    let preferences = standing.feedback.iter().filter(by_people).filter(|row| !of_remark(row.id));
+    let mut rows: Vec<AnswerRow> =
+        preferences.filter_map(preference).chain(remarks.iter().filter_map(remark)).collect();
+    rows.reverse();
+    rows.sort_by_key(|row| Reverse(row.at));
+    rows
 }
 
 /// `trial 3 over trial 2`.
@@ -353,6 +400,18 @@ pub(super) fn answer_in_words(row: &FeedbackRow, standing: &Standing) -> Option<
         Said::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
         Said::Label { .. } | Said::Suggestion { .. } => None,
     }
+}
+
+/// `trial 3 is unsafe`.
+pub(super) fn remark_in_words(remark: &Remark, standing: &Standing) -> Option<String> {
+    let name = |id| standing.trial(id).map(|trial| format!("trial {}", trial.number));
+    let (first, second) = (name(remark.first)?, name(remark.second)?);
+    Some(match remark.answer {
+        presentations::Said::UnsafeFirst => format!("{first} is unsafe (beside {second})"),
+        presentations::Said::UnsafeSecond => format!("{second} is unsafe (beside {first})"),
+        presentations::Said::UnsafeBoth => format!("{first} and {second} are unsafe"),
+        _ => format!("cannot tell {first} from {second}"),
+    })
 }
 
 /// How long the study will go on by itself, as far as its own solves tell.

@@ -1,0 +1,113 @@
+//! Remarks: what is said of two gaits that is no preference.
+
+use crate::access::{self, Read};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::OnceWith;
+use crate::http::shown::Shown;
+use crate::store::remarks::{self, Remark};
+use crate::store::{RemarkId, StudyId, studies};
+use crate::studies::remark::{self, NewRemark};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+/// `GET /studies/{id}/remarks`: as made, those that were taken back included.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/remarks",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "Every remark, by time", body = Vec<Remark>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+) -> Result<Json<Vec<Remark>>, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    Ok(Json(remarks::of_study(&mut reader, id).await?))
+}
+
+/// `POST /studies/{id}/remarks`: that nobody can tell which of two gaits is better, or that one must not be walked. A
+/// gait that was called unsafe is not recommended, not asked about and not planned for a lab session.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/remarks",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = NewRemark,
+    responses((status = 201, description = "Recorded", body = Remark)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id): Id<StudyId>,
+    OnceWith(once, new): OnceWith<access::Answer, NewRemark>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let made = remark::give(&mut writer, &once.caller, id, &new).await?;
+    let row = remarks::get(&mut writer, made).await?;
+    once.finish(&app, writer, StatusCode::CREATED, Some(format!("/api/v1/remarks/{made}")), &row).await
+}
+
+/// `GET /remarks/{id}`.
+#[utoipa::path(
+    get,
+    path = "/remarks/{id}",
+    tag = "preferences",
+    params(("id" = RemarkId, Path, description = "The remark")),
+    responses((status = 200, description = "The remark", body = Remark)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<RemarkId>,
+) -> Result<Json<Remark>, Error> {
+    Ok(Json(remarks::get(&mut *app.read().await?, id).await?))
+}
+
+/// Why a remark is taken back.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RetractRemark {
+    #[schema(min_length = 1, max_length = 2000)]
+    reason: String,
+    /// By default the name of the caller.
+    #[serde(default)]
+    author: Option<String>,
+}
+
+/// `POST /remarks/{id}/retract`.
+#[utoipa::path(
+    post,
+    path = "/remarks/{id}/retract",
+    tag = "preferences",
+    params(("id" = RemarkId, Path, description = "The remark")),
+    request_body = RetractRemark,
+    responses((status = 200, description = "Taken back, with what the learner heard of it: the row stays", body = Remark)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn retract(
+    State(app): State<AppState>,
+    Id(id): Id<RemarkId>,
+    OnceWith(once, why): OnceWith<access::Answer, RetractRemark>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = remark::retract(&mut writer, &once.caller, None, id, (why.author.as_deref(), &why.reason)).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &row).await
+}

@@ -1,0 +1,95 @@
+//! Which walk of a lab session the person who walked found better, in terms of walks.
+
+use super::audit::Actor;
+use super::presentations::Said;
+use super::{Connection, Instant, LabSessionId, StoreResult, now};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+/// An answer of the record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabAnswer {
+    /// 1; a further one when the one before was taken back.
+    pub number: u32,
+    /// What was said; first is walk 2.
+    pub said: Said,
+    /// Free text.
+    pub note: String,
+    /// Who wrote it down.
+    pub actor: String,
+    /// When.
+    pub at: Instant,
+    /// Whether it was taken back.
+    pub taken_back: bool,
+}
+
+/// Adds an answer. `false`: there is one with this number.
+///
+/// # Errors
+/// A violated trigger, or what the database reports.
+pub async fn insert(
+    db: &mut Connection,
+    actor: &Actor,
+    id: LabSessionId,
+    number: u32,
+    (said, note): (Said, &str),
+) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into lab_answers (session_id, number, answer, note, actor, created_at) values (?, ?, ?, ?, ?, ?) \
+         on conflict (session_id, number) do nothing",
+    )
+    .bind(id)
+    .bind(number)
+    .bind(said.as_str())
+    .bind(note)
+    .bind(actor.as_str())
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// Takes an answer back. `false`: it was taken back before.
+///
+/// # Errors
+/// A violated constraint when there is no such answer, or what the database reports.
+pub async fn take_back(db: &mut Connection, actor: &Actor, id: LabSessionId, number: u32) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into lab_answer_retractions (session_id, number, actor, created_at) values (?, ?, ?, ?) \
+         on conflict (session_id, number) do nothing",
+    )
+    .bind(id)
+    .bind(number)
+    .bind(actor.as_str())
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// The answers of a session, in order.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_session(db: &mut Connection, id: LabSessionId) -> StoreResult<Vec<LabAnswer>> {
+    let rows = sqlx::query(
+        "select a.*, r.number is not null as taken_back from lab_answers a \
+         left join lab_answer_retractions r on r.session_id = a.session_id and r.number = a.number \
+         where a.session_id = ? order by a.number",
+    )
+    .bind(id)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<LabAnswer> {
+    Ok(LabAnswer {
+        number: row.try_get("number")?,
+        said: row.try_get::<&str, _>("answer")?.parse()?,
+        note: row.try_get("note")?,
+        actor: row.try_get("actor")?,
+        at: row.try_get("created_at")?,
+        taken_back: row.try_get("taken_back")?,
+    })
+}

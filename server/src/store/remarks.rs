@@ -1,0 +1,142 @@
+//! Remarks: what staff say of two gaits that is no preference.
+
+use super::feedback::{Retraction, Source, Voice};
+use super::presentations::Said;
+use super::{Connection, FeedbackId, Instant, RemarkId, StoreError, StoreResult, StudyId, TrialId, now};
+use serde::Serialize;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
+
+/// A remark of the record.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Remark {
+    /// Identifier.
+    pub id: RemarkId,
+    /// The study.
+    pub study_id: StudyId,
+    /// One gait.
+    pub first: TrialId,
+    /// The other one.
+    pub second: TrialId,
+    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
+    pub answer: Said,
+    /// Where it comes from.
+    pub source: Source,
+    /// Who said it.
+    pub author: String,
+    /// Free text.
+    pub note: String,
+    /// What the learner hears of it; none: nothing.
+    pub feedback_id: Option<FeedbackId>,
+    /// When.
+    pub created_at: Instant,
+    /// Set when it was taken back.
+    pub retraction: Option<Retraction>,
+}
+
+impl Remark {
+    /// The two gaits.
+    pub fn pair(&self) -> (TrialId, TrialId) {
+        (self.first, self.second)
+    }
+}
+
+/// A remark to write.
+#[derive(Debug, Clone, Copy)]
+pub struct NewRemark<'a> {
+    /// The study.
+    pub study: StudyId,
+    /// The two gaits.
+    pub pair: (TrialId, TrialId),
+    /// What is said of them.
+    pub said: Said,
+    /// Who says so.
+    pub voice: Voice<'a>,
+    /// What the learner hears of it.
+    pub feedback: Option<FeedbackId>,
+}
+
+/// Adds a remark.
+///
+/// # Errors
+/// A violated constraint or trigger, or what the database reports.
+pub async fn insert(db: &mut Connection, new: &NewRemark<'_>) -> StoreResult<RemarkId> {
+    let id = RemarkId::fresh();
+    sqlx::query(
+        "insert into remarks (id, study_id, first, second, answer, source, author, note, feedback_id, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(new.study)
+    .bind(new.pair.0)
+    .bind(new.pair.1)
+    .bind(new.said.as_str())
+    .bind(new.voice.source.as_str())
+    .bind(new.voice.author)
+    .bind(new.voice.note)
+    .bind(new.feedback)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// Takes a remark back. `false`: it was taken back already.
+///
+/// # Errors
+/// What the database reports.
+pub async fn retract(db: &mut Connection, id: RemarkId, author: &str, reason: &str) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into remark_retractions (remark_id, author, reason, created_at) values (?, ?, ?, ?) \
+         on conflict (remark_id) do nothing",
+    )
+    .bind(id)
+    .bind(author)
+    .bind(reason)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+const SELECT: &str = "select m.*, r.author as retracted_by, r.reason as retracted_because, \
+                      r.created_at as retracted_at from remarks m \
+                      left join remark_retractions r on r.remark_id = m.id ";
+
+/// The remark with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: RemarkId) -> StoreResult<Remark> {
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.id = ?"));
+    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
+    let missing = || StoreError::Missing { what: "remark", id: id.to_string() };
+    row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
+}
+
+/// Every remark of a study, by time, those that were taken back included.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Remark>> {
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.study_id = ? order by m.id"));
+    let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Remark> {
+    Ok(Remark {
+        id: row.try_get("id")?,
+        study_id: row.try_get("study_id")?,
+        first: row.try_get("first")?,
+        second: row.try_get("second")?,
+        answer: row.try_get::<&str, _>("answer")?.parse()?,
+        source: row.try_get::<&str, _>("source")?.parse()?,
+        author: row.try_get("author")?,
+        note: row.try_get("note")?,
+        feedback_id: row.try_get("feedback_id")?,
+        created_at: row.try_get("created_at")?,
+        retraction: Retraction::from_row(row)?,
+    })
+}

@@ -1,0 +1,151 @@
+//! In the lab: walks are recorded, and the person who walked says which was better.
+
+use crate::chromium::Chromium;
+use crate::site::Site;
+use gaitwright::store::StudyId;
+use gaitwright::store::feedback::{FeedbackRow, Source};
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::trials::TrialState;
+use gaitwright_tests::analytic::Analytic;
+use serde_json::json;
+
+/// A study, and a session of it that was planned.
+async fn planned(site: &Site) -> (StudyId, String) {
+    let study = site.service.study(|new| new.trial_budget = 6).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let mut gaits = site.service.trials(study).await;
+    gaits.retain(|trial| trial.state == TrialState::Converged);
+    let pair = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id});
+    let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &pair).await.json();
+    (study, session["id"].as_str().unwrap().to_owned())
+}
+
+/// What the subject said, as the learner heard it.
+async fn heard(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
+    let mut rows = site.service.feedback(study).await;
+    rows.retain(|row| row.source == Source::Subject);
+    rows
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let (study, session) = planned(&site).await;
+    let page = browser.open(&site.at(&format!("/lab/{session}"))).await;
+    page.resize(768, 1024).await;
+    for walk in 1..=3 {
+        page.wait_until(&format!("document.querySelector('h1').innerText.startsWith('Walk {walk}')")).await;
+        // Clicked twice it is recorded once, and the page goes on.
+        page.run("const b = document.querySelector('main button'); b.click(); b.click()").await;
+    }
+    page.wait_until("document.querySelector('h1').innerText === 'Which walk was better?'").await;
+    assert_eq!(page.count("[role=alert]").await, 0);
+    for (width, height) in [(768, 1024), (1024, 768)] {
+        page.resize(width, height).await;
+        let bottom =
+            "Math.max(...[...document.querySelectorAll('.verdict')].map(e => e.getBoundingClientRect().bottom))";
+        let bottom: f64 = page.value(bottom).await.parse().unwrap();
+        assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
+    }
+
+    // With a finger; taken back; then with the keyboard.
+    page.become_touch_screen().await;
+    page.touch("input[value=first]").await;
+    page.wait_until("document.querySelector('input:checked')?.value === 'first'").await;
+    page.touch("main form button").await;
+    page.wait_for(".notice.good button").await;
+    assert!(page.text(".notice.good").await.contains("walk 2 was better"));
+    page.click(".notice.good button").await;
+    page.wait_for("input[name=number][value='2']").await;
+    page.run("document.querySelector('input[name=answer]').focus()").await;
+    page.press("ArrowRight").await;
+    page.press("ArrowRight").await;
+    assert_eq!(page.value("document.querySelector('input:checked')?.value ?? ''").await, "second");
+    page.press("Enter").await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('walk 3 was better') ?? false").await;
+    page.reload().await;
+    assert!(page.text(".notice.good").await.contains("walk 3 was better"));
+    assert!(heard(&site, study).await.is_empty(), "the order was not told yet");
+    page.is_clean(&site.origin).await;
+
+    let page = browser.open(&site.at(&format!("/lab-sessions/{session}"))).await;
+    assert!(page.text("main").await.contains("walk 3 was better"));
+    page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
+    page.fill("#reason", "every walk was recorded").await;
+    page.click("form[action$='/unblind'] button").await;
+    page.wait_until("document.querySelector('main').innerText.includes('The order was told')").await;
+    assert_eq!(heard(&site, study).await.len(), 1);
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    assert!(page.text(".answers").await.contains("the subject, "));
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let (study, session) = planned(&site).await;
+    for walk in 1..=3 {
+        site.service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": walk})).await;
+    }
+    let at = site.at(&format!("/lab/{session}"));
+    let (plain, other) = (browser.open_without_scripts(&at).await, browser.open(&at).await);
+    plain.click_plainly("input[value=unsafe_first]").await;
+    plain.click_plainly("#note").await;
+    plain.type_text("stumbled").await;
+    plain.click_plainly("main form button").await;
+    plain.wait_for(".notice.good").await;
+    assert!(plain.text(".notice.good").await.contains("walk 2 was unsafe"));
+    // The other tab is told that its answer was not taken, and shows the one that was.
+    other.click("input[value=second]").await;
+    other.click("main form button").await;
+    other.wait_for("[role=alert]").await;
+    assert!(other.text(".notice.good").await.contains("walk 2 was unsafe"));
+    // Both gaits are closed until the order says which one it was.
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    assert_eq!(page.count(".trials .tag.bad").await, 2);
+    assert_eq!(page.count("[data-part=state] [role=alert]").await, 2);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_staff_call_a_gait_unsafe_and_take_it_back() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let (study, _) = planned(&site).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let best = page.text("[data-part=best] a").await;
+    let compare = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    compare.click("[data-part=answers] a").await;
+    // The best gait against another one.
+    compare.wait_for("#a").await;
+    let choose = format!(
+        "const a = document.querySelector('#a'); a.value = [...a.options].find(o => o.text === '{best}').value; \
+         const b = document.querySelector('#b'); b.value = [...b.options].find(o => o.text !== '{best}').value; \
+         a.form.querySelector('button').click()"
+    );
+    compare.run(&choose).await;
+    compare.wait_until(&format!("document.querySelector('figcaption a')?.innerText === '{best}'")).await;
+    compare.click("input[value=unsafe_a]").await;
+    compare.fill("#author", "K1").await;
+    compare.click("main form[method=post] button[type=submit]").await;
+    compare.wait_for(".notice.good").await;
+    assert!(compare.text(".notice.good").await.contains(&format!("{best} is unsafe")));
+    // The study's page hears of it without being loaded anew, and recommends another one.
+    page.wait_for("[data-part=state] [role=alert]").await;
+    page.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
+    assert_eq!(page.count(".trials .tag.bad").await, 1);
+
+    compare.run("document.querySelector('.notice.good details').open = true").await;
+    compare.fill("#retract-author", "K1").await;
+    compare.fill("#reason", "the wrong button").await;
+    compare.click(".notice.good form button").await;
+    compare.wait_until("document.querySelector('.notice.good').innerText.includes('taken back')").await;
+    page.wait_until("document.querySelector('[data-part=state] [role=alert]') === null").await;
+    page.wait_until(&format!("document.querySelector('[data-part=best] a').innerText === '{best}'")).await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
