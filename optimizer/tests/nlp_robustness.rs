@@ -191,9 +191,9 @@ fn nlp_invalid_input_is_named() {
     let settings = NlpSettings::default();
     assert!(matches!(go(&problem, vec![0.0; 2], &settings), Err(NlpError::InvalidStart(_))));
     assert!(matches!(go(&problem, vec![f64::NAN], &settings), Err(NlpError::InvalidStart(_))));
-    let bad = NlpSettings { kappa_mu: 1.5, ..settings.clone() };
+    let bad = NlpSettings { kappa_mu: 1.5, ..settings };
     assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "kappa_mu", .. })));
-    let bad = NlpSettings { tolerance: f64::NAN, ..settings.clone() };
+    let bad = NlpSettings { tolerance: f64::NAN, ..settings };
     assert!(matches!(go(&problem, vec![0.0], &bad), Err(NlpError::InvalidSetting { field: "tolerance", .. })));
     let crossed = Small::new("p", &[0.0], &[(1.0, -1.0)], &[], |x| (x[0], vec![x[0]]));
     assert!(matches!(go(&crossed, vec![0.0], &settings), Err(NlpError::InvalidProblem(_))));

@@ -68,13 +68,12 @@ impl<'a> Run<'a> {
         self.begun.elapsed().as_secs_f64()
     }
 
-    #[allow(clippy::needless_pass_by_value)] // the settings are made for the call
     fn phase(
         &mut self,
         phase: Phase,
         programme: &GaitProgramme,
         start: &StartPoint,
-        settings: NlpSettings,
+        settings: &NlpSettings,
     ) -> Result<NlpResult, SolveError> {
         let options = self.context.options;
         let remaining = options
@@ -84,7 +83,7 @@ impl<'a> Run<'a> {
             max_seconds: remaining,
             max_iterations: options.max_iterations,
             threads: self.threads,
-            ..settings
+            ..*settings
         };
         let (before, guess) = (self.iterations, self.guess);
         let observer = &mut *self.observer;
@@ -144,12 +143,12 @@ impl<'a> Run<'a> {
             Phase::Tracking,
             &plain.for_tracking(TRACKING_WEIGHT),
             &StartPoint::Cold(first),
-            tracking_settings,
+            &tracking_settings,
         )?;
         if problem.muscles {
             if guess.route == ColdRoute::PlainOptimum && !Self::interrupted(&tracked) {
                 let settings = NlpSettings { mu_initial: MU_COST, ..rough };
-                tracked = self.phase(Phase::PlainCost, &plain, &StartPoint::Cold(tracked.x), settings)?;
+                tracked = self.phase(Phase::PlainCost, &plain, &StartPoint::Cold(tracked.x), &settings)?;
             }
             let with_muscles = cold_start::muscles::guess(programme, &plain, &tracked.x);
             if Self::interrupted(&tracked) {
@@ -163,7 +162,7 @@ impl<'a> Run<'a> {
                         .with_timing(&guess.timing.fractions())
                         .for_tracking(TRACKING_WEIGHT),
                     &StartPoint::Cold(with_muscles),
-                    NlpSettings { mu_initial: MU_MUSCLE_TRACKING, ..tracking_settings },
+                    &NlpSettings { mu_initial: MU_MUSCLE_TRACKING, ..tracking_settings },
                 )?;
             } else {
                 tracked.x = with_muscles;
@@ -175,7 +174,7 @@ impl<'a> Run<'a> {
         let barrier_strategy =
             if guess.adaptive_barrier { BarrierStrategy::Adaptive } else { BarrierStrategy::Monotone };
         let settings = NlpSettings { barrier_strategy, ..cost_settings(guess.barrier) };
-        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), settings)
+        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), &settings)
     }
 
     /// Begins with the barrier parameter that a cold start ends with: a larger one forgets the point, and with a smaller
@@ -187,7 +186,7 @@ impl<'a> Run<'a> {
             Phase::Cost,
             self.context.programme,
             &StartPoint::Warm(point),
-            NlpSettings {
+            &NlpSettings {
                 tolerance: self.context.options.tolerance,
                 mu_initial: MU_COST,
                 mu_warm: Some(mu_warm),
