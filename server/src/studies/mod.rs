@@ -23,6 +23,7 @@ pub mod lifecycle;
 mod next_step;
 pub mod person;
 pub mod plan;
+pub mod recommended;
 pub mod record;
 pub mod recording;
 mod rehearsal;

@@ -19,10 +19,11 @@ use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{StudyId, TrialId, commit, consents, devices, events, reference_gaits, studies, trials};
-use crate::studies::choice::{MANY, best_trial};
+use crate::studies::choice::{MANY, best_trial, ranking};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
+use crate::studies::recommended::{self, CertificateState, Judged};
 use crate::studies::standing::Standing;
 use crate::studies::{command, lifecycle};
 use crate::workers::Track;
@@ -103,6 +104,27 @@ struct Best {
     cost: String,
     bounds: Vec<Bound>,
     has_gait: bool,
+    /// What its certificate says.
+    judged: Judged,
+    /// Where that failed, the best trial whose gait passed.
+    passing: Option<Passing>,
+}
+
+impl Best {
+    fn failed(&self) -> bool {
+        self.judged.verdict == CertificateState::Failed
+    }
+
+    fn passed(&self) -> bool {
+        self.judged.verdict == CertificateState::Passed
+    }
+}
+
+/// A trial whose gait passed its certificate.
+struct Passing {
+    id: TrialId,
+    number: u32,
+    rmse: String,
 }
 
 struct AnswerRow {
@@ -209,6 +231,8 @@ pub(super) struct Figures {
     /// People are to answer and nobody has: what the learner believes then is only what it began with.
     unanswered: bool,
     pub(super) best: Option<TrialId>,
+    /// The gaits, the best one first.
+    ranking: Vec<TrialId>,
     pub(super) history: Vec<Milestone>,
     question: bool,
 }
@@ -240,26 +264,29 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
     let figures = figures.map_err(Error::Learner)?;
+    let judged = recommended::judged(&mut *app.read().await?, &figures.ranking).await?;
     let running = standing
         .trials
         .iter()
         .filter(|trial| trial.state == TrialState::Running)
         .map(|trial| running_row(trial, app.director.board().track(trial.id).as_ref()))
         .collect();
-    Ok(view(standing, counts, &figures, running, table, caller.may(Run::NEEDED)))
+    Ok(view(standing, counts, &figures, judged, running, table, caller.may(Run::NEEDED)))
 }
 
 pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
     if large {
         let best = standing.trials.last().and_then(|newest| newest.best_before);
         let question = standing.study.state == StudyState::Waiting;
-        return Ok(Figures { unanswered: false, best, history: history::known(standing), question });
+        let ranking = best.into_iter().collect();
+        return Ok(Figures { unanswered: false, best, ranking, history: history::known(standing), question });
     }
     let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
     if standing.waits_for_first_answer() {
-        return Ok(Figures { unanswered: true, best: None, history: Vec::new(), question });
+        return Ok(Figures { unanswered: true, best: None, ranking: Vec::new(), history: Vec::new(), question });
     }
-    Ok(Figures { unanswered: false, best: best_trial(standing)?, history: history::of(standing)?, question })
+    let (best, ranking) = (best_trial(standing)?, ranking(standing)?);
+    Ok(Figures { unanswered: false, best, ranking, history: history::of(standing)?, question })
 }
 
 fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
@@ -283,6 +310,7 @@ fn view(
     standing: Standing,
     counts: TrialCounts,
     figures: &Figures,
+    judged: Judged,
     running: Vec<RunningRow>,
     table: TrialsTable,
     may_run: bool,
@@ -294,6 +322,12 @@ fn view(
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
         has_gait: trial.state == TrialState::Converged,
+        passing: judged.passing.and_then(|id| standing.trial(id)).map(|trial| Passing {
+            id: trial.id,
+            number: trial.number,
+            rmse: format::figure(trial.gait_rmse_rad),
+        }),
+        judged,
     });
     let answers = standing.feedback.iter().rev().filter_map(|row| answer_row(row, &standing)).collect();
     let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
