@@ -165,10 +165,11 @@ fn a_stride_that_was_not_wholly_recorded_is_dropped() {
     assert!(refused.contains("none of 1 strides lasts 0.8 to 1.6 s, without a gap of 0.1 s"), "{refused}");
 }
 
+type Change = fn(&mut ReferenceGait);
+
 #[test]
 fn a_reference_that_no_joint_can_follow_is_refused_by_field() {
     let whole = ReferenceGait::builtin().unwrap();
-    type Change = fn(&mut ReferenceGait);
     let changes: [(Change, &str); 5] = [
         (|r| r.angles_rad.iter_mut().flatten().for_each(|a| *a = a.to_degrees()), "angles_rad[0][0] = 7"),
         (|r| r.standard_deviation_rad = Some(vec![[-0.1; 5]; 101]), "standard_deviation_rad[0][0] = -0.1"),

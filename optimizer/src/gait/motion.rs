@@ -66,6 +66,7 @@ impl Gait {
     /// The same gait with `parts` points for each of its own, for drawing: coordinates with velocities and accelerations,
     /// and fibre lengths, as they are between the mesh points; what has no derivatives there, linear. What is not a
     /// well-formed gait stays as it is.
+    #[must_use]
     pub fn refined(&self, parts: usize) -> Self {
         let mut refined = self.clone();
         if self.validate().is_ok() {

@@ -41,8 +41,8 @@ impl Gait {
 fn check_times(trajectory: &DomainTrajectory, start_s: f64) -> Result<(), String> {
     let gaps = (trajectory.time_s.len() - 1) as f64;
     let planned = |k: usize| start_s + trajectory.duration_s * k as f64 / gaps;
-    let late = |(k, time): (usize, &f64)| !((time - planned(k)).abs() <= ROUNDING);
-    match trajectory.time_s.iter().enumerate().position(late) {
+    let in_time = |(k, time): (usize, &f64)| (time - planned(k)).abs() <= ROUNDING;
+    match trajectory.time_s.iter().enumerate().position(|point| !in_time(point)) {
         Some(k) => Err(format!("time_s[{k}] is {}, expected {:.6} by the durations", trajectory.time_s[k], planned(k))),
         None => Ok(()),
     }

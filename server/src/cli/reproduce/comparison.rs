@@ -55,16 +55,23 @@ pub(super) struct Outcome {
 impl Outcome {
     /// What the certificate of the best gait says, and which gait passes where that one does not.
     pub(super) fn certificate_in_words(&self) -> String {
-        let objections = self.objections.join("; ");
         match (self.certificate, self.passing) {
             (CertificateState::Passed, _) => "passed".to_owned(),
             (CertificateState::NotExamined, _) => "not examined".to_owned(),
-            (CertificateState::Failed, None) => format!("failed: {objections}"),
+            (CertificateState::Failed, None) => "failed".to_owned(),
             (CertificateState::Failed, Some((number, rmse))) => {
                 let rmse = rmse.map_or_else(String::new, |rmse| format!(" ({rmse:.4} rad)"));
-                format!("failed: {objections}. Trial {number}{rmse} passes")
+                format!("failed; trial {number}{rmse} passes")
             }
         }
+    }
+
+    /// Why the certificate of the best gait failed; none: it did not.
+    pub(super) fn failure_in_words(&self) -> Option<String> {
+        let with = if self.muscles { "with" } else { "without" };
+        let objections = self.objections.join("; ");
+        let who = format!("subject {}, seed {}, {with} muscles", self.subject, self.seed);
+        (self.certificate == CertificateState::Failed).then(|| format!("{who}: {objections}"))
     }
 }
 

@@ -19,6 +19,8 @@ struct Report<'a> {
     statements: Vec<Statement>,
     /// Of all solves together, s.
     seconds: f64,
+    /// Why certificates of best gaits failed.
+    failures: Vec<String>,
     /// Name of the reference, and what is to be known of its band.
     reference: Option<(&'a str, &'static str)>,
     verdicts: Vec<Verdict>,
@@ -52,6 +54,7 @@ pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
         conclusion: conclusion(&verdicts),
         statements: statements(outcomes, &verdicts),
         seconds: outcomes.iter().map(|outcome| outcome.seconds).sum(),
+        failures: outcomes.iter().filter_map(Outcome::failure_in_words).collect(),
         reference: outcomes.first().map(|o| (o.reference.name.as_str(), band_in_words(&o.reference))),
         verdicts,
         outcomes,
