@@ -40,7 +40,8 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
     let message = message.split(" at line ").next().unwrap_or(&message);
     let place = place(&inner, &path, bytes);
     if !inner.is_data() {
-        let within = if written == "." { String::new() } else { format!("field {written}: ") };
+        let known = written != "." && path.iter().all(|segment| !matches!(segment, Segment::Unknown));
+        let within = if known { format!("field {written}: ") } else { String::new() };
         return Error::Malformed(format!("{within}not JSON: {message}{place}"));
     }
     let missing = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
