@@ -5,16 +5,13 @@
 
 use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
+use crate::reference::LARGEST_ANGLE_RAD;
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 
 /// Order of one pass of the low-pass.
 const ORDER: usize = 4;
-/// Largest angle of a recording, rad: a wrong unit exceeds it.
-const LARGEST_ANGLE_RAD: f64 = PI;
-
 /// Longest time between two rows, s: what lies in a longer one is not known.
 const LONGEST_GAP_S: f64 = 0.05;
 

@@ -2,6 +2,7 @@
 
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 mod matching;
 mod recording;
@@ -15,6 +16,8 @@ pub(crate) use strides::{contacts, given};
 
 /// The built-in reference (citation, licence and processing in its header).
 const BUILTIN_CSV: &str = include_str!("../data/reference_gait.csv");
+/// Largest joint angle that is read, rad: a wrong unit exceeds it.
+pub(crate) const LARGEST_ANGLE_RAD: f64 = PI;
 /// Rows of a reference: 0, 1, ..., 100 % of the cycle.
 pub const REFERENCE_ROWS: usize = 101;
 /// Column names after the percentage.
@@ -81,8 +84,9 @@ impl ReferenceGait {
             for ((value, &column), wanted) in row.iter_mut().zip(&columns).zip(REFERENCE_COLUMNS) {
                 let cell = record.get(column).unwrap_or("");
                 *value =
-                    cell.parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() <= 4.0).ok_or_else(|| {
-                        malformed(line, format!("{wanted} = {cell:?} is not an angle in [-4, 4] rad"))
+                    cell.parse::<f64>().ok().filter(|angle| angle.abs() <= LARGEST_ANGLE_RAD).ok_or_else(|| {
+                        let range = format!("[-{LARGEST_ANGLE_RAD:.2}, {LARGEST_ANGLE_RAD:.2}] rad");
+                        malformed(line, format!("{wanted} = {cell:?} is not an angle in {range}"))
                     })?;
             }
             angles_rad.push(row);
@@ -112,22 +116,16 @@ impl ReferenceGait {
         Ok(reference)
     }
 
-    /// Checks the numbers of rows.
+    /// Checks the numbers of rows, every angle and deviation, and whose gait it is.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`].
+    /// [`ModelError`] naming the field.
     pub fn validate(&self) -> Result<(), ModelError> {
-        let whole = |curves: &[[f64; 5]]| {
-            curves.len() == REFERENCE_ROWS && curves.iter().flatten().all(|angle| angle.is_finite())
-        };
-        if whole(&self.angles_rad) && self.standard_deviation_rad.as_deref().is_none_or(whole) {
-            Ok(())
-        } else {
-            Err(ModelError::Malformed {
-                what: format!("reference gait {:?}", self.name),
-                reason: format!("{} rows, expected {REFERENCE_ROWS} of finite angles", self.angles_rad.len()),
-            })
+        check_curves("angles_rad", &self.angles_rad, -LARGEST_ANGLE_RAD)?;
+        if let Some(deviation) = &self.standard_deviation_rad {
+            check_curves("standard_deviation_rad", deviation, 0.0)?;
         }
+        Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg }.validate()
     }
 
     /// The five angles at a stride fraction (periodic, linear between rows), rad.
@@ -148,4 +146,18 @@ impl ReferenceGait {
         let [_, _, knee_r, ankle_r, _] = self.at(fraction + 0.5);
         [torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]
     }
+}
+
+/// Five curves over the cycle, each value from `least` to the largest angle.
+fn check_curves(field: &str, curves: &[[f64; 5]], least: f64) -> Result<(), ModelError> {
+    if curves.len() != REFERENCE_ROWS {
+        let reason = format!("{} rows, expected {REFERENCE_ROWS}", curves.len());
+        return Err(ModelError::Malformed { what: field.to_owned(), reason });
+    }
+    for (row, values) in curves.iter().enumerate() {
+        for (column, value) in values.iter().enumerate() {
+            ModelError::check_range(&format!("{field}[{row}][{column}]"), *value, least, LARGEST_ANGLE_RAD)?;
+        }
+    }
+    Ok(())
 }

@@ -71,6 +71,13 @@ fn a_changed_curve_is_found_and_leaves_the_orbit() {
 }
 
 #[test]
+fn an_impulse_that_makes_no_such_jump_is_found() {
+    let (_, mut gait) = golden_gait(1, false);
+    gait.domains[1].impulse.as_mut().unwrap()[0] += 0.01;
+    assert!(objects_to(&certificate(&gait), "C2 impulses of the impacts: 0.01 N s (DS2_R"));
+}
+
+#[test]
 fn a_tighter_bound_than_the_gait_keeps_is_found() {
     let (_, mut gait) = golden_gait(2, false);
     gait.bounds.a7 = 10.0;
@@ -111,6 +118,21 @@ fn an_incomplete_gait_is_refused_by_name() {
     let mut gait = whole.clone();
     gait.domains[1].u.pop();
     assert!(certify(&gait).unwrap_err().to_string().contains("DS3_R: u has 8 entries, expected 9"));
+    let mut gait = whole.clone();
+    gait.domains[3].time_s.iter_mut().for_each(|time| *time += 1.0);
+    let refused = certify(&gait).unwrap_err().to_string();
+    assert!(refused.contains("SS1_R: time_s[0] is 1.") && refused.contains("by the durations"), "{refused}");
+    for (change, field) in [
+        ((|gait| gait.stride_time_s = -4.0) as fn(&mut Gait), "stride_time_s"),
+        (|gait| gait.speed_m_s = 99.0, "speed_m_s"),
+    ] {
+        let mut gait = whole.clone();
+        change(&mut gait);
+        assert!(certify(&gait).unwrap_err().to_string().starts_with(field));
+    }
+    let mut gait = whole.clone();
+    gait.domains[0].impulse = None;
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_R: impulse has None entries, expected Some(4)"));
     let mut gait = whole;
     gait.domains[4].q[2][3] = f64::NAN;
     assert!(certify(&gait).unwrap_err().to_string().contains("DS2_L: holds a number that is not finite"));

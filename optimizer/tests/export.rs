@@ -7,6 +7,8 @@ mod golden_gaits;
 use gait_optimizer::ModelError;
 use gait_optimizer::export::{ControllerFile, motion_file};
 use golden_gaits::golden_gait;
+use serde_json::Value;
+use std::collections::BTreeSet;
 
 #[test]
 fn the_controller_file_reproduces_the_gait_at_its_domain_ends() {
@@ -44,7 +46,26 @@ fn the_controller_file_reproduces_the_gait_at_its_domain_ends() {
             let slope = (trajectory.knee_rad[k + 1] - trajectory.knee_rad[k - 1]) * 100.0;
             assert!((slope - trajectory.knee_rad_s[k]).abs() < 0.2, "{k}: {slope} {}", trajectory.knee_rad_s[k]);
         }
-        assert!(file.fields.contains_key("domains.outputs.bezier_rad"));
+        let whole: Value = serde_json::from_str(&text).unwrap();
+        for name in names("", &whole) {
+            let explained = file.fields.get(&name).is_some_and(|words| !words.is_empty());
+            assert!(explained, "{name} has no description");
+        }
+    }
+}
+
+/// Every field of a document by its path, but what is keyed by names of joints or fields.
+fn names(path: &str, value: &Value) -> BTreeSet<String> {
+    match value {
+        Value::Array(all) => all.iter().flat_map(|one| names(path, one)).collect(),
+        Value::Object(fields) if !["fields", "domains.phase_gradient_m_per_rad"].contains(&path) => {
+            let named = |(name, value): (&String, &Value)| {
+                let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                names(&path, value).into_iter().chain([path])
+            };
+            fields.iter().flat_map(named).collect()
+        }
+        _ => BTreeSet::new(),
     }
 }
 

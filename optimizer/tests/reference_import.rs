@@ -127,6 +127,65 @@ fn forces_may_be_in_a_file_of_their_own_at_their_own_rate() {
 }
 
 #[test]
+fn forces_of_camargos_tables_cut_its_strides() {
+    let mut forces = "Header,Treadmill_R_vx,Treadmill_R_vy\n".to_owned();
+    for k in 0..5501 {
+        let time = f64::from(k) / 1000.0;
+        let force = if (time / 1.1).rem_euclid(1.0) < 0.6 { 700.0 } else { 0.0 };
+        writeln!(forces, "{time:.3},0,{force}").unwrap();
+    }
+    let motion = Recording::from_camargo_csv("ik.csv", &synthetic_recordings::camargo(5)).unwrap();
+    let recording = motion.with_camargo_forces("fp.csv", &forces, "Treadmill_R_vy").unwrap();
+    let strikes = recording.heel_strikes(&HeelStrikes::Force).unwrap();
+    for (k, strike) in strikes.iter().enumerate() {
+        assert!((strike - 1.1 * (k + 1) as f64).abs() < 2e-3, "{strikes:?}");
+    }
+    let provenance = recording.reference("x", &HeelStrikes::Force, Walker::default()).unwrap().provenance;
+    assert!(provenance.contains("fp.csv: 5501 rows, Treadmill_R_vy"), "{provenance}");
+}
+
+#[test]
+fn a_stride_that_was_not_wholly_recorded_is_dropped() {
+    let whole = opensim(5);
+    let (header, body) = whole.split_once("lumbar_extension\tright_vy\n").unwrap();
+    let kept: Vec<&str> =
+        body.lines().filter(|row| !(2.5..2.65).contains(&row.split('\t').next().unwrap().parse().unwrap())).collect();
+    let header = header.replace("nRows=551", &format!("nRows={}", kept.len()));
+    let text = format!("{header}lumbar_extension\tright_vy\n{}\n", kept.join("\n"));
+    let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2, 3.3, 4.4]);
+    let reference = read(&text).unwrap().reference("x", &given, Walker::default()).unwrap();
+    assert!(reference.provenance.contains("mean of 3 strides of 0.8 to 1.6 s, without a gap of 0.1 s (1 dropped)"));
+    assert!(reference.provenance.contains("5 right heel strikes given: 0.0000, 1.1000, 2.2000, 3.3000, 4.4000 s"));
+    let of_whole = read(&whole).unwrap().reference("x", &given, Walker::default()).unwrap();
+    for (ours, theirs) in reference.angles_rad.iter().flatten().zip(of_whole.angles_rad.iter().flatten()) {
+        assert!((ours - theirs).abs() < 1e-9);
+    }
+    let only_that = HeelStrikes::Given(vec![2.2, 3.3]);
+    let refused = read(&text).unwrap().reference("x", &only_that, Walker::default()).unwrap_err().to_string();
+    assert!(refused.contains("none of 1 strides lasts 0.8 to 1.6 s, without a gap of 0.1 s"), "{refused}");
+}
+
+type Change = fn(&mut ReferenceGait);
+
+#[test]
+fn a_reference_that_no_joint_can_follow_is_refused_by_field() {
+    let whole = ReferenceGait::builtin().unwrap();
+    let changes: [(Change, &str); 5] = [
+        (|r| r.angles_rad.iter_mut().flatten().for_each(|a| *a = a.to_degrees()), "angles_rad[0][0] = 7"),
+        (|r| r.standard_deviation_rad = Some(vec![[-0.1; 5]; 101]), "standard_deviation_rad[0][0] = -0.1"),
+        (|r| r.standard_deviation_rad = Some(vec![[0.1; 5]; 50]), "standard_deviation_rad: 50 rows, expected 101"),
+        (|r| r.height_m = Some(175.0), "height_m = 175"),
+        (|r| r.body_mass_kg = Some(f64::NAN), "body_mass_kg = NaN"),
+    ];
+    for (change, expected) in changes {
+        let mut reference = whole.clone();
+        change(&mut reference);
+        let refused = reference.validate().unwrap_err().to_string();
+        assert!(refused.starts_with(expected), "{expected}: {refused}");
+    }
+}
+
+#[test]
 fn strides_are_averaged_with_their_deviation_and_provenance() {
     let recording = read(&opensim(5)).unwrap();
     let walker = Walker { height_m: Some(1.75), body_mass_kg: Some(70.0) };

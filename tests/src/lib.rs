@@ -9,6 +9,7 @@ pub mod broker;
 pub mod callers;
 pub mod cli;
 pub mod client;
+pub mod examined;
 pub mod large;
 pub mod measured;
 pub mod service;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright::store::studies::StudyState;
+use gaitwright::studies::recommended::Judged;
 use gaitwright::studies::standing::Standing;
 use gaitwright::studies::summary;
 use gaitwright_tests::analytic::Analytic;
@@ -32,7 +33,7 @@ async fn documents_keep_their_shape() {
     let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
 
     // tune --json; the last trial comes first, because it has everything.
-    let mut tune = serde_json::to_value(summary::of(&standing).unwrap()).unwrap();
+    let mut tune = serde_json::to_value(summary::of(&standing, Judged::default()).unwrap()).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();
     insta::assert_json_snapshot!("tune", shape(&tune));
 

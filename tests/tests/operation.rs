@@ -4,12 +4,12 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gait_optimizer::certificate::Certificate;
 use gaitwright::cli::study::{import, prune};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::{Store, archive, backup, certificates, commit, gaits, studies};
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::examined::certificate;
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
 use serde_json::{Value, json};
@@ -46,7 +46,7 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
         json!({"trial_a": converged[2].id, "trial_b": converged[0].id, "answer": "no_difference", "author": "K"});
     service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
     let expected = posterior(&service, study).await;
-    let examined = (converged[0].id, certificate());
+    let examined = (converged[0].id, certificate(false));
     let mut writer = service.store.write().await.unwrap();
     assert!(certificates::keep(&mut writer, examined.0, &examined.1).await.unwrap());
     commit(writer).await.unwrap();
@@ -88,20 +88,6 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     assert_eq!(import(&older, &archive::open(&as_before_certificates(&file)).unwrap()).await.unwrap(), study);
     assert_eq!(certificates::find(&mut older.read().await.unwrap(), examined.0).await.unwrap(), None);
     older.close().await;
-}
-
-/// What an examination that found a fault leaves.
-fn certificate() -> Certificate {
-    Certificate {
-        format_version: gait_optimizer::certificate::FORMAT_VERSION,
-        passed: false,
-        objections: vec!["the simulated walker falls".to_owned()],
-        checks: Vec::new(),
-        fall: Some("the simulated walker falls".to_owned()),
-        return_map: None,
-        free_hip_return_map: None,
-        pushes: None,
-    }
 }
 
 /// The archive as the program wrote it before: without the table, and with the format of then.

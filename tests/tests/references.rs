@@ -8,6 +8,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::measured::four_strides;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
+use std::fmt::Write;
 
 fn recording() -> String {
     four_strides(100)
@@ -106,6 +107,24 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await;
     assert!(page.status == StatusCode::OK && page.text.contains("S03, level"), "{}", page.text);
+    // The forces in a file of their own; where something is wrong, both files come back.
+    let mut forces = "forces\nnRows=9001\nnColumns=2\nendheader\ntime\tground_force_vy\n".to_owned();
+    for k in 0..9001 {
+        let force = if k % 1000 < 600 { 700 } else { 0 };
+        writeln!(forces, "{:.3}\t{force}", f64::from(k) / 1000.0).unwrap();
+    }
+    let encoded = |text: &str| text.replace('\n', "%0D%0A").replace('\t', "%09");
+    let with = |forces: &str| form(&recording(), "").replace("kinematics", "force") + "&forces=" + &encoded(forces);
+    let refused = service.post_text("/references", kind, &with("not a file")).await;
+    assert!(refused.text.contains("forces, line 1: there is no line &#34;endheader&#34;"), "{}", refused.text);
+    assert!(refused.text.contains(">not a file</textarea>") && refused.text.contains("<details open>"), "as typed");
+    let imported = service.post_text("/references", kind, &with(&forces)).await;
+    assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
+    let page = service.fetch(imported.headers["location"].to_str().unwrap()).await.text;
+    assert!(
+        page.contains("ground_force_vy is the force under the right foot")
+            && page.contains("heel strikes by the force")
+    );
     // More than the usual limit of a body is accepted here, and only here.
     let mut body = new("long", 1.7);
     body["recording"] = json!(four_strides(10_000));

@@ -3,7 +3,7 @@
 for (const field of document.querySelectorAll("[data-recording]")) {
   const text = field.querySelector("textarea");
   const label = document.createElement("label");
-  label.textContent = "File";
+  label.textContent = field.dataset.recording || "File";
   const input = document.createElement("input");
   input.type = "file";
   input.accept = ".mot,.sto,.csv,text/plain,text/csv";
@@ -17,6 +17,6 @@ for (const field of document.querySelectorAll("[data-recording]")) {
     if (!file) return;
     text.value = await file.text();
     const name = document.querySelector("#name");
-    if (name && !name.value) name.value = file.name.replace(/\.[^.]*$/, "");
+    if (name && !name.value && text.required) name.value = file.name.replace(/\.[^.]*$/, "");
   });
 }

@@ -44,11 +44,12 @@ const NORMAL_FORCE: Measured = Measured::new("C3 unilateral contact", "N", 1e-3,
 const FRICTION: Measured = Measured::new("C3 friction cone", "N", 1e-3, Some(FRICTION_THRESHOLD_N));
 const DEPTH: Measured = Measured::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
 const CLEARANCE: Measured = Measured::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
-const ANGLE: Measured = Measured::new("C4 joint angles (a6, a7, a8)", "rad", 1e-6, Some(0.01));
-const SPEED: Measured = Measured::new("C4 velocities (a1)", "rad/s", 3e-6, Some(0.1));
-const ACCELERATION: Measured = Measured::new("C4 accelerations (a2)", "rad/s²", 3e-5, Some(5.0));
-const TORQUE: Measured = Measured::new("C4 torques", "N m", 1e-4, Some(2.0));
+const ANGLE: Measured = Measured::new("C4 joint angles beyond a6, a7, a8", "rad", 1e-6, Some(0.01));
+const SPEED: Measured = Measured::new("C4 velocities beyond a1", "rad/s", 3e-6, Some(0.1));
+const ACCELERATION: Measured = Measured::new("C4 accelerations beyond a2", "rad/s²", 3e-5, Some(5.0));
+const TORQUE: Measured = Measured::new("C4 torques beyond their limits", "N m", 1e-4, Some(2.0));
 const IMPACT: Quantity = Quantity::judged("C2 velocities after impacts", "rad/s", 1e-5);
+const IMPULSE: Quantity = Quantity::judged("C2 impulses of the impacts", "N s", 1e-4);
 const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3e-6);
 const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
 const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "m, s", 1e-6);
@@ -243,7 +244,11 @@ impl DomainResiduals<'_> {
         }
         worst.other.note(RESET, largest(position_jump.into_iter()), place);
         let expected = if CYCLE[next].opens_with_impact() {
-            crate::walking::impact(self.model, CYCLE[next], q, qd).map(|impact| impact.velocity_after)
+            let impact = crate::walking::impact(self.model, CYCLE[next], q, qd);
+            let by_physics = impact.as_ref().map_or(&[][..], |impact| &impact.impulse);
+            let missed = to.impulse.iter().flatten().zip(by_physics).map(|(told, found)| told - found);
+            worst.other.note(IMPULSE, if by_physics.is_empty() { f64::NAN } else { largest(missed) }, place);
+            impact.map(|impact| impact.velocity_after)
         } else {
             Some(*qd)
         };

@@ -16,7 +16,10 @@ const FORMAT_VERSION: u32 = 1;
 const ANGLES: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
 
 /// Every field in words; it travels with the file.
-const FIELDS: [(&str, &str); 17] = [
+const FIELDS: [(&str, &str); 28] = [
+    ("format", "what this file is"),
+    ("format_version", "version of its layout"),
+    ("fields", "this explanation"),
     (
         "signs",
         "forward lean, hip flexion, knee flexion and ankle dorsiflexion are positive; R is the prosthesis, L the intact leg",
@@ -25,6 +28,10 @@ const FIELDS: [(&str, &str); 17] = [
     ("stride_time_s", "time from right heel strike to the next, s"),
     ("stride_length_m", "distance between these heel strikes, m"),
     ("domains", "the eight contact situations of a stride, in order from right heel strike"),
+    (
+        "domains.name",
+        "DS2, DS3: double support; SS2, SS1: single support on the flat foot, on the toe; and the stance leg",
+    ),
     ("domains.stance", "the leg that is, or becomes, the stance leg"),
     ("domains.duration_s", "planned duration, s"),
     ("domains.ends", "the event that ends the domain"),
@@ -42,16 +49,20 @@ const FIELDS: [(&str, &str); 17] = [
         "rate of p to be regulated, m/s; null where the walker is underactuated and p is free",
     ),
     ("domains.outputs", "joints that follow their curve y(s)"),
+    ("domains.outputs.joint", "name of the joint; torso: the trunk's lean"),
     ("domains.outputs.bezier_rad", "coefficients a_0..a_5 of y(s) = sum of a_i C(5,i) s^i (1-s)^(5-i), rad"),
     (
         "trajectory",
         "the prosthetic joints over one stride as set points in time, for tracking by proportional-derivative control",
     ),
     ("trajectory.rate_hz", "samples per second; the last sample is the end of the stride"),
-    (
-        "trajectory.knee_torque_n_m",
-        "torque of the planned gait, flexion positive, N m: a feed-forward; ankle: dorsiflexion positive",
-    ),
+    ("trajectory.time_s", "time of each sample from right heel strike, s"),
+    ("trajectory.knee_rad", "knee angle, flexion positive, rad"),
+    ("trajectory.ankle_rad", "ankle angle, dorsiflexion positive, rad"),
+    ("trajectory.knee_rad_s", "its rate, rad/s; jumps at impacts"),
+    ("trajectory.ankle_rad_s", "the ankle's rate, rad/s; jumps at impacts"),
+    ("trajectory.knee_torque_n_m", "torque of the planned gait, flexion positive, N m: a feed-forward"),
+    ("trajectory.ankle_torque_n_m", "the same of the ankle, dorsiflexion positive, N m"),
 ];
 
 /// A gait for the device.

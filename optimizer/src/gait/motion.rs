@@ -4,7 +4,7 @@
 //! parabola through the three points of a mesh interval. Fibre lengths: the cubic of Hermite-Simpson collocation, whose
 //! slope is the parabola through the fibre velocities.
 
-use crate::gait::{DomainTrajectory, MuscleTrajectory};
+use crate::gait::{DomainTrajectory, Gait, MuscleTrajectory};
 
 /// The gait at one instant of a domain.
 #[derive(Debug, Clone)]
@@ -60,6 +60,54 @@ pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> Instant {
     }
     result.muscles = domain.muscles.as_ref().map(|muscles| interval.muscles(muscles));
     result
+}
+
+impl Gait {
+    /// The same gait with `parts` points for each of its own, for drawing: coordinates with velocities and accelerations,
+    /// and fibre lengths, as they are between the mesh points; what has no derivatives there, linear. What is not a
+    /// well-formed gait stays as it is.
+    #[must_use]
+    pub fn refined(&self, parts: usize) -> Self {
+        let mut refined = self.clone();
+        if self.validate().is_ok() {
+            refined.domains = self.domains.iter().map(|domain| refine(domain, parts.max(1))).collect();
+        }
+        refined
+    }
+}
+
+fn refine(domain: &DomainTrajectory, parts: usize) -> DomainTrajectory {
+    let gaps = domain.q.len() - 1;
+    let places = || (0..=gaps * parts).map(|k| (k / parts, k % parts));
+    let share = |part: usize| part as f64 / parts as f64;
+    let linear = |value: &dyn Fn(usize) -> f64, (gap, part): (usize, usize)| {
+        if part == 0 { value(gap) } else { value(gap) + share(part) * (value(gap + 1) - value(gap)) }
+    };
+    let instants: Vec<Instant> =
+        places().map(|(gap, part)| instant(domain, (gap as f64 + share(part)) / gaps as f64)).collect();
+    DomainTrajectory {
+        time_s: places().map(|place| linear(&|k| domain.time_s[k], place)).collect(),
+        q: instants.iter().map(|instant| instant.q).collect(),
+        qd: instants.iter().map(|instant| instant.qd).collect(),
+        qdd: instants.iter().map(|instant| instant.qdd).collect(),
+        u: places().map(|place| std::array::from_fn(|i| linear(&|k| domain.u[k][i], place))).collect(),
+        contact_forces: places()
+            .map(|place| {
+                (0..domain.contact_rows.len()).map(|c| linear(&|k| domain.contact_forces[k][c], place)).collect()
+            })
+            .collect(),
+        muscles: domain.muscles.as_ref().map(|muscles| MuscleTrajectory {
+            fibre_length: instants.iter().filter_map(|instant| Some(instant.muscles.as_ref()?.fibre_length)).collect(),
+            fibre_velocity: instants
+                .iter()
+                .filter_map(|instant| Some(instant.muscles.as_ref()?.fibre_length_rate))
+                .collect(),
+            activation: places()
+                .map(|place| std::array::from_fn(|m| linear(&|k| muscles.activation[k][m], place)))
+                .collect(),
+        }),
+        ..domain.clone()
+    }
 }
 
 /// A mesh interval of three points, and a place in it.
@@ -126,6 +174,41 @@ mod tests {
         let x = 1.0 - 2.0 * t;
         let n1 = f64::from(n);
         [x.powi(n), -2.0 * n1 * x.powi(n - 1), 4.0 * n1 * (n1 - 1.0) * x.powi(n - 2)]
+    }
+
+    #[test]
+    fn a_refined_domain_keeps_its_points_and_is_smooth_between_them() {
+        let points = 5;
+        let at = |k: usize| power(5, k as f64 / (points - 1) as f64);
+        let row = |value: f64| [value; 9];
+        let domain = DomainTrajectory {
+            name: "SS2_R".to_owned(),
+            duration_s: 1.0,
+            time_s: (0..points).map(|k| 0.25 * k as f64).collect(),
+            q: (0..points).map(|k| row(at(k)[0])).collect(),
+            qd: (0..points).map(|k| row(at(k)[1])).collect(),
+            qdd: (0..points).map(|k| row(at(k)[2])).collect(),
+            u: (0..points).map(|k| [k as f64; 6]).collect(),
+            contact_rows: Vec::new(),
+            contact_forces: vec![Vec::new(); points],
+            muscles: None,
+            outputs: Vec::new(),
+            bezier: Vec::new(),
+            phase_start_m: 0.0,
+            phase_end_m: 1.0,
+            impulse: None,
+        };
+        let refined = refine(&domain, 3);
+        assert_eq!(refined.q.len(), 13);
+        for k in 0..points {
+            assert!((refined.q[3 * k][4] - domain.q[k][4]).abs() < 1e-12);
+            assert_eq!(refined.u[3 * k], domain.u[k]);
+        }
+        for (time, (q, qd)) in refined.time_s.iter().zip(refined.q.iter().zip(&refined.qd)) {
+            let wanted = power(5, *time);
+            assert!((q[0] - wanted[0]).abs() < 1e-12 && (qd[0] - wanted[1]).abs() < 1e-11, "{time}");
+        }
+        assert!((refined.u[1][0] - 1.0 / 3.0).abs() < 1e-12);
     }
 
     #[test]

@@ -4,9 +4,12 @@ use super::{DomainTrajectory, Gait};
 use crate::subject::ModelError;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain};
 
+/// What is known twice agrees up to this, s or m/s.
+const ROUNDING: f64 = 1e-6;
+
 impl Gait {
     /// Checks subject, device, bounds and settings against their ranges, and that the eight domains are complete, in
-    /// order, of matching lengths and finite.
+    /// order, of matching lengths and times, and finite.
     ///
     /// # Errors
     /// [`ModelError`] naming what is wrong.
@@ -17,11 +20,31 @@ impl Gait {
         self.settings.validate()?;
         ModelError::check_range("number of domains", self.domains.len() as f64, 8.0, 8.0)?;
         ModelError::check_range("stride_length_m", self.stride_length_m, 0.01, 10.0)?;
+        let mut elapsed = 0.0;
         for (trajectory, domain) in self.domains.iter().zip(CYCLE) {
             check(trajectory, domain, self.muscles)
+                .and_then(|()| check_times(trajectory, elapsed))
                 .map_err(|reason| ModelError::Malformed { what: format!("gait, domain {}", domain.name()), reason })?;
+            elapsed += trajectory.duration_s;
+        }
+        for (field, found, expected) in [
+            ("stride_time_s", self.stride_time_s, elapsed),
+            ("speed_m_s", self.speed_m_s, self.stride_length_m / elapsed),
+        ] {
+            ModelError::check_range(field, found, expected - ROUNDING, expected + ROUNDING)?;
         }
         Ok(())
+    }
+}
+
+/// `Err` in words when the points are not evenly spaced from the end of the domain before.
+fn check_times(trajectory: &DomainTrajectory, start_s: f64) -> Result<(), String> {
+    let gaps = (trajectory.time_s.len() - 1) as f64;
+    let planned = |k: usize| start_s + trajectory.duration_s * k as f64 / gaps;
+    let in_time = |(k, time): (usize, &f64)| (time - planned(k)).abs() <= ROUNDING;
+    match trajectory.time_s.iter().enumerate().position(|point| !in_time(point)) {
+        Some(k) => Err(format!("time_s[{k}] is {}, expected {:.6} by the durations", trajectory.time_s[k], planned(k))),
+        None => Ok(()),
     }
 }
 
@@ -69,13 +92,18 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
     if let Some((name, found, expected)) = lengths.into_iter().find(|(_, found, expected)| found != expected) {
         return Err(format!("{name} has {found} entries, expected {expected}"));
     }
+    let impulses = trajectory.impulse.as_ref().map(Vec::len);
+    let expected = domain.opens_with_impact().then_some(contacts.len());
+    if impulses != expected {
+        return Err(format!("impulse has {impulses:?} entries, expected {expected:?}"));
+    }
     let forward = trajectory.phase_end_m > trajectory.phase_start_m;
     if !(forward && trajectory.duration_s > 0.0 && trajectory.duration_s.is_finite()) {
         return Err("duration_s and phase_end_m - phase_start_m must be positive".to_owned());
     }
     let angles = trajectory.q.iter().chain(&trajectory.qd).chain(&trajectory.qdd).flatten();
     let efforts = trajectory.u.iter().flatten().chain(trajectory.contact_forces.iter().flatten());
-    let curves = trajectory.bezier.iter().flatten();
+    let curves = trajectory.bezier.iter().flatten().chain(trajectory.impulse.iter().flatten());
     if angles.chain(efforts).chain(curves).all(|value| value.is_finite()) {
         Ok(())
     } else {

@@ -1,12 +1,9 @@
 //! A recording of joint angles over several strides, in the walker's convention, with what was done to get there.
 
+use super::LARGEST_ANGLE_RAD;
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table};
-use std::f64::consts::PI;
-
-/// Largest angle of a recording, rad: a wrong unit exceeds it.
-const LARGEST_ANGLE_RAD: f64 = PI;
 
 /// Joint angles over time: torso, hip_L, knee_L, ankle_L, hip_R, rad, of the seven-link walker.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,9 +61,20 @@ impl Recording {
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
-    pub fn with_force_file(mut self, what: &str, text: &str, column: &str) -> Result<Self, ModelError> {
-        let table = StorageFile::read(what, text)?.table;
-        self.right_force = Some(VerticalForce::of(&table, column)?);
+    pub fn with_force_file(self, what: &str, text: &str, column: &str) -> Result<Self, ModelError> {
+        self.with_force(what, &StorageFile::read(what, text)?.table, column)
+    }
+
+    /// The same from the `fp` table of the trial of Camargo et al. 2021, written as its `ik` table was.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn with_camargo_forces(self, what: &str, text: &str, column: &str) -> Result<Self, ModelError> {
+        self.with_force(what, &camargo_table(what, text)?, column)
+    }
+
+    fn with_force(mut self, what: &str, table: &Table, column: &str) -> Result<Self, ModelError> {
+        self.right_force = Some(VerticalForce::of(table, column)?);
         self.steps.push(format!("{what}: {} rows, {column} is the force under the right foot", table.len()));
         Ok(self)
     }
@@ -78,8 +86,7 @@ impl Recording {
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_camargo_csv(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = text.lines().collect();
-        let table = Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))?;
+        let table = camargo_table(what, text)?;
         let mut steps =
             vec![format!("{what}: Camargo 2021 inverse kinematics, {} rows, angles in degrees", table.len())];
         Self::from_opensim_columns(what, &table, AngleUnit::Degrees.in_radians(), None, &mut steps)
@@ -160,4 +167,10 @@ impl Recording {
         let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
         Ok(Self { what: what.to_owned(), time_s: table.times(), angles_rad, knee_r_rad, right_force, steps })
     }
+}
+
+/// A table of Camargo et al. 2021: the first column has the time, s.
+fn camargo_table(what: &str, text: &str) -> Result<Table, ModelError> {
+    let lines: Vec<&str> = text.lines().collect();
+    Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))
 }

@@ -6,12 +6,16 @@ use crate::subject::{ModelError, Subject};
 
 /// Durations of strides that are kept, s.
 pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
+/// A stride with more than so long between two rows is not wholly recorded, s.
+const LONGEST_GAP_S: f64 = 0.1;
 /// Vertical force that tells contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
 /// A heel strike by force comes after at least so long without contact, s.
 const SHORTEST_SWING_S: f64 = 0.1;
 /// A heel strike by kinematics is the farthest forward heel within so long before and after, s.
 const NEIGHBOURHOOD_S: f64 = 0.3;
+/// So many heel strikes are written down one by one.
+const MANY_STRIKES: usize = 200;
 /// Thigh and shank, in body heights (Winter 2009).
 const LEG: [f64; 2] = [0.245, 0.246];
 
@@ -36,7 +40,7 @@ pub struct Walker {
 }
 
 impl Walker {
-    fn validate(&self) -> Result<(), ModelError> {
+    pub(super) fn validate(&self) -> Result<(), ModelError> {
         for (field, value, (low, high)) in [
             ("height_m", self.height_m, Subject::HEIGHT_RANGE_M),
             ("body_mass_kg", self.body_mass_kg, Subject::BODY_MASS_RANGE_KG),
@@ -78,6 +82,14 @@ pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<
         return Err(ModelError::Malformed { what: what.to_owned(), reason });
     }
     Ok(())
+}
+
+/// Times, s; of many, the first and the last.
+fn in_words(times: &[f64]) -> String {
+    match times {
+        [first, .., last] if times.len() > MANY_STRIKES => format!("{first:.4} to {last:.4}"),
+        few => few.iter().map(|time| format!("{time:.4}")).collect::<Vec<_>>().join(", "),
+    }
 }
 
 impl Recording {
@@ -145,6 +157,11 @@ impl Recording {
         std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
     }
 
+    /// Whether no row is missing between two times.
+    fn is_whole(&self, start: f64, end: f64) -> bool {
+        self.time_s.windows(2).all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S)
+    }
+
     /// The mean stride with its standard deviation, as a reference.
     ///
     /// # Errors
@@ -156,10 +173,11 @@ impl Recording {
             .windows(2)
             .map(|pair| (pair[0], pair[1]))
             .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
+            .filter(|(start, end)| self.is_whole(*start, *end))
             .collect();
+        let kept = format!("{} to {} s, without a gap of {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
-            let reason =
-                format!("none of {} strides lasts {} to {} s", strikes.len() - 1, STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+            let reason = format!("none of {} strides lasts {kept}", strikes.len() - 1);
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let count = strides.len() as f64;
@@ -180,12 +198,10 @@ impl Recording {
             HeelStrikes::Kinematics => "by the farthest forward right heel (Zeni et al. 2008)",
         };
         let mut steps = self.steps.clone();
-        steps.push(format!("{} right heel strikes {found}", strikes.len()));
+        steps.push(format!("{} right heel strikes {found}: {} s", strikes.len(), in_words(&strikes)));
         steps.push(format!(
-            "mean of {} strides of {} to {} s ({} dropped), {REFERENCE_ROWS} points each",
+            "mean of {} strides of {kept} ({} dropped), {REFERENCE_ROWS} points each, linear between rows",
             strides.len(),
-            STRIDE_RANGE_S.0,
-            STRIDE_RANGE_S.1,
             strikes.len() - 1 - strides.len()
         ));
         let reference = ReferenceGait {

@@ -6,6 +6,7 @@ use super::output::tell;
 use super::serve::interrupted;
 use crate::document;
 use crate::error::Error;
+use crate::studies::device;
 use clap::Args;
 use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, Mesh, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
@@ -32,23 +33,19 @@ pub(super) struct ProblemFiles {
 impl ProblemFiles {
     pub(super) fn device(&self) -> Result<Device, Error> {
         Ok(match &self.device {
-            Some(path) => {
-                let device: Device = read_document(path, "a device file")?;
-                device.validate()?;
-                device
-            }
+            Some(path) => read_document(path, "a device file", device::check)?,
             None => Device::ampro3()?,
         })
     }
 
     /// Validated as far as they stand in the file.
     pub(super) fn settings(&self) -> Result<GaitSettings, Error> {
-        let settings: GaitSettings = match &self.settings {
-            Some(path) => read_document(path, "settings of the gait problem")?,
+        Ok(match &self.settings {
+            Some(path) => {
+                read_document(path, "settings of the gait problem", |read: &GaitSettings| Ok(read.validate()?))?
+            }
             None => GaitSettings::default(),
-        };
-        settings.validate()?;
-        Ok(settings)
+        })
     }
 
     pub(super) fn reference(&self) -> Result<ReferenceGait, Error> {
@@ -59,9 +56,7 @@ impl ProblemFiles {
 /// The reference gait of a file, or the built-in one.
 pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> {
     let Some(path) = path else { return Ok(ReferenceGait::builtin()?) };
-    let reference: ReferenceGait = read_document(path, "a reference gait")?;
-    reference.validate()?;
-    Ok(reference)
+    read_document(path, "a reference gait", |read: &ReferenceGait| Ok(read.validate()?))
 }
 
 #[derive(Debug, Clone, Args)]
@@ -117,7 +112,7 @@ impl ProblemFlags {
 
     pub(super) fn warm_start(&self) -> Result<Option<WarmStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let outcome: SolveOutcome = read_document(path, "a file of `gaitwright solve --out`")?;
+        let outcome: SolveOutcome = read_document(path, "a file of `gaitwright solve --out`", |_| Ok(()))?;
         Ok(Some(outcome.warm_start))
     }
 }
@@ -126,8 +121,14 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
 }
 
-fn read_document<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T, Error> {
-    document::read(read(path)?.as_bytes()).map_err(|e| Error::Malformed(format!("{}: not {what}: {e}", path.display())))
+/// A file, read and checked; what is wrong is told with its name.
+fn read_document<T: DeserializeOwned>(
+    path: &Path,
+    what: &str,
+    check: impl Fn(&T) -> Result<(), Error>,
+) -> Result<T, Error> {
+    let read = document::read(read(path)?.as_bytes()).and_then(|read| check(&read).map(|()| read));
+    read.map_err(|e| Error::Malformed(format!("{}: not {what}: {e}", path.display())))
 }
 
 /// A token that the first Ctrl-C cancels.

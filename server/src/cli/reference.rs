@@ -22,10 +22,12 @@ pub(super) struct Reference {
     /// Unit of an OpenSim file whose header does not say it.
     #[arg(long, value_enum)]
     unit: Option<Unit>,
-    /// Column of the vertical force under the right foot in an OpenSim file; default with --forces: ground_force_vy.
+    /// Column of the vertical force under the right foot in an OpenSim file; default with --forces: ground_force_vy, of
+    /// Camargo 2021 Treadmill_R_vy.
     #[arg(long, value_name = "NAME")]
     force_column: Option<String>,
-    /// The OpenSim file with this column, where it is not the recording itself; both have one clock.
+    /// The file with this column, where it is not the recording itself: an OpenSim file, or with --form camargo the fp
+    /// table as CSV. Both have one clock.
     #[arg(long, value_name = "FILE")]
     forces: Option<PathBuf>,
     /// How right heel strikes are found.

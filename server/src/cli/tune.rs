@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Store, commit};
 use crate::studies::plan::NewStudy;
+use crate::studies::recommended::{CertificateState, MOST_EXAMINED};
 use crate::studies::summary::{self, Summary};
 use crate::studies::{catalogue, device, recording};
 use clap::Args;
@@ -67,10 +68,10 @@ impl Tune {
         };
         let study = Box::pin(unattended::study(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
-        let ran = unattended::run(&store, &study, workers, lines).await;
+        let ran = Box::pin(unattended::run_and_examine(&store, &study, workers, lines)).await;
         store.close().await;
-        let ran = ran?;
-        self.print(&summary::of(&ran.standing).map_err(Error::Learner)?)?;
+        let (ran, judged) = ran?;
+        self.print(&summary::of(&ran.standing, judged).map_err(Error::Learner)?)?;
         if ran.interrupted {
             let done = ran.standing.trials.len() - ran.standing.open();
             tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
@@ -98,10 +99,31 @@ impl Tune {
                 if let Some(cost) = summary.best_cost_of_transport {
                     data(&format!("  cost of transport {cost:.4}"))?;
                 }
+                certificate_lines(summary).iter().try_for_each(|line| data(line))?;
             }
             _ => data("no trial gave a gait")?,
         }
         tell(&format!("look at it: gaitwright serve --database {}", self.database.display()));
         Ok(())
     }
+}
+
+/// What the certificate of the best gait says, and where it failed, what to take in its place.
+fn certificate_lines(summary: &Summary) -> Vec<String> {
+    let mut lines = vec![format!("  certificate       {}", summary.best_certificate.as_str().replace('_', " "))];
+    lines.extend(summary.best_objections.iter().map(|objection| format!("    {objection}")));
+    if summary.best_certificate != CertificateState::Failed {
+        return lines;
+    }
+    match &summary.passing {
+        Some(trial) => {
+            let rmse = trial.gait_rmse_rad.map_or_else(String::new, |rmse| format!(": Gait RMSE {rmse:.4} rad"));
+            lines.push(format!("best gait that passes its certificate: trial {}{rmse}", trial.number));
+            lines.push(format!("  action            {}", action_line(&trial.action)));
+        }
+        None => lines.push(format!("none of the {MOST_EXAMINED} best gaits passes its certificate")),
+    }
+    lines
+        .push("a finer mesh often passes with the same bounds: gaitwright solve --mesh 8,8,12,12 --certify".to_owned());
+    lines
 }

@@ -9,6 +9,7 @@ use crate::store::trials::{Trial, TrialState};
 use crate::store::{Store, commit, studies, trials as trial_rows};
 use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
+use crate::studies::recommended::{self, Judged};
 use crate::studies::standing::Standing;
 use crate::studies::summary;
 use crate::workers::{GaitSolver, InProcess};
@@ -86,6 +87,24 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
         ended?;
     }
     Ok(Run { standing, interrupted })
+}
+
+/// Runs a study and examines its best gaits, if nobody stopped it.
+pub(super) async fn run_and_examine(
+    store: &Store,
+    study: &Study,
+    workers: usize,
+    lines: Lines,
+) -> Result<(Run, Judged), Error> {
+    let ran = run(store, study, workers, lines).await?;
+    let judged = if ran.interrupted { Judged::default() } else { examined(store, &ran.standing).await? };
+    Ok((ran, judged))
+}
+
+/// Examines the best gaits of a study.
+pub(super) async fn examined(store: &Store, standing: &Standing) -> Result<Judged, Error> {
+    tell("examining the best gait");
+    recommended::examine(store, &Actor::terminal(), standing).await
 }
 
 /// Shows progress until the study ends.

@@ -10,6 +10,8 @@ pub enum Stroke {
     Solid,
     /// A dashed line.
     Dashed,
+    /// A dotted line.
+    Dotted,
     /// Points only.
     Points,
     /// A line that holds its value until the next point, with a mark at each.
@@ -263,6 +265,7 @@ impl Stroke {
         match self {
             Self::Solid | Self::Steps | Self::Marked => "solid",
             Self::Dashed | Self::DashedSteps => "dashed",
+            Self::Dotted => "dotted",
             Self::Points => "points",
         }
     }
@@ -300,7 +303,7 @@ impl Series {
             }
             write!(svg, "\"/>")?;
         }
-        if !matches!(self.stroke, Stroke::Solid | Stroke::Dashed) {
+        if !matches!(self.stroke, Stroke::Solid | Stroke::Dashed | Stroke::Dotted) {
             for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
                 write!(svg, "<circle class=\"dot c{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\"/>", px(x), py(y))?;
             }

@@ -20,7 +20,7 @@ pub fn over_reference(chart: Chart, reference: &ReferenceGait, column: usize) ->
         }
         None => chart,
     };
-    chart.with("reference", COLOUR, Stroke::Dashed, rows.map(|row| (row as f64, mean(row))).collect())
+    chart.with("reference", COLOUR, Stroke::Dotted, rows.map(|row| (row as f64, mean(row))).collect())
 }
 
 /// What is to be known of the band, in words.

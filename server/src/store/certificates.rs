@@ -18,6 +18,18 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Cer
         .transpose()
 }
 
+/// Whether a trial's gait passed the present examination, if it was made.
+///
+/// # Errors
+/// What the database reports.
+pub async fn passed(db: &mut Connection, trial: TrialId) -> StoreResult<Option<bool>> {
+    Ok(sqlx::query_scalar("select passed from certificates where trial_id = ? and format_version = ?")
+        .bind(trial)
+        .bind(certificate::FORMAT_VERSION)
+        .fetch_optional(db)
+        .await?)
+}
+
 /// Keeps a certificate. `false` when there was one: it is deterministic, so both are the same.
 ///
 /// # Errors

@@ -88,6 +88,30 @@ pub fn best_trial(standing: &Standing) -> Result<Option<TrialId>, LearnerError> 
     }
 }
 
+/// The gaits of a study that nobody called unsafe, the recommended one first, then by posterior mean; of a large study, the
+/// best one alone.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn ranking(standing: &Standing) -> Result<Vec<TrialId>, LearnerError> {
+    let best = best_to_show(standing)?;
+    if standing.trials.len() >= MANY {
+        return Ok(best.into_iter().collect());
+    }
+    let plan = &standing.study.plan;
+    let belief = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
+    let mut ranked = Vec::new();
+    let open = |trial: &&Trial| trial.state == TrialState::Converged && !standing.objections.closes(trial.id);
+    for trial in standing.trials.iter().filter(open) {
+        ranked.push((belief.mean(trial.action_index)?, trial.id));
+    }
+    ranked.sort_by(|(mean_a, a), (mean_b, b)| {
+        let first = |id: &TrialId| best != Some(*id);
+        first(a).cmp(&first(b)).then(mean_b.total_cmp(mean_a))
+    });
+    Ok(ranked.into_iter().map(|(_, id)| id).collect())
+}
+
 /// From so many trials on, pages show what the learner last believed instead of asking it anew.
 pub const MANY: usize = 400;
 

@@ -8,13 +8,21 @@ use crate::store::devices::{self, Device};
 use gait_optimizer::Device as Definition;
 use serde_json::json;
 
+/// Checks a device's name and numbers.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub fn check(definition: &Definition) -> Result<(), Error> {
+    printable::name("device.name", &definition.name, 80)?;
+    Ok(definition.validate()?)
+}
+
 /// Checks a device and writes it; the one that is there already where it is the very same.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<Device, Error> {
-    printable::name("device.name", &definition.name, 80)?;
-    definition.validate()?;
+    check(definition)?;
     let (device, added) = devices::ensure(writer, definition).await?;
     if added {
         let detail = json!({ "name": device.name });

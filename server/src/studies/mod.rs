@@ -24,6 +24,7 @@ mod next_step;
 pub mod objections;
 pub mod person;
 pub mod plan;
+pub mod recommended;
 pub mod record;
 pub mod recording;
 mod rehearsal;

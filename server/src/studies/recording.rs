@@ -16,6 +16,8 @@ use utoipa::ToSchema;
 const LONGEST_NAME: usize = 200;
 /// The right foot's force in the files of OpenSim's examples.
 const FORCE_COLUMN: &str = "ground_force_vy";
+/// The right foot's force in the `fp` tables of Camargo 2021.
+const CAMARGO_FORCE_COLUMN: &str = "Treadmill_R_vy";
 /// Longest provenance: comments of a recording become part of it.
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
@@ -76,11 +78,12 @@ pub struct NewReferenceGait {
     /// Unit of an OpenSim file whose header does not say it.
     #[serde(default)]
     pub unit: Option<Unit>,
-    /// Column of the vertical force under the right foot in an OpenSim file; by default `ground_force_vy` where `forces` is
-    /// given.
+    /// Column of the vertical force under the right foot in an OpenSim file; where `forces` is given, by default
+    /// `ground_force_vy`, and `Treadmill_R_vy` in a table of Camargo 2021.
     #[serde(default)]
     pub force_column: Option<String>,
-    /// Text of the OpenSim file that has this column, where it is not the recording itself; both have one clock.
+    /// Text of the file that has this column, where it is not the recording itself: an OpenSim file, or the `fp` table
+    /// beside an `ik` table of Camargo 2021. Both have one clock.
     #[serde(default)]
     pub forces: Option<String>,
     /// How right heel strikes are found where they are not given.
@@ -115,8 +118,15 @@ impl NewReferenceGait {
         };
         let recording = match &self.forces {
             Some(text) => {
-                let column = self.force_column.as_deref().unwrap_or(FORCE_COLUMN);
-                recording.with_force_file(&format!("{what}: forces"), text, column)?
+                let (what, column) = (format!("{what}: forces"), self.force_column.as_deref());
+                match self.form {
+                    Form::Camargo => {
+                        recording.with_camargo_forces(&what, text, column.unwrap_or(CAMARGO_FORCE_COLUMN))?
+                    }
+                    Form::Opensim | Form::Csv => {
+                        recording.with_force_file(&what, text, column.unwrap_or(FORCE_COLUMN))?
+                    }
+                }
             }
             None => recording,
         };

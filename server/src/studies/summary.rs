@@ -1,6 +1,7 @@
 //! A study in one document: what `tune --json` prints, a contract for scripts.
 
 use super::choice::best_trial;
+use super::recommended::{CertificateState, Judged};
 use super::standing::Standing;
 use crate::store::studies::StudyState;
 use crate::store::trials::{Trial, TrialState};
@@ -24,6 +25,12 @@ pub struct Summary {
     pub best_gait_rmse_rad: Option<f64>,
     /// Its cost of transport.
     pub best_cost_of_transport: Option<f64>,
+    /// What the certificate of its gait says.
+    pub best_certificate: CertificateState,
+    /// Why that failed, in words.
+    pub best_objections: Vec<String>,
+    /// Where it failed: the best trial whose gait passed.
+    pub passing: Option<TrialSummary>,
     /// Every trial, by number.
     pub trials: Vec<TrialSummary>,
 }
@@ -55,11 +62,11 @@ pub struct TrialSummary {
     pub warm_started_from: Option<u32>,
 }
 
-/// The summary of a study.
+/// The summary of a study, with what is known of its certificates.
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn of(standing: &Standing) -> Result<Summary, LearnerError> {
+pub fn of(standing: &Standing, judged: Judged) -> Result<Summary, LearnerError> {
     let best = best_trial(standing)?.and_then(|id| standing.trial(id));
     Ok(Summary {
         study_id: standing.study.id,
@@ -68,6 +75,9 @@ pub fn of(standing: &Standing) -> Result<Summary, LearnerError> {
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        best_certificate: judged.verdict,
+        best_objections: judged.objections,
+        passing: judged.passing.and_then(|id| standing.trial(id)).map(|trial| line(trial, &standing.trials)),
         trials: standing.trials.iter().map(|trial| line(trial, &standing.trials)).collect(),
     })
 }

@@ -1,6 +1,7 @@
 //! With muscles against without, per subject and seed; as tables and in words.
 
 use crate::studies::history::Milestone;
+use crate::studies::recommended::CertificateState;
 use gait_optimizer::{Gait, ReferenceGait};
 use std::fmt::Write;
 
@@ -40,9 +41,38 @@ pub(super) struct Outcome {
     pub(super) best_rmse_rad: Option<f64>,
     pub(super) best_cost_of_transport: Option<f64>,
     pub(super) best_bounds: Option<String>,
+    /// What the certificate of the best gait says.
+    pub(super) certificate: CertificateState,
+    /// Why that failed, in words.
+    pub(super) objections: Vec<String>,
+    /// Where it failed: number and Gait RMSE, rad, of the best trial whose gait passed.
+    pub(super) passing: Option<(u32, Option<f64>)>,
     pub(super) curve: Option<Curve>,
     /// What Gait RMSE was measured by.
     pub(super) reference: ReferenceGait,
+}
+
+impl Outcome {
+    /// What the certificate of the best gait says, and which gait passes where that one does not.
+    pub(super) fn certificate_in_words(&self) -> String {
+        match (self.certificate, self.passing) {
+            (CertificateState::Passed, _) => "passed".to_owned(),
+            (CertificateState::NotExamined, _) => "not examined".to_owned(),
+            (CertificateState::Failed, None) => "failed".to_owned(),
+            (CertificateState::Failed, Some((number, rmse))) => {
+                let rmse = rmse.map_or_else(String::new, |rmse| format!(" ({rmse:.4} rad)"));
+                format!("failed; trial {number}{rmse} passes")
+            }
+        }
+    }
+
+    /// Why the certificate of the best gait failed; none: it did not.
+    pub(super) fn failure_in_words(&self) -> Option<String> {
+        let with = if self.muscles { "with" } else { "without" };
+        let objections = self.objections.join("; ");
+        let who = format!("subject {}, seed {}, {with} muscles", self.subject, self.seed);
+        (self.certificate == CertificateState::Failed).then(|| format!("{who}: {objections}"))
+    }
 }
 
 /// Fills the iterations between milestones: a recommendation holds until the next one.
@@ -173,12 +203,12 @@ pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
 /// One row per study.
 pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
     let mut text = "subject,seed,muscles,trials,converged,best_trial,best_gait_rmse_rad,best_cost_of_transport,\
-                    solve_seconds,best_bounds\n"
+                    solve_seconds,best_bounds,certificate,passing_trial,passing_gait_rmse_rad\n"
         .to_owned();
     for o in outcomes {
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{:.1},{}",
+            "{},{},{},{},{},{},{:.1},{},{},{},{}",
             variant(o),
             o.trials,
             o.converged,
@@ -186,7 +216,10 @@ pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
             cell(o.best_rmse_rad),
             cell(o.best_cost_of_transport),
             o.seconds,
-            o.best_bounds.as_deref().unwrap_or("")
+            o.best_bounds.as_deref().unwrap_or(""),
+            o.certificate.as_str(),
+            o.passing.map_or_else(String::new, |(number, _)| number.to_string()),
+            cell(o.passing.and_then(|(_, rmse)| rmse)),
         );
     }
     text
@@ -232,6 +265,9 @@ mod tests {
             best_trial: Some(1),
             best_cost_of_transport: Some(0.06),
             best_bounds: None,
+            certificate: CertificateState::Failed,
+            objections: vec!["the simulated walker falls".to_owned()],
+            passing: Some((2, Some(0.625))),
             curve: None,
             reference: ReferenceGait::builtin().unwrap(),
         }
@@ -277,6 +313,6 @@ mod tests {
             iterations_csv(&outcomes),
             "subject,seed,muscles,iteration,best_gait_rmse_rad\n1,1,off,1,\n1,1,off,2,0.5\n"
         );
-        assert!(studies_csv(&outcomes).ends_with("\n1,1,off,2,2,1,0.5,0.06,1.0,\n"));
+        assert!(studies_csv(&outcomes).ends_with("\n1,1,off,2,2,1,0.5,0.06,1.0,,failed,2,0.625\n"));
     }
 }

@@ -2,6 +2,7 @@
 
 mod comparison;
 mod report;
+mod statements;
 
 use super::Ended;
 use super::numbers::{seed, trials, whole};
@@ -16,6 +17,7 @@ use crate::studies::catalogue;
 use crate::studies::choice::best_trial;
 use crate::studies::history;
 use crate::studies::plan::{self, NewStudy};
+use crate::studies::recommended::Judged;
 use crate::studies::standing::Standing;
 use clap::{Args, ValueEnum};
 use comparison::{Curve, Outcome};
@@ -136,7 +138,8 @@ impl Reproduce {
                         ran.standing
                     };
                     failures.extend(unattended::failure(&standing).map(|failure| format!("{title}: {failure}")));
-                    outcomes.push(outcome(store, subject, muscles, seed, &standing, reference).await?);
+                    let judged = unattended::examined(store, &standing).await?;
+                    outcomes.push(outcome(store, subject, muscles, seed, &standing, judged, reference).await?);
                 }
             }
         }
@@ -185,6 +188,7 @@ async fn outcome(
     muscles: bool,
     seed: u64,
     standing: &Standing,
+    judged: Judged,
     reference: &ReferenceGait,
 ) -> Result<Outcome, Error> {
     let milestones = history::of(standing).map_err(Error::Learner)?;
@@ -204,6 +208,9 @@ async fn outcome(
         best_trial: best.map(|trial| trial.number),
         best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        certificate: judged.verdict,
+        objections: judged.objections,
+        passing: judged.passing.and_then(|id| standing.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
         best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
         curve,
         reference: reference.clone(),

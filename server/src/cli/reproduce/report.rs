@@ -1,6 +1,7 @@
 //! The report: one HTML file that needs nothing beside it.
 
 use super::comparison::{COORDINATES, Outcome, Verdict, conclusion, verdicts};
+use super::statements::{Statement, statements};
 use crate::error::Error;
 use crate::plots::{Chart, Stroke, band_in_words, over_reference};
 use askama::Template;
@@ -15,6 +16,11 @@ struct Report<'a> {
     version: &'static str,
     trials: u32,
     conclusion: String,
+    statements: Vec<Statement>,
+    /// Of all solves together, s.
+    seconds: f64,
+    /// Why certificates of best gaits failed.
+    failures: Vec<String>,
     /// Name of the reference, and what is to be known of its band.
     reference: Option<(&'a str, &'static str)>,
     verdicts: Vec<Verdict>,
@@ -46,6 +52,9 @@ pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
         version: env!("CARGO_PKG_VERSION"),
         trials,
         conclusion: conclusion(&verdicts),
+        statements: statements(outcomes, &verdicts),
+        seconds: outcomes.iter().map(|outcome| outcome.seconds).sum(),
+        failures: outcomes.iter().filter_map(Outcome::failure_in_words).collect(),
         reference: outcomes.first().map(|o| (o.reference.name.as_str(), band_in_words(&o.reference))),
         verdicts,
         outcomes,
@@ -63,8 +72,9 @@ fn label(outcome: &Outcome) -> &'static str {
     if outcome.muscles { "with muscles" } else { "without muscles" }
 }
 
-fn look(outcome: &Outcome) -> (usize, Stroke) {
-    if outcome.muscles { (0, Stroke::Steps) } else { (1, Stroke::Steps) }
+/// Colour, stroke of what goes in steps, stroke of a curve.
+fn look(outcome: &Outcome) -> (usize, Stroke, Stroke) {
+    if outcome.muscles { (0, Stroke::Steps, Stroke::Solid) } else { (1, Stroke::DashedSteps, Stroke::Dashed) }
 }
 
 /// Figure 3b of the paper.
@@ -73,7 +83,7 @@ fn rmse_chart(verdict: &Verdict, pair: &[&Outcome]) -> Chart {
     let mut chart = Chart::new(&title, "iteration", "Gait RMSE, rad");
     chart.whole_x = true;
     for outcome in pair {
-        let (colour, stroke) = look(outcome);
+        let (colour, stroke, _) = look(outcome);
         let values = outcome.by_iteration.iter().enumerate();
         let points = values.map(|(i, rmse)| ((i + 1) as f64, rmse.unwrap_or(f64::NAN))).collect();
         chart = chart.with(label(outcome), colour, stroke, points);
@@ -96,7 +106,8 @@ fn angle_chart(verdict: &Verdict, pair: &[&Outcome], coordinate: usize) -> Chart
     }
     for outcome in pair {
         if let Some(curve) = &outcome.curve {
-            chart = chart.with(label(outcome), look(outcome).0, Stroke::Solid, points(&curve.0));
+            let (colour, _, stroke) = look(outcome);
+            chart = chart.with(label(outcome), colour, stroke, points(&curve.0));
         }
     }
     chart

@@ -6,8 +6,10 @@ use crate::http::AppState;
 use crate::http::may::May;
 use crate::http::negotiate::csv_answer;
 use crate::http::shown::Shown;
+use crate::store::trials::Trial;
 use crate::store::{StudyId, TrialId, schema, studies};
-use crate::studies::choice::best_to_show;
+use crate::studies::choice::ranking;
+use crate::studies::recommended::{self, CertificateState};
 use crate::studies::standing::Standing;
 use axum::Json;
 use axum::extract::State;
@@ -21,6 +23,19 @@ use utoipa::ToSchema;
 pub(super) struct Recommendation {
     study_id: StudyId,
     study: String,
+    #[serde(flatten)]
+    best: Recommended,
+    /// What the certificate of its gait says.
+    certificate: CertificateState,
+    /// Why that failed, in words.
+    objections: Vec<String>,
+    /// Where it failed: the best action whose gait is known to pass.
+    passing: Option<Recommended>,
+}
+
+/// An action that a trial tried.
+#[derive(Debug, Serialize, ToSchema)]
+struct Recommended {
     /// The trial that tried it.
     trial_id: TrialId,
     /// Its number.
@@ -32,6 +47,18 @@ pub(super) struct Recommendation {
     gait_rmse_rad: Option<f64>,
     /// Its cost of transport.
     cost_of_transport: Option<f64>,
+}
+
+impl From<&Trial> for Recommended {
+    fn from(trial: &Trial) -> Self {
+        Self {
+            trial_id: trial.id,
+            number: trial.number,
+            bounds: trial.action,
+            gait_rmse_rad: trial.gait_rmse_rad,
+            cost_of_transport: trial.cost_of_transport,
+        }
+    }
 }
 
 /// `GET /studies/{id}/recommendation`: the visited action that the learner believes to be the best.
@@ -71,15 +98,22 @@ pub(super) async fn of_study_csv(
     State(app): State<AppState>,
     Shown(id): Shown<StudyId>,
 ) -> Result<Response, Error> {
-    let best = read(&app, id).await?;
+    let Recommendation { best, certificate, .. } = read(&app, id).await?;
     let bounds = TunedBounds::NAMES.iter().zip(best.bounds.to_array()).zip(TunedBounds::MEANINGS);
     let rows = bounds
         .map(|((name, value), meaning)| {
             let (limited, unit) = meaning.rsplit_once(", ").unwrap_or((meaning, ""));
-            vec![(*name).to_owned(), value.to_string(), unit.to_owned(), limited.to_owned()]
+            vec![
+                (*name).to_owned(),
+                value.to_string(),
+                unit.to_owned(),
+                limited.to_owned(),
+                certificate.as_str().to_owned(),
+            ]
         })
         .collect();
-    csv_answer(&format!("bounds-trial-{}.csv", best.number), &["bound", "value", "unit", "limits"], rows)
+    let columns = ["bound", "value", "unit", "limits", "certificate_of_the_gait"];
+    csv_answer(&format!("bounds-trial-{}.csv", best.number), &columns, rows)
 }
 
 async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
@@ -87,22 +121,22 @@ async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
-    let (standing, best) = tokio::task::spawn_blocking(move || {
-        let best = if standing.waits_for_first_answer() { Ok(None) } else { best_to_show(&standing) };
-        (standing, best)
+    let (standing, ranking) = tokio::task::spawn_blocking(move || {
+        let ranking = if standing.waits_for_first_answer() { Ok(Vec::new()) } else { ranking(&standing) };
+        (standing, ranking)
     })
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
-    let trial = best.map_err(Error::Learner)?.and_then(|id| standing.trial(id));
-    let trial =
-        trial.ok_or_else(|| Error::conflict("nothing is recommended yet: no answer says which gait is better"))?;
+    let ranking = ranking.map_err(Error::Learner)?;
+    let none = || Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better");
+    let best = ranking.first().and_then(|id| standing.trial(*id)).ok_or_else(none)?;
+    let judged = recommended::judged(&mut *app.read().await?, &ranking).await?;
     Ok(Recommendation {
         study_id: id,
         study: standing.study.plan.name.clone(),
-        trial_id: trial.id,
-        number: trial.number,
-        bounds: trial.action,
-        gait_rmse_rad: trial.gait_rmse_rad,
-        cost_of_transport: trial.cost_of_transport,
+        best: best.into(),
+        certificate: judged.verdict,
+        objections: judged.objections,
+        passing: judged.passing.and_then(|id| standing.trial(id)).map(Into::into),
     })
 }

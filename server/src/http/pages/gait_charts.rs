@@ -50,6 +50,14 @@ impl Group {
     }
 }
 
+/// So many points are drawn for each of a gait's own.
+const DRAWN_PARTS: usize = 6;
+
+/// A gait as it is drawn: smooth between its mesh points.
+fn drawn(gait: &Gait) -> Gait {
+    gait.refined(DRAWN_PARTS)
+}
+
 /// The points of a gait on the axis of the gait cycle.
 struct Cycle<'a> {
     points: Vec<Point<'a>>,
@@ -66,14 +74,24 @@ impl<'a> Cycle<'a> {
     }
 
     /// A line over the cycle, with a gap between domains: forces, torques and accelerations may jump there.
-    fn over(&self, f: impl FnMut(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
-        self.line(|point| 100.0 * point.time_s / self.end, f)
+    fn over(&self, y: impl FnMut(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
+        self.line(|point| 100.0 * point.time_s / self.end, y, |_| true)
     }
 
-    fn line(&self, x: impl Fn(&Point<'_>) -> f64, mut y: impl FnMut(&Point<'_>) -> f64) -> Vec<(f64, f64)> {
+    /// The orbit of a coordinate, °, °/s, with a gap where an impact makes its velocity jump: before each double support.
+    fn orbit(&self, q: usize) -> Vec<(f64, f64)> {
+        self.line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees(), |domain| domain.starts_with("DS"))
+    }
+
+    fn line(
+        &self,
+        x: impl Fn(&Point<'_>) -> f64,
+        mut y: impl FnMut(&Point<'_>) -> f64,
+        jumps_into: impl Fn(&str) -> bool,
+    ) -> Vec<(f64, f64)> {
         let mut line: Vec<(f64, f64)> = Vec::with_capacity(self.points.len() + 8);
         for (i, point) in self.points.iter().enumerate() {
-            if i > 0 && self.points[i - 1].domain != point.domain {
+            if i > 0 && self.points[i - 1].domain != point.domain && jumps_into(point.domain) {
                 line.push((f64::NAN, f64::NAN));
             }
             line.push((x(point), y(point)));
@@ -97,6 +115,7 @@ pub(super) fn tiles(figures: Vec<StickFigure>) -> Figure {
 /// # Errors
 /// When its subject or device is invalid.
 pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Error> {
+    let gait = &drawn(gait);
     let cycle = Cycle::of(gait);
     let mut groups = vec![angles(&cycle, reference), forces(&cycle), torques(&cycle, gait)];
     if gait.muscles {
@@ -204,9 +223,8 @@ fn muscles(cycle: &Cycle<'_>) -> Group {
 fn portraits(cycle: &Cycle<'_>) -> Group {
     let draw = |(place, name): (usize, &&str)| {
         let q = place + 2;
-        let line = cycle.line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees());
         let colour = if q >= 6 { RIGHT } else { 0 };
-        Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, line)
+        Chart::new(name, "angle, °", "velocity, °/s").with("this gait", colour, Stroke::Solid, cycle.orbit(q))
     };
     let charts = COORDINATES.iter().enumerate().map(draw).collect();
     let hint = "Angle and its velocity over the stride: a closed curve repeats itself; a gap is an impact.";
@@ -239,11 +257,11 @@ pub(super) fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
 
 /// The human joint angles of gaits over a reference: name and gait.
 pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
+    let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |&(title, q, column): &(&str, usize, usize)| {
         let mut chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);
         for (place, (name, gait)) in gaits.iter().enumerate() {
-            let stroke = if place == 0 { Stroke::Solid } else { Stroke::Dashed };
-            chart = chart.with(name, place, stroke, Cycle::of(gait).over(|p| p.q[q].to_degrees()));
+            chart = chart.with(name, place, stroke(place), Cycle::of(gait).over(|p| p.q[q].to_degrees()));
         }
         chart
     };
@@ -252,16 +270,25 @@ pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGai
 
 /// The orbit of each joint, of gaits one over the other: name and gait.
 pub(super) fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
+    let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |(place, title): (usize, &&str)| {
         let mut chart = Chart::new(title, "angle, °", "velocity, °/s");
         for (colour, (name, gait)) in gaits.iter().enumerate() {
-            let q = place + 2;
-            let line = Cycle::of(gait).line(|p| p.q[q].to_degrees(), |p| p.qd[q].to_degrees());
-            chart = chart.with(name, colour, if colour == 0 { Stroke::Solid } else { Stroke::Dashed }, line);
+            chart = chart.with(name, colour, stroke(colour), Cycle::of(gait).orbit(place + 2));
         }
         chart
     };
     if gaits.is_empty() { Vec::new() } else { COORDINATES.iter().enumerate().map(draw).collect() }
+}
+
+/// The orbit of a coordinate of a gait, °, °/s.
+pub(super) fn orbit(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
+    Cycle::of(&drawn(gait)).orbit(coordinate)
+}
+
+/// Of the first gait and of another one.
+fn stroke(place: usize) -> Stroke {
+    if place == 0 { Stroke::Solid } else { Stroke::Dashed }
 }
 
 /// In words.

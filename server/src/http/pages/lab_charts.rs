@@ -1,5 +1,6 @@
 //! The charts of a lab session: muscle activity over the cycle, limit cycles.
 
+use super::gait_charts::orbit;
 use crate::plots::{Chart, Figure, Stroke};
 use crate::studies::lab::{Condition, EmgView, LimitCycles, SessionView};
 use gait_optimizer::Gait;
@@ -96,14 +97,4 @@ pub(super) fn limit_cycles(session: &SessionView, measured: &[(LimitCycles, Opti
         }
     }
     charts
-}
-
-/// Angle and velocity of a coordinate over the stride, with a gap at each impact.
-fn orbit(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
-    let of_domain = |domain: &gait_optimizer::DomainTrajectory| {
-        let points = domain.q.iter().zip(&domain.qd);
-        let points = points.map(|(q, qd)| (q[coordinate].to_degrees(), qd[coordinate].to_degrees()));
-        points.chain([(f64::NAN, f64::NAN)]).collect::<Vec<_>>()
-    };
-    gait.domains.iter().flat_map(of_domain).collect()
 }

@@ -28,6 +28,7 @@ pub(super) struct Fields {
     recording: String,
     unit: String,
     force_column: String,
+    forces: String,
     strikes: Strikes,
     heel_strikes_s: String,
     height_m: String,
@@ -49,7 +50,7 @@ impl Fields {
                 other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
             },
             force_column: given(&self.force_column),
-            forces: None,
+            forces: Some(self.forces.clone()).filter(|text| !text.trim().is_empty()),
             strikes: self.strikes,
             heel_strikes_s: match given(&self.heel_strikes_s) {
                 None => Vec::new(),

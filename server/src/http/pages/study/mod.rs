@@ -22,11 +22,12 @@ use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{
     Instant, StudyId, TrialId, commit, consents, devices, events, presentations, reference_gaits, studies, trials,
 };
-use crate::studies::choice::{MANY, best_trial};
+use crate::studies::choice::{MANY, best_to_show, ranking};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
 use crate::studies::objections::Closed;
+use crate::studies::recommended::{self, CertificateState, Judged};
 use crate::studies::standing::Standing;
 use crate::studies::{command, lifecycle};
 use crate::workers::Track;
@@ -113,6 +114,27 @@ struct Best {
     cost: String,
     bounds: Vec<Bound>,
     has_gait: bool,
+    /// What its certificate says.
+    judged: Judged,
+    /// Where that failed, the best trial whose gait passed.
+    passing: Option<Passing>,
+}
+
+impl Best {
+    fn failed(&self) -> bool {
+        self.judged.verdict == CertificateState::Failed
+    }
+
+    fn passed(&self) -> bool {
+        self.judged.verdict == CertificateState::Passed
+    }
+}
+
+/// A trial whose gait passed its certificate.
+struct Passing {
+    id: TrialId,
+    number: u32,
+    rmse: String,
 }
 
 struct AnswerRow {
@@ -230,6 +252,9 @@ pub(super) struct Figures {
     /// People are to answer and nobody has: what the learner believes then is only what it began with.
     unanswered: bool,
     pub(super) best: Option<TrialId>,
+    /// The gaits, the best one first, and what their certificates say.
+    ranking: Vec<TrialId>,
+    judged: Judged,
     pub(super) history: Vec<Milestone>,
     question: bool,
 }
@@ -261,7 +286,8 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     })
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
-    let figures = figures.map_err(Error::Learner)?;
+    let mut figures = figures.map_err(Error::Learner)?;
+    figures.judged = recommended::judged(&mut *app.read().await?, &figures.ranking).await?;
     let running = standing
         .trials
         .iter()
@@ -274,15 +300,18 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
 
 pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
     if large {
-        let best = standing.trials.last().and_then(|newest| newest.best_before);
+        let best = best_to_show(standing)?;
+        let (ranking, history) = (ranking(standing)?, history::known(standing));
         let question = standing.study.state == StudyState::Waiting;
-        return Ok(Figures { unanswered: false, best, history: history::known(standing), question });
+        return Ok(Figures { unanswered: false, best, ranking, judged: Judged::default(), history, question });
     }
     let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
     if standing.waits_for_first_answer() {
-        return Ok(Figures { unanswered: true, best: None, history: Vec::new(), question });
+        let (ranking, history) = (Vec::new(), Vec::new());
+        return Ok(Figures { unanswered: true, best: None, ranking, judged: Judged::default(), history, question });
     }
-    Ok(Figures { unanswered: false, best: best_trial(standing)?, history: history::of(standing)?, question })
+    let (best, ranking, history) = (best_to_show(standing)?, ranking(standing)?, history::of(standing)?);
+    Ok(Figures { unanswered: false, best, ranking, judged: Judged::default(), history, question })
 }
 
 fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
@@ -318,6 +347,12 @@ fn view(
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
         has_gait: trial.state == TrialState::Converged,
+        passing: figures.judged.passing.and_then(|id| standing.trial(id)).map(|trial| Passing {
+            id: trial.id,
+            number: trial.number,
+            rmse: format::figure(trial.gait_rmse_rad),
+        }),
+        judged: figures.judged.clone(),
     });
     let unsafe_gait = |closed: &Closed| {
         let number = standing.trial(closed.trial)?.number;

@@ -1,0 +1,108 @@
+//! What the certificate of a recommended gait says: nothing is recommended silently whose certificate failed.
+
+use super::choice;
+use super::examination;
+use super::standing::Standing;
+use crate::error::Error;
+use crate::store::audit::Actor;
+use crate::store::{Connection, Store, StoreResult, TrialId, certificates, commit};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// So many of the best gaits are examined in search of one that passes.
+pub const MOST_EXAMINED: usize = 10;
+
+/// What is known of a gait's certificate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CertificateState {
+    /// Every quantity is within its limit, and the gait is stable.
+    Passed,
+    /// Something is not.
+    Failed,
+    /// Nobody asked for it yet.
+    #[default]
+    NotExamined,
+}
+
+impl CertificateState {
+    /// As written in tables.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "failed",
+            Self::NotExamined => "not_examined",
+        }
+    }
+}
+
+/// The certificate of a study's best gait, and the gait to take where that one failed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Judged {
+    /// Of the best gait.
+    pub verdict: CertificateState,
+    /// Why it failed, in words.
+    pub objections: Vec<String>,
+    /// Where the best one failed: the best gait that is known to pass.
+    pub passing: Option<TrialId>,
+    /// The best gait that was not examined, where no better one passed.
+    pub unexamined: Option<TrialId>,
+}
+
+/// Reads what is known of the certificates of gaits, the best one first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Judged> {
+    let mut judged = Judged::default();
+    for (place, &trial) in ranking.iter().enumerate() {
+        let verdict = match certificates::passed(db, trial).await? {
+            Some(true) => CertificateState::Passed,
+            Some(false) => CertificateState::Failed,
+            None => CertificateState::NotExamined,
+        };
+        if place == 0 {
+            judged.verdict = verdict;
+        }
+        match verdict {
+            CertificateState::Passed => {
+                judged.passing = Some(trial).filter(|_| place > 0);
+                break;
+            }
+            CertificateState::Failed => {}
+            CertificateState::NotExamined => drop(judged.unexamined.get_or_insert(trial)),
+        }
+    }
+    if let Some(&best) = ranking.first().filter(|_| judged.verdict == CertificateState::Failed) {
+        judged.objections = certificates::find(db, best).await?.map(|found| found.objections).unwrap_or_default();
+    }
+    Ok(judged)
+}
+
+/// Examines the gaits of a study, the best one first, until one passes or [`MOST_EXAMINED`] have failed.
+///
+/// What is no gait of the walker, as another worker may have sent it, stays unexamined.
+///
+/// # Errors
+/// What learner and database report.
+pub async fn examine(store: &Store, actor: &Actor, standing: &Standing) -> Result<Judged, Error> {
+    let ranking = choice::ranking(standing).map_err(Error::Learner)?;
+    for &trial in ranking.iter().take(MOST_EXAMINED) {
+        let begun = examination::begin(&mut *store.read().await?, trial).await?;
+        let certificate = match examination::certificate(begun).await {
+            Ok(certificate) => certificate,
+            Err(error) if error.is_input() => {
+                tracing::warn!(%trial, %error, "what a trial gave cannot be examined");
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let mut writer = store.write().await?;
+        examination::record(&mut writer, actor, trial, &certificate).await?;
+        commit(writer).await?;
+        if certificate.passed {
+            break;
+        }
+    }
+    Ok(judged(&mut *store.read().await?, &ranking).await?)
+}
