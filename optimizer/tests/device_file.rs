@@ -20,7 +20,8 @@ fn with(field: &str, value: &Value) -> Result<Device, String> {
 
 /// Field and range of every number in the description.
 fn described() -> Vec<(&'static str, f64, f64)> {
-    let rows = DESCRIPTION.lines().filter(|line| line.starts_with("| `"));
+    let devices = DESCRIPTION.split("\n## ").find(|section| section.starts_with("Devices")).unwrap();
+    let rows = devices.lines().filter(|line| line.starts_with("| `"));
     rows.filter_map(|row| {
         let cells: Vec<&str> = row.split('|').map(str::trim).collect();
         let (low, high) = cells[3].split_once(" to ")?;

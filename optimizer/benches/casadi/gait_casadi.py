@@ -26,12 +26,22 @@ CRATE = HERE.parent.parent
 REFERENCE = CRATE / "data" / "reference_gait.csv"
 FIXTURES = CRATE / "tests" / "data"
 
-TRACKING = {"w": [0.0, 10.0], "relaxed": True, "tol": 1e-3, "constr_viol_tol": 1e-5}
-TRACKING |= {"acceptable_tol": 1e-2, "acceptable_iter": 5}
+TRACKING = {"w": [0.0, 10.0], "relaxed": True}
+COST = {"w": [1.0, 0.0], "relaxed": False, "tol": 1e-6, "constr_viol_tol": 1e-7}
+ROUGH = {"tol": 1e-2, "constr_viol_tol": 1e-3, "compl_inf_tol": 1e-2}
+FIRM = {"tol": 1e-3, "constr_viol_tol": 1e-5, "acceptable_tol": 1e-2, "acceptable_iter": 5}
+# By name: those of the crate, and those that this implementation had of its own.
 PHASES = {
-    "tracking": TRACKING | {"muscles": False, "mu_init": 1e-3},
-    "muscle_tracking": TRACKING | {"muscles": True, "mu_init": 1e-2},
-    "cost": {"w": [1.0, 0.0], "relaxed": False, "mu_init": 1e-4, "tol": 1e-6, "constr_viol_tol": 1e-7},
+    "same": {
+        "tracking": TRACKING | ROUGH | {"muscles": False, "mu_init": 1e-3},
+        "muscle_tracking": TRACKING | ROUGH | {"muscles": True, "mu_init": 1e-2},
+        "cost": COST | {"mu_init": 1e-5},
+    },
+    "own": {
+        "tracking": TRACKING | FIRM | {"muscles": False, "mu_init": 1e-3},
+        "muscle_tracking": TRACKING | FIRM | {"muscles": True, "mu_init": 1e-2},
+        "cost": COST | {"mu_init": 1e-4},
+    },
 }
 
 
@@ -81,7 +91,7 @@ class Solver:
             "print_level": 0 if quiet else 5,
             "sb": "yes",
         }
-        names = ("mu_init", "tol", "constr_viol_tol", "acceptable_tol", "acceptable_iter")
+        names = ("mu_init", "tol", "constr_viol_tol", "compl_inf_tol", "acceptable_tol", "acceptable_iter")
         ipopt |= {key: phase[key] for key in names if key in phase}
         ipopt |= extra or {}
         options = {
@@ -129,11 +139,12 @@ def solve(options):
     start = np.array(options["start"], dtype=float)
     backend = options.get("backend", "vm")
     quiet = not options.get("verbose", False)
+    settings = PHASES[options.get("phases", "same")]
     cache = options.get("cache")
     plain = Solver(problem | {"muscles": False}, backend, cache)
     assert start.size == plain.gait.layout.n, f"start has {start.size} variables, not {plain.gait.layout.n}"
     phases, setup, compilation = OrderedDict(), plain.setup_s, plain.compile_s
-    x, phases["tracking"] = plain.solve(start, PHASES["tracking"], quiet=quiet)
+    x, phases["tracking"] = plain.solve(start, settings["tracking"], quiet=quiet)
     last = plain
     guess_s = 0.0
     if problem.get("muscles", False):
@@ -142,8 +153,8 @@ def solve(options):
         started = time.perf_counter()
         x = muscle_guess.guess(plain.gait, last.gait, x)
         guess_s = time.perf_counter() - started
-        x, phases["muscle_tracking"] = last.solve(x, PHASES["muscle_tracking"], quiet=quiet)
-    x, phases["cost"] = last.solve(x, PHASES["cost"], quiet=quiet)
+        x, phases["muscle_tracking"] = last.solve(x, settings["muscle_tracking"], quiet=quiet)
+    x, phases["cost"] = last.solve(x, settings["cost"], quiet=quiet)
     mcot, reg, _ = last.cost(x)
     final = phases["cost"]
     return {
@@ -292,7 +303,7 @@ def check_golden(subject, letter):
     x = golden_x(solver.gait, data)
     objective = float(solver.f(x, [1, 0]))
     assert abs(objective - data["obj"]) < 1e-10, (objective, data["obj"])
-    phase = PHASES["cost"] | {"mu_init": 1e-6 / 11}
+    phase = COST | {"mu_init": 1e-6 / 11}
     stay, figures = solver.solve(x, phase, {"bound_push": 1e-9, "bound_frac": 1e-9, "max_iter": 60})
     difference = abs(figures["objective"] - data["obj"]) / data["obj"]
     print(

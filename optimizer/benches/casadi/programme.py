@@ -241,12 +241,13 @@ class Gait:
         # Inequalities.
         for side in (domain.stance, 1 - domain.stance):
             mine = [c for c in range(nc) if domain.contacts[c][0] // 2 == side]
-            leaves = domain.kind == "DS3" and last and side != domain.stance
-            if mine and not leaves:
+            if mine:
+                leaves = domain.kind == "DS3" and last and side != domain.stance
                 normal = sum(force[c] for c in mine if domain.contacts[c][1] == 1)
                 shear = sum(force[c] for c in mine if domain.contacts[c][1] == 0)
                 mu = self.options["friction"]
-                add("ineq", [(mu * normal - shear) / 500, (mu * normal + shear) / 500], positive)
+                limit = (-ca.inf, ca.inf) if leaves else positive
+                add("ineq", [(mu * normal - shear) / 500, (mu * normal + shear) / 500], limit)
         stance, swing = domain.stance, 1 - domain.stance
         made_zero = {
             ("DS2", "last"): 2 * stance + 1,

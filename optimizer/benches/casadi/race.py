@@ -1,7 +1,7 @@
-"""Ours against CasADi + IPOPT, alternately, from the same start: prints every run, medians and the ratio.
+"""Ours against CasADi + IPOPT, alternately, from the same starts: prints every run, medians and ratios.
 
-    python race.py [--subject 1] [--muscles] [--runs 3] [--backend vm|c] [--guess 1] [--threads 1] [--limit 900]
-        [--json FILE]
+    python race.py [--subject 1 2] [--guess 1 2] [--muscles] [--runs 3] [--backend vm|c] [--phases same|own]
+        [--threads 1] [--limit 900] [--json FILE]
 
 Wall seconds and processor seconds (user + system) are both reported: on a machine that is shared only the latter are
 comparable. CasADi's symbolic set-up and compilation are not in its time; posture and motion guess are in ours.
@@ -81,6 +81,7 @@ def run_casadi(start, arguments, limit, folder):
     problem = {"subject": {"H": start["subject"]["height_m"], "M": start["subject"]["body_mass_kg"]}}
     problem |= {"muscles": arguments.muscles, "bounds": start["bounds"]}
     options = {"problem": problem, "start": start["start"], "backend": arguments.backend, "cache": str(folder)}
+    options |= {"phases": arguments.phases}
     given, result = folder / "options.json", folder / "result.json"
     given.write_text(json.dumps(options))
     command = [sys.executable, str(HERE / "gait_casadi.py"), "solve", str(given), str(result)]
@@ -110,21 +111,53 @@ def processor():
     return platform.processor() or platform.machine()
 
 
+def race(arguments, ours, dump, folder):
+    """All runs from one start, alternately."""
+    place = ["--subject", str(arguments.subject), "--guess", str(arguments.guess)]
+    start = json.loads(subprocess.check_output([dump, *place]))
+    runs = []
+    for number in range(arguments.runs):
+        for side in ("ours", "casadi"):
+            if side == "ours":
+                run = run_ours(ours, arguments, arguments.limit)
+            else:
+                run = run_casadi(start, arguments, arguments.limit, folder)
+            run |= {"subject": arguments.subject, "guess": arguments.guess, "load": os.getloadavg()[0]}
+            runs.append(run)
+            print(
+                f"subject {arguments.subject} guess {arguments.guess} {number + 1} {side:7} {run['status']:16} "
+                f"{run['iterations']:5} iterations objective {run['objective']:.8f} violation {run['violation']:.1e} "
+                f"wall {run['wall']:8.2f} s  cpu {run['cpu']:8.2f} s  evaluation {run['evaluation']:7.2f} s  "
+                f"memory {run['memory']:5.0f} MB  load {run['load']:.1f}  {run['by_phase']}",
+                flush=True,
+            )
+    return runs
+
+
+def medians(runs):
+    """By side; and the ratios of wall and processor seconds."""
+    median = {}
+    for side in ("ours", "casadi"):
+        mine = [run for run in runs if run["side"] == side]
+        keys = ("wall", "cpu", "iterations", "objective")
+        median[side] = {key: statistics.median(run[key] for run in mine) for key in keys}
+        median[side]["not solved"] = [run["status"] for run in mine if not run["solved"]]
+    return median | {key: median["casadi"][key] / median["ours"][key] for key in ("wall", "cpu")}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--subject", type=int, default=1, choices=[1, 2])
+    parser.add_argument("--subject", type=int, nargs="+", default=[1], choices=[1, 2])
     parser.add_argument("--muscles", action="store_true")
-    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--phases", default="same", choices=["same", "own"], help="settings of IPOPT in its phases")
+    parser.add_argument("--runs", type=int, default=3, help="from each start")
     parser.add_argument("--backend", default="vm", choices=["vm", "c"])
-    parser.add_argument("--guess", type=int, default=1, help="number of the guess in our catalogue that both start from")
+    parser.add_argument("--guess", type=int, nargs="+", default=[1], help="of our catalogue; both sides start from it")
     parser.add_argument("--threads", type=int, default=1, help="of ours; IPOPT's linear algebra has one")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a single run is given up")
     parser.add_argument("--json", help="file for all figures")
     arguments = parser.parse_args()
-    ours = example("timed_solve")
-    place = ["--subject", str(arguments.subject), "--guess", str(arguments.guess)]
-    start = json.loads(subprocess.check_output([example("dump_start"), *place]))
-    runs = []
+    ours, dump = example("timed_solve"), example("dump_start")
     header = {
         "date": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
         "processor": processor(),
@@ -132,37 +165,29 @@ def main():
         "load_before": os.getloadavg()[0],
     }
     print(json.dumps(header))
+    runs, starts = [], []
     with tempfile.TemporaryDirectory(prefix="gait_race_") as folder:
-        for number in range(arguments.runs):
-            for side in ("ours", "casadi"):
-                if side == "ours":
-                    run = run_ours(ours, arguments, arguments.limit)
-                else:
-                    run = run_casadi(start, arguments, arguments.limit, Path(folder))
-                run["load"] = os.getloadavg()[0]
-                runs.append(run)
-                print(
-                    f"{number + 1} {side:7} {run['status']:20} {run['iterations']:5} iterations "
-                    f"objective {run['objective']:.8f} violation {run['violation']:.1e} "
-                    f"wall {run['wall']:8.2f} s  cpu {run['cpu']:8.2f} s  evaluation {run['evaluation']:7.2f} s  "
-                    f"memory {run['memory']:5.0f} MB  "
-                    f"load {run['load']:.1f}  {run['by_phase']}",
-                    flush=True,
-                )
+        for subject in arguments.subject:
+            for guess in arguments.guess:
+                one = argparse.Namespace(**vars(arguments) | {"subject": subject, "guess": guess})
+                mine = race(one, ours, dump, Path(folder))
+                runs += mine
+                starts.append({"subject": subject, "guess": guess} | medians(mine))
     header["load_after"] = os.getloadavg()[0]
-    median = {}
-    for side in ("ours", "casadi"):
-        mine = [run for run in runs if run["side"] == side]
-        failed = [run["status"] for run in mine if not run["solved"]]
-        median[side] = {key: statistics.median(run[key] for run in mine) for key in ("wall", "cpu", "iterations")}
-        print(
-            f"{side:7} median wall {median[side]['wall']:.2f} s, cpu {median[side]['cpu']:.2f} s, "
-            f"{median[side]['iterations']:.0f} iterations; not solved: {failed or 'none'}"
-        )
+    for start in starts:
+        print(f"subject {start['subject']} guess {start['guess']}, medians:")
+        for side in ("ours", "casadi"):
+            m = start[side]
+            print(
+                f"  {side:7} {m['iterations']:.0f} iterations, objective {m['objective']:.8f}, wall {m['wall']:.2f} s, "
+                f"cpu {m['cpu']:.2f} s; not solved: {m['not solved'] or 'none'}"
+            )
+        print(f"  CasADi + IPOPT / ours: wall {start['wall']:.2f}, cpu {start['cpu']:.2f}")
     for key in ("wall", "cpu"):
-        print(f"CasADi + IPOPT / ours, {key}: {median['casadi'][key] / median['ours'][key]:.2f}")
+        ratios = [start[key] for start in starts]
+        print(f"CasADi + IPOPT / ours, {key}, geometric mean of the starts: {statistics.geometric_mean(ratios):.2f}")
     if arguments.json:
-        document = {"machine": header, "arguments": vars(arguments), "runs": runs, "median": median}
+        document = {"machine": header, "arguments": vars(arguments), "runs": runs, "starts": starts}
         Path(arguments.json).write_text(json.dumps(document, indent=2) + "\n")
 
 
