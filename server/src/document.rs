@@ -51,7 +51,7 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
             return Error::Malformed(format!("the whole document is not {}{place}", expected(message)));
         }
         (".", Some(name)) => name.to_owned(),
-        (_, Some(name)) if missing.is_some() => format!("{written}.{name}"),
+        (_, Some(name)) => format!("{written}.{name}"),
         _ => written,
     };
     let value = if missing.is_some() { Value::Null } else { value_at(bytes, &path) };

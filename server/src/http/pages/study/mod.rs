@@ -300,8 +300,10 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
 
 pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
     if large {
-        let best = best_to_show(standing)?;
-        let (ranking, history) = (ranking(standing)?, history::known(standing));
+        // Of many trials not all were read: what the learner last believed stands for the posterior.
+        let last = standing.trials.last().and_then(|newest| newest.best_before);
+        let best = last.filter(|best| !standing.objections.closes(*best));
+        let (ranking, history) = (best.into_iter().collect(), history::known(standing));
         let question = standing.study.state == StudyState::Waiting;
         return Ok(Figures { unanswered: false, best, ranking, judged: Judged::default(), history, question });
     }
