@@ -292,7 +292,10 @@ mod tests {
             ("{} {}", "something follows the JSON document: trailing characters at line 1 column 4"),
             ("{", "not JSON: EOF while parsing an object (line 1, column 1)"),
             (r#"{"mesh": {"ds2": 3, "ds2": 4}}"#, "field mesh.ds2 is there twice (line 1, column 25)"),
-            (r#"{"mesh": {"ds2": 3, "ds3": 4, "ss2": 4}}"#, "field mesh.ss1 is missing (line 1, column 39)"),
+            (
+                r#"{"limits": {"duration_min_s": {"ds2": 0.03}}}"#,
+                "field limits.duration_min_s.ds3 is missing (line 1, column 43)",
+            ),
         ] {
             assert_eq!(refusal::<GaitSettings>(text), told);
         }

@@ -265,7 +265,8 @@ impl NlpSettings {
         in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
         in_range("residual_target", self.residual_target, 1e-16, 1.0)?;
         in_range("residual_limit", self.residual_limit, self.residual_target, 1.0)?;
-        positive("elastic_weight", self.elastic_weight)?;
+        // With a weight near the tolerance every point would be stationary, and called infeasible.
+        in_range("elastic_weight", self.elastic_weight, 1.0, 1e12)?;
         in_range("required_reduction", self.required_reduction, 0.0, 0.999_999)?;
         in_range("threads", self.threads as f64, 1.0, 16.0)
     }
