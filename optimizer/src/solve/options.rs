@@ -25,7 +25,7 @@ pub struct SolveOptions {
     pub retry: bool,
     /// Which of the converged guesses is the answer.
     pub basin_choice: BasinChoice,
-    /// Settings of the interior point, but for those that the phases of a solve decide ([`solver_settings`]). In JSON only
+    /// Settings of the interior point, but for those that the phases of a solve decide. In JSON only
     /// what differs from the default needs to be there.
     #[serde(with = "solver_settings", skip_serializing_if = "solver_settings::are_default")]
     pub solver: NlpSettings,
