@@ -134,17 +134,18 @@ pub(super) fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
     (largest, first + at.unwrap_or(0))
 }
 
-/// Whether all values, of padded length, are finite.
+/// Whether all values are finite.
 #[inline(always)]
 pub(super) fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0f64; LANES];
-    for block in values.as_chunks::<LANES>().0 {
+    let (blocks, rest) = values.as_chunks::<LANES>();
+    for block in blocks {
         for k in 0..LANES {
             // Zero unless the value is infinite or not a number.
             sums[k] += block[k] * 0.0;
         }
     }
-    sums.iter().all(|s| *s == 0.0)
+    sums.iter().all(|s| *s == 0.0) && rest.iter().all(|v| v.is_finite())
 }
 
 /// Lower triangle (and what shares a tile with it) of S -= X G^T + G X^T over the first `count` columns of X and G and the

@@ -295,7 +295,9 @@ impl<'p> Run<'p> {
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, (dw, dc), change);
-            change = Change::Diagonal;
+            if inertia.is_some() {
+                change = Change::Diagonal;
+            }
             let go_on = match inertia {
                 Some(i) if i.zero == 0 && i.negative == self.form.m => {
                     let ratio = session.newton.solve(

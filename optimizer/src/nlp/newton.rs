@@ -13,7 +13,7 @@
 
 use std::time::Instant;
 
-use super::dense_kernels::LANES;
+use super::dense_kernels::{all_finite, largest_magnitude};
 use super::formulation::Formulation;
 use super::kkt::KktMatrix;
 use super::kkt_solver::{Change, Inertia, KktSolver};
@@ -58,22 +58,7 @@ impl PrimalDual {
 
 /// Largest absolute entry; NaN counts as infinite.
 pub(super) fn largest(values: &[f64]) -> f64 {
-    let (mut largest, mut zeros) = ([0.0f64; LANES], [0.0f64; LANES]);
-    let (blocks, rest) = values.as_chunks::<LANES>();
-    let mut take = |k: usize, value: f64| {
-        largest[k] = if value.abs() > largest[k] { value.abs() } else { largest[k] };
-        // Not a number unless the value is finite.
-        zeros[k] += value * 0.0;
-    };
-    for block in blocks {
-        for (k, value) in block.iter().enumerate() {
-            take(k, *value);
-        }
-    }
-    for value in rest {
-        take(0, *value);
-    }
-    if zeros.iter().any(|zero| zero.is_nan()) { f64::INFINITY } else { largest.into_iter().fold(0.0, f64::max) }
+    if all_finite(values) { largest_magnitude(values) } else { f64::INFINITY }
 }
 
 /// Derivatives and slacks at the current point.

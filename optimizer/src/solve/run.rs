@@ -137,8 +137,6 @@ impl<'a> Run<'a> {
             ..every_phase
         };
         let tracking_settings = NlpSettings { mu_initial: MU_TRACKING, ..rough };
-        let cost_settings =
-            |mu_initial| NlpSettings { tolerance: self.context.options.tolerance, mu_initial, ..every_phase };
         let mut tracked = self.phase(
             Phase::Tracking,
             &plain.for_tracking(TRACKING_WEIGHT),
@@ -173,7 +171,8 @@ impl<'a> Run<'a> {
         }
         let barrier_strategy =
             if guess.adaptive_barrier { BarrierStrategy::Adaptive } else { BarrierStrategy::Monotone };
-        let settings = NlpSettings { barrier_strategy, ..cost_settings(guess.barrier) };
+        let tolerance = self.context.options.tolerance;
+        let settings = NlpSettings { tolerance, mu_initial: guess.barrier, barrier_strategy, ..every_phase };
         self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), &settings)
     }
 

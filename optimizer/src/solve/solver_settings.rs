@@ -6,6 +6,7 @@
 use crate::nlp::{BoundMultiplierStart, NlpSettings};
 use crate::subject::ModelError;
 use serde::de::Error as _;
+use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
@@ -37,40 +38,50 @@ pub(super) fn default() -> NlpSettings {
     }
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
 pub(super) fn are_default(settings: &NlpSettings) -> bool {
     *settings == default()
 }
 
-fn fields(settings: &NlpSettings) -> Result<Map<String, Value>, serde_json::Error> {
-    match serde_json::to_value(settings)? {
+fn fields(settings: &NlpSettings) -> Result<Map<String, Value>, String> {
+    match serde_json::to_value(settings).map_err(|error| error.to_string())? {
         Value::Object(fields) => Ok(fields),
-        other => Err(serde_json::Error::custom(format!("not an object: {other}"))),
+        other => Err(format!("not an object: {other}")),
     }
+}
+
+fn decided(field: &str) -> String {
+    format!(
+        "{field} is decided by the phases of a solve; leave it out (the options beside solver, and the guesses, set it)"
+    )
 }
 
 /// Checks every range, and that nothing is set here that is decided elsewhere.
 pub(super) fn validate(settings: &NlpSettings) -> Result<(), ModelError> {
     let invalid = |reason: String| ModelError::Malformed { what: "solver".to_owned(), reason };
     settings.validate().map_err(|error| invalid(error.to_string()))?;
-    let (own, usual) = (fields(settings), fields(&default()));
-    let (own, usual) = (own.map_err(|e| invalid(e.to_string()))?, usual.map_err(|e| invalid(e.to_string()))?);
+    let (own, usual) = (fields(settings).map_err(invalid)?, fields(&default()).map_err(invalid)?);
     match DECIDED_BY_PHASES.into_iter().find(|&field| own.get(field) != usual.get(field)) {
-        Some(field) => Err(invalid(format!(
-            "{field} is decided by the phases of a solve; leave it out (the options beside solver, and the guesses, set it)"
-        ))),
+        Some(field) => Err(invalid(decided(field))),
         None => Ok(()),
     }
 }
 
+/// Writes what differs from the default.
 pub(super) fn serialize<S: Serializer>(settings: &NlpSettings, serializer: S) -> Result<S::Ok, S::Error> {
-    settings.serialize(serializer)
+    let usual = fields(&default()).map_err(S::Error::custom)?;
+    let mut own = fields(settings).map_err(S::Error::custom)?;
+    own.retain(|field, value| usual.get(field) != Some(value));
+    own.serialize(serializer)
 }
 
-/// Fields that are left out have the default for gait problems.
+/// Fields that are left out have the default for gait problems; those that the phases decide must be left out.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NlpSettings, D::Error> {
     let mut all = fields(&default()).map_err(D::Error::custom)?;
-    all.extend(Map::deserialize(deserializer)?);
+    let given = Map::deserialize(deserializer)?;
+    if let Some(field) = DECIDED_BY_PHASES.into_iter().find(|&field| given.contains_key(field)) {
+        return Err(D::Error::custom(decided(field)));
+    }
+    all.extend(given);
     serde_json::from_value(Value::Object(all)).map_err(D::Error::custom)
 }
 
@@ -106,6 +117,7 @@ mod tests {
             (r#"{"solver": {"tau_mni": 0.9}}"#, "unknown field `tau_mni`"),
             (r#"{"solver": {"tau_min": "high"}}"#, "invalid type: string"),
             (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial is decided by the phases of a solve"),
+            (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial is decided by the phases of a solve"),
             (r#"{"solver": {"threads": 2}}"#, "threads is decided by the phases of a solve"),
         ] {
             let error = options(text).unwrap_err();

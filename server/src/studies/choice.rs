@@ -121,10 +121,15 @@ pub const MANY: usize = 400;
 /// When the learner refuses the log.
 pub fn best_to_show(standing: &Standing) -> Result<Option<TrialId>, LearnerError> {
     if standing.trials.len() >= MANY {
-        let best = standing.trials.last().and_then(|newest| newest.best_before);
-        return Ok(best.filter(|best| !standing.objections.closes(*best)));
+        return Ok(last_believed(standing));
     }
     best_trial(standing)
+}
+
+/// What the learner last believed to be best, unless somebody called it unsafe; it does not take every trial to tell.
+pub fn last_believed(standing: &Standing) -> Option<TrialId> {
+    let best = standing.trials.last().and_then(|newest| newest.best_before);
+    best.filter(|best| !standing.objections.closes(*best))
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

@@ -1,12 +1,12 @@
 //! Coactive feedback: "with these bounds it would have been better than in that trial".
 
-use super::answer::{comparable, voice};
+use super::answer::{comparable, voice, write};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::store::feedback::{Said, Source};
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
-use crate::store::{FeedbackId, StudyId, TrialId, Writer, audit, events, feedback, studies};
+use crate::store::{FeedbackId, StudyId, TrialId, Writer, audit, studies};
 use gait_learner::ActionIndex;
 use serde::Deserialize;
 use serde_json::json;
@@ -44,8 +44,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Su
     let trial = comparable(writer, study.id, "over", new.over).await?;
     let suggested = action(&study, &trial, &new.bounds)?;
     let voice = voice(caller, new.source, new.author.as_deref(), &new.note)?;
-    let id = feedback::append(writer, study.id, &Said::Suggestion { suggested, over: trial.id }, voice).await?;
-    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
+    let id = write(writer, study.id, &Said::Suggestion { suggested, over: trial.id }, voice).await?;
     let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": voice.author });
     audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;
     Ok(id)

@@ -139,15 +139,15 @@ pub(super) async fn create(
     once.finish(&app, writer, StatusCode::CREATED, Some(location), &Recorded { row, beside }).await
 }
 
-/// Why an answer is taken back.
+/// Why an answer or a remark is taken back.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Retract {
     #[schema(min_length = 1, max_length = 2000)]
-    reason: String,
+    pub(super) reason: String,
     /// By default the name of the caller.
     #[serde(default)]
-    author: Option<String>,
+    pub(super) author: Option<String>,
 }
 
 /// `POST /preferences/{id}/retract`.

@@ -1,5 +1,6 @@
 //! Remarks: what is said of two gaits that is no preference.
 
+use super::preferences::Retract;
 use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
@@ -14,8 +15,6 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
-use serde::Deserialize;
-use utoipa::ToSchema;
 
 /// `GET /studies/{id}/remarks`: as made, those that were taken back included.
 #[utoipa::path(
@@ -78,31 +77,20 @@ pub(super) async fn get(
     Ok(Json(remarks::get(&mut *app.read().await?, id).await?))
 }
 
-/// Why a remark is taken back.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RetractRemark {
-    #[schema(min_length = 1, max_length = 2000)]
-    reason: String,
-    /// By default the name of the caller.
-    #[serde(default)]
-    author: Option<String>,
-}
-
 /// `POST /remarks/{id}/retract`.
 #[utoipa::path(
     post,
     path = "/remarks/{id}/retract",
     tag = "preferences",
     params(("id" = RemarkId, Path, description = "The remark")),
-    request_body = RetractRemark,
+    request_body = Retract,
     responses((status = 200, description = "Taken back, with what the learner heard of it: the row stays", body = Remark)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id): Id<RemarkId>,
-    OnceWith(once, why): OnceWith<access::Answer, RetractRemark>,
+    OnceWith(once, why): OnceWith<access::Answer, Retract>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,

@@ -22,7 +22,7 @@ use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{
     Instant, StudyId, TrialId, commit, consents, devices, events, presentations, reference_gaits, studies, trials,
 };
-use crate::studies::choice::{MANY, best_to_show, ranking};
+use crate::studies::choice::{MANY, best_to_show, last_believed, ranking};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
@@ -248,6 +248,7 @@ fn button(act: Act) -> Option<ActButton> {
 }
 
 /// What is computed from the standing: CPU work.
+#[derive(Default)]
 pub(super) struct Figures {
     /// People are to answer and nobody has: what the learner believes then is only what it began with.
     unanswered: bool,
@@ -301,19 +302,17 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
 pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
     if large {
         // Of many trials not all were read: what the learner last believed stands for the posterior.
-        let last = standing.trials.last().and_then(|newest| newest.best_before);
-        let best = last.filter(|best| !standing.objections.closes(*best));
+        let best = last_believed(standing);
         let (ranking, history) = (best.into_iter().collect(), history::known(standing));
         let question = standing.study.state == StudyState::Waiting;
-        return Ok(Figures { unanswered: false, best, ranking, judged: Judged::default(), history, question });
+        return Ok(Figures { best, ranking, history, question, ..Figures::default() });
     }
     let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
     if standing.waits_for_first_answer() {
-        let (ranking, history) = (Vec::new(), Vec::new());
-        return Ok(Figures { unanswered: true, best: None, ranking, judged: Judged::default(), history, question });
+        return Ok(Figures { unanswered: true, question, ..Figures::default() });
     }
     let (best, ranking, history) = (best_to_show(standing)?, ranking(standing)?, history::of(standing)?);
-    Ok(Figures { unanswered: false, best, ranking, judged: Judged::default(), history, question })
+    Ok(Figures { best, ranking, history, question, ..Figures::default() })
 }
 
 fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
