@@ -6,6 +6,7 @@
 
 mod arguments;
 mod splitmix;
+mod tuned_actions;
 
 use arguments::argument;
 use gait_optimizer::{
@@ -13,32 +14,11 @@ use gait_optimizer::{
 };
 use splitmix::SplitMix;
 use std::error::Error;
-
-/// Levels of Table I (Li et al. 2022).
-const LEVELS: [&[f64]; 8] = [
-    &[15.0, 20.0],
-    &[70.0, 80.0, 90.0],
-    &[0.3, 0.4, 0.5],
-    &[1.2, 1.3, 1.4],
-    &[0.0, 0.013, 0.026, 0.039],
-    &[0.0, 0.1, 0.2, 0.3, 0.4, 0.5],
-    &[20.0, 35.0, 50.0],
-    &[20.0, 30.0, 40.0],
-];
+use tuned_actions::{LEVELS, median};
 
 fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {
     let options = SolveOptions { threads, ..SolveOptions::default() };
     Ok(solve(problem, warm, &options, &mut |_| {}, &CancelToken::new())?)
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        odd if odd % 2 == 1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
-    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -18,6 +18,7 @@ pub mod fibres;
 pub mod hip_velocity;
 pub mod layout;
 pub mod limits;
+pub mod margins;
 pub mod mechanics;
 pub mod mesh_transfer;
 pub mod muscle_forces;

@@ -30,6 +30,7 @@ pub mod walking;
 pub use bounds::TunedBounds;
 pub use device::{Device, DeviceField};
 pub use gait::{DomainTrajectory, Gait};
+pub use gait_problem::margins::Margins;
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{

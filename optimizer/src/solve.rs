@@ -2,7 +2,6 @@
 
 use crate::nlp::NlpError;
 use crate::subject::ModelError;
-use std::borrow::Cow;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -17,7 +16,7 @@ mod solver_settings;
 mod warm_start;
 
 pub use attempts::CONVERGED_VIOLATION;
-use attempts::{Tried, choose, try_catalogue, try_guesses, try_warm};
+use attempts::{Tried, choose, keep_between_points, try_catalogue, try_guesses, try_warm};
 pub use cold_guesses::{ColdGuess, ColdRoute, GuessTiming};
 pub use options::{BasinChoice, SolveOptions};
 pub use problem::GaitProblem;
@@ -46,7 +45,9 @@ pub enum SolveError {
 ///
 /// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]; when none
 /// converges, it tries the others of the catalogue until one does ([`SolveOptions::retry`]). A warm start that does not
-/// converge falls back to a cold start; when that does not converge either, the outcome is where the violation is smallest. `observer` is called once per iteration, on the calling thread.
+/// converge falls back to a cold start; when that does not converge either, the outcome is where the violation is
+/// smallest. A gait that exceeds its bounds between its mesh points is solved on with tightened bounds
+/// ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on the calling thread.
 /// A solve that ends without a gait is an `Ok` outcome with another status than `Converged`.
 ///
 /// # Errors
@@ -60,27 +61,27 @@ pub fn solve(
 ) -> Result<SolveOutcome, SolveError> {
     options.validate()?;
     let programme = problem.programme(problem.muscles)?;
-    let warm_point = warm_start.map(|warm| on_mesh_of(problem, &programme, warm)).transpose()?;
+    let start = warm_start.map(|warm| on_mesh_of(problem, &programme, warm)).transpose()?;
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
     let mut tried = Vec::new();
-    if let Some(point) = warm_point {
-        let strategy = if matches!(point, Cow::Borrowed(_)) { "warm start" } else { "warm start from another mesh" };
-        let warm = try_warm(&context, point.into_owned(), strategy, observer)?;
-        let is_final = warm.is_final();
-        tried.push(warm);
-        if is_final {
-            return finish(&context, tried, StartedFrom::Warm, StartedFrom::Warm);
-        }
+    if let Some(start) = start {
+        tried.push(try_warm(&context, start, observer)?);
     }
-    let (first, others) = match warm_start {
-        Some(_) => (StartedFrom::Warm, StartedFrom::ColdAfterWarm),
-        None => (StartedFrom::Cold, StartedFrom::Cold),
+    if !tried.iter().any(Tried::is_final) {
+        tried.extend(try_catalogue(&context, observer)?);
+    }
+    let chosen = choose(&tried, options.basin_choice);
+    let started_from = match (warm_start, chosen) {
+        (None, _) => StartedFrom::Cold,
+        (Some(_), 0) => StartedFrom::Warm,
+        (Some(_), _) => StartedFrom::ColdAfterWarm,
     };
-    tried.extend(try_catalogue(&context, observer)?);
-    finish(&context, tried, first, others)
+    let chosen = keep_between_points(&context, &mut tried, chosen, observer)?;
+    finish(&context, tried, chosen, started_from)
 }
 
-/// Solves one gait problem cold from the given guesses only: for studies of basins.
+/// Solves one gait problem cold from the given guesses only, as it is at its mesh points: for studies of basins and of
+/// the solver.
 ///
 /// # Errors
 /// [`SolveError`] when the input is invalid or there is no guess.
@@ -99,17 +100,17 @@ pub fn solve_from_guesses(
     let programme = problem.programme(problem.muscles)?;
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
     let tried = try_guesses(&context, guesses, 0, observer)?;
-    finish(&context, tried, StartedFrom::Cold, StartedFrom::Cold)
+    let chosen = choose(&tried, options.basin_choice);
+    finish(&context, tried, chosen, StartedFrom::Cold)
 }
 
-/// The outcome of what was tried: `first` and `others` say what the first and the other attempts started from.
+/// The outcome of what was tried.
 fn finish(
     context: &Context<'_>,
     tried: Vec<Tried>,
-    first: StartedFrom,
-    others: StartedFrom,
+    chosen: usize,
+    started_from: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
-    let chosen = choose(&tried, context.options.basin_choice);
     let mut tally = Tally::default();
     let mut answer = None;
     for (index, mut one) in tried.into_iter().enumerate() {
@@ -119,11 +120,11 @@ fn finish(
         tally.linear_algebra_s += one.linear_algebra_s;
         tally.attempts.push(one.attempt);
         if index == chosen {
-            answer = Some(one.choice);
+            answer = Some((one.choice, one.margins));
         }
     }
     match answer {
-        Some(answer) => Ok(outcome(context, answer, tally, if chosen == 0 { first } else { others })),
+        Some((choice, margins)) => Ok(outcome(context, choice, &margins, tally, started_from)),
         None => {
             Err(ModelError::OutOfRange { field: "guesses".to_owned(), value: 0.0, minimum: 1.0, maximum: 1e3 }.into())
         }

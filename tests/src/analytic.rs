@@ -6,7 +6,8 @@ use gait_optimizer::gait::{Axis, ContactRowName, FootPoint, MuscleTrajectory, Si
 use gait_optimizer::nlp::WarmPoint;
 use gait_optimizer::solve::{Phase, StartedFrom};
 use gait_optimizer::{
-    CancelToken, DomainTrajectory, Gait, IterationRecord, SolveOutcome, SolveReport, SolveStatus, Violation, WarmStart,
+    CancelToken, DomainTrajectory, Gait, IterationRecord, Margins, SolveOutcome, SolveReport, SolveStatus, Violation,
+    WarmStart,
 };
 use gaitwright::store::TrialId;
 use gaitwright::workers::{Assignment, Evaluate};
@@ -102,6 +103,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             gait_rmse_parts_rad: [rmse / 5.0; 5],
             max_violation: if status == SolveStatus::Converged { 1e-9 } else { 0.004 },
             optimality: None,
+            tightened_bounds: 0,
             seconds_total: 0.01,
             seconds_evaluation: 0.005,
             seconds_linear_algebra: 0.005,
@@ -136,6 +138,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
                 slack_lower_multipliers: Vec::new(),
                 slack_upper_multipliers: Vec::new(),
             },
+            margins: Margins::default(),
         },
         violations,
     }

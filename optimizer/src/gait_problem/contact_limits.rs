@@ -4,14 +4,16 @@ use super::entries::Entries;
 use super::layout::{FORCE, PointVariables, Q, QD};
 use super::mechanics::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
 use super::programme::{GaitProgramme, PointContext};
-use super::rows::PointRows;
+use super::rows::{HeightRow, PointRows};
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
 use crate::gait::{Axis, Side};
 use crate::walking::{DomainKind, clearance_profile};
 
-const FRICTION_SCALE: f64 = 1.0 / 500.0;
-const HEIGHT_SCALE: f64 = 10.0;
+/// Of a friction row, per newton.
+pub(super) const FRICTION_SCALE: f64 = 1.0 / 500.0;
+/// Of a height row, per metre.
+pub(super) const HEIGHT_SCALE: f64 = 10.0;
 
 /// Side of a foot point (heel_L, toe_L, heel_R, toe_R).
 fn side_of(foot_point: usize) -> Side {
@@ -45,11 +47,10 @@ struct SwingShare {
     durations: [usize; 2],
 }
 
-fn swing_share(programme: &GaitProgramme, context: &PointContext<'_>, x: &[f64]) -> SwingShare {
-    let sigma = context.layout.sigma(context.k);
-    let (ss2, ss1, alpha, beta) = match context.layout.domain.kind {
-        DomainKind::Ss2 => (context.d, context.d + 1, sigma, 0.0),
-        _ => (context.d - 1, context.d, 1.0, sigma),
+fn swing_share(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> SwingShare {
+    let (ss2, ss1, alpha, beta) = match programme.layout.domains[d].domain.kind {
+        DomainKind::Ss2 => (d, d + 1, sigma, 0.0),
+        _ => (d - 1, d, 1.0, sigma),
     };
     let durations = [programme.layout.domains[ss2].duration, programme.layout.domains[ss1].duration];
     let t2 = programme.layout.value(x, durations[0]);
@@ -60,6 +61,25 @@ fn swing_share(programme: &GaitProgramme, context: &PointContext<'_>, x: &[f64])
     let cross = -(gradient[0] + gradient[1]) / sum;
     let hessian = [[-2.0 * gradient[0] / sum, cross], [cross, -2.0 * gradient[1] / sum]];
     SwingShare { w, gradient, hessian, durations }
+}
+
+/// A height row at a relative time of domain `d`, on a mesh point or not: the height, less the swing clearance where it
+/// applies.
+pub(super) fn height_row(
+    programme: &GaitProgramme,
+    d: usize,
+    sigma: f64,
+    state: &PointState,
+    height: HeightRow,
+    x: &[f64],
+) -> f64 {
+    let z = state.contact_position(&programme.foot_points[height.foot_point])[1];
+    let mut value = HEIGHT_SCALE * z;
+    if height.clearance {
+        let share = swing_share(programme, d, sigma, x);
+        value -= HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[0];
+    }
+    value
 }
 
 /// Values.
@@ -86,13 +106,7 @@ pub(super) fn values(
         g[row + 1] = FRICTION_SCALE * (programme.limits.friction * normal + tangential);
     }
     for height in &rows.heights {
-        let z = state.contact_position(&programme.foot_points[height.foot_point])[1];
-        let mut value = HEIGHT_SCALE * z;
-        if height.clearance {
-            let share = swing_share(programme, context, x);
-            value -= HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[0];
-        }
-        g[height.row] = value;
+        g[height.row] = height_row(programme, context.d, context.layout.sigma(context.k), state, *height, x);
     }
     if let Some(row) = rows.phase_rate {
         g[row] = context.hip_phase(point)[1];
@@ -133,7 +147,7 @@ pub(super) fn jacobian(
             out.jacobian(height.row, p + Q + 2 + i, HEIGHT_SCALE * gradient[i]);
         }
         if height.clearance {
-            let share = swing_share(programme, context, x);
+            let share = swing_share(programme, context.d, context.layout.sigma(context.k), x);
             let slope = -HEIGHT_SCALE * programme.limits.clearance_m * clearance_profile(share.w)[1];
             for i in 0..2 {
                 out.jacobian(height.row, share.durations[i], slope * share.gradient[i]);
@@ -174,7 +188,7 @@ pub(super) fn hessian(
         let foot = &programme.foot_points[height.foot_point];
         add_contact_hessian(state, foot, [0.0, weight], [0.0; 2], [0.0; 2], link);
         if height.clearance {
-            let share = swing_share(programme, context, x);
+            let share = swing_share(programme, context.d, context.layout.sigma(context.k), x);
             let profile = clearance_profile(share.w);
             let scale = -weight * programme.limits.clearance_m;
             for i in 0..2 {

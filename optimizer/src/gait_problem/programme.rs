@@ -4,6 +4,7 @@ use super::elimination_tree::elimination_tree;
 use super::entries::{Compressed, Entries};
 use super::layout::{DomainLayout, Layout, PointVariables};
 use super::limits::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
+use super::margins::Margins;
 use super::objective::ObjectiveParts;
 use super::rows::RowTable;
 use super::zero_dynamics;
@@ -261,6 +262,19 @@ impl GaitProgramme {
         }
         result.sort_by(|a, b| b.amount.total_cmp(&a.amount));
         result
+    }
+
+    /// The same programme with tightened bounds.
+    #[must_use]
+    pub fn tightened(&self, margins: &Margins) -> Self {
+        let mut programme = self.clone();
+        margins.apply(&mut programme.bounds.lower, &mut programme.bounds.upper, &mut programme.rows.lower);
+        programme
+    }
+
+    /// Lower and upper bounds of the stored variables.
+    pub(super) fn stored_bounds(&self) -> (&[f64], &[f64]) {
+        (&self.bounds.lower, &self.bounds.upper)
     }
 
     /// Moves every variable into its bounds.

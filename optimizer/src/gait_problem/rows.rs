@@ -244,6 +244,8 @@ pub struct PointRows {
     pub muscle_torque: Option<usize>,
     /// Two rows per foot on the ground, stance foot first.
     pub friction: usize,
+    /// How many these are.
+    pub friction_edges: usize,
     /// Heights of the points in the air.
     pub heights: Vec<HeightRow>,
     /// dp_dot >= minimum.
@@ -426,7 +428,8 @@ impl RowTable {
             rows.muscle_torque = Some(self.add(place, RowKind::MuscleTorque, 4, 0.0, 0.0));
         }
         let feet = if matches!(domain.kind, DomainKind::Ds2 | DomainKind::Ds3) { 2 } else { 1 };
-        rows.friction = self.add(place, RowKind::Friction, 2 * feet, 0.0, f64::INFINITY);
+        rows.friction_edges = 2 * feet;
+        rows.friction = self.add(place, RowKind::Friction, rows.friction_edges, 0.0, f64::INFINITY);
         if domain.kind == DomainKind::Ds3 && k == domain_layout.last() {
             // The trailing foot leaves the ground. Its cone is down to the vertex, which the bounds of its forces say; two
             // rows without an interior would have unbounded multipliers.

@@ -1,12 +1,15 @@
-//! What a solve tries: a warm start, then cold guesses side by side; and which attempt is the answer.
+//! What a solve tries: a warm start, then cold guesses side by side; which attempt is the answer; and what becomes of it
+//! between its mesh points.
 
 use super::cold_guesses::{ColdGuess, ColdRoute};
 use super::run::{Context, Run};
-use super::{Attempt, BasinChoice, IterationRecord, SolveError, SolveStatus};
+use super::warm_start::Start;
+use super::{Attempt, BasinChoice, IterationRecord, Phase, SolveError, SolveStatus};
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
+use crate::gait_problem::margins::{Margins, excess_between_points};
 use crate::metrics::gait_rmse;
-use crate::nlp::{NlpResult, NonlinearProgram, WarmPoint};
+use crate::nlp::{NlpResult, NonlinearProgram};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
@@ -64,6 +67,8 @@ impl Choice {
 pub(super) struct Tried {
     pub(super) choice: Choice,
     pub(super) attempt: Attempt,
+    /// Bounds that were tightened.
+    pub(super) margins: Margins,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra_s: f64,
 }
@@ -74,10 +79,11 @@ impl Tried {
         matches!(self.choice.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
 
-    fn new(context: &Context<'_>, result: NlpResult, strategy: &str, run: &Run<'_>) -> Self {
+    fn new(context: &Context<'_>, result: NlpResult, strategy: &str, margins: Margins, run: &Run<'_>) -> Self {
         let choice = Choice::new(context, result);
         Self {
             attempt: choice.attempt(strategy, run),
+            margins,
             evaluation_s: run.evaluation_s,
             linear_algebra_s: run.linear_algebra_s,
             choice,
@@ -85,16 +91,57 @@ impl Tried {
     }
 }
 
-/// Tries a warm start.
+/// Tries a warm start, its bounds tightened as they were there.
 pub(super) fn try_warm(
     context: &Context<'_>,
-    point: WarmPoint,
-    strategy: &str,
+    start: Start,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Tried, SolveError> {
     let mut run = Run::new(context, context.options.threads, observer);
-    let result = run.warm(point)?;
-    Ok(Tried::new(context, result, strategy, &run))
+    let Start { point, mut margins, strategy } = start;
+    if context.options.tightening_rounds == 0 {
+        margins = Margins::default();
+    }
+    let result = if margins.is_empty() {
+        run.warm(Phase::Cost, context.programme, point)
+    } else {
+        run.warm(Phase::BetweenPoints, &context.programme.tightened(&margins), point)
+    }?;
+    Ok(Tried::new(context, result, strategy, margins, &run))
+}
+
+/// Solves on from the chosen gait with bounds tightened where it exceeds them between its mesh points, until it does not
+/// or the rounds are over. Index of the answer: the last gait that converged, or what was cancelled.
+pub(super) fn keep_between_points(
+    context: &Context<'_>,
+    tried: &mut Vec<Tried>,
+    mut chosen: usize,
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<usize, SolveError> {
+    for _ in 0..context.options.tightening_rounds {
+        let now = &tried[chosen];
+        if now.choice.status != SolveStatus::Converged {
+            break;
+        }
+        let excess = excess_between_points(context.programme, &now.choice.gait, &now.choice.result.x);
+        if excess.worst <= 1.0 {
+            break;
+        }
+        let mut margins = now.margins.clone();
+        margins.grow(&excess);
+        let point = now.choice.result.warm_point();
+        let mut run = Run::new(context, context.options.threads, observer);
+        run.guess = tried.len();
+        let result = run.warm(Phase::BetweenPoints, &context.programme.tightened(&margins), point)?;
+        let next = Tried::new(context, result, "bounds tightened between mesh points", margins, &run);
+        let status = next.choice.status;
+        tried.push(next);
+        if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {
+            break;
+        }
+        chosen = tried.len() - 1;
+    }
+    Ok(chosen)
 }
 
 fn try_guess(
@@ -107,7 +154,7 @@ fn try_guess(
     let mut run = Run::new(context, threads, observer);
     run.guess = index;
     let result = run.cold(guess)?;
-    Ok(Tried::new(context, result, &guess.label(), &run))
+    Ok(Tried::new(context, result, &guess.label(), Margins::default(), &run))
 }
 
 /// What the threads tell the calling one.

@@ -25,6 +25,9 @@ pub struct SolveOptions {
     pub retry: bool,
     /// Which of the converged guesses is the answer.
     pub basin_choice: BasinChoice,
+    /// How often bounds are tightened where the gait exceeds them between its mesh points by more than half of what its
+    /// certificate allows there, each time solving on from where it was; 0: never.
+    pub tightening_rounds: usize,
     /// Settings of the interior point, but for those that the phases of a solve decide. In JSON only
     /// what differs from the default needs to be there.
     #[serde(with = "solver_settings", skip_serializing_if = "solver_settings::are_default")]
@@ -41,6 +44,7 @@ impl Default for SolveOptions {
             cold_guesses: 2,
             retry: true,
             basin_choice: BasinChoice::default(),
+            tightening_rounds: 4,
             solver: solver_settings::default(),
         }
     }
@@ -57,6 +61,7 @@ impl SolveOptions {
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
         ModelError::check_range("cold_guesses", self.cold_guesses as f64, 1.0, ColdGuess::CATALOGUE.len() as f64)?;
         self.basin_choice.validate()?;
+        ModelError::check_range("tightening_rounds", self.tightening_rounds as f64, 0.0, 20.0)?;
         solver_settings::validate(&self.solver)?;
         if let Some(limit) = self.time_limit_s {
             ModelError::check_range("time_limit_s", limit, 0.0, 1e7)?;

@@ -38,6 +38,8 @@ pub enum Phase {
     PlainCost,
     /// Minimising the cost of transport.
     Cost,
+    /// The same with bounds tightened where the gait exceeded them between its mesh points.
+    BetweenPoints,
 }
 
 /// Stops a solve from another thread within one iteration.

@@ -5,6 +5,7 @@ use super::run::Context;
 use super::warm_start::WarmStart;
 use crate::gait::Gait;
 use crate::gait_problem::GaitProgramme;
+use crate::gait_problem::margins::Margins;
 use crate::gait_problem::programme::RowViolation;
 use crate::metrics::gait_rmse;
 use crate::nlp::{NlpStatus, NonlinearProgram};
@@ -76,7 +77,7 @@ pub struct Attempt {
 }
 
 /// The first-order conditions of a local optimum, measured anew where the solve ended, as the solver scales them (by the
-/// size of the multipliers, WB06 eq. 5). With `max_violation` they are the certificate of a converged gait.
+/// size of the multipliers, WB06 eq. 5), of the problem with its tightened bounds. With `max_violation` they are the certificate of a converged gait.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Optimality {
     /// Largest entry of the Lagrangian's gradient.
@@ -110,6 +111,9 @@ pub struct SolveReport {
     /// versions that did not say.
     #[serde(default)]
     pub optimality: Option<Optimality>,
+    /// How many bounds at mesh points are tightened so that the gait keeps them between the points too.
+    #[serde(default)]
+    pub tightened_bounds: usize,
     /// Wall time, s.
     pub seconds_total: f64,
     /// Of which evaluating functions and derivatives.
@@ -173,11 +177,18 @@ pub(super) struct Tally {
 const MAX_VIOLATIONS: usize = 20;
 
 /// The outcome of the attempt that was chosen.
-pub(super) fn outcome(context: &Context<'_>, choice: Choice, tally: Tally, started_from: StartedFrom) -> SolveOutcome {
+pub(super) fn outcome(
+    context: &Context<'_>,
+    choice: Choice,
+    margins: &Margins,
+    tally: Tally,
+    started_from: StartedFrom,
+) -> SolveOutcome {
     let (problem, programme) = (context.problem, context.programme);
     let Choice { result, gait, status, .. } = choice;
     let x = &result.x;
     let rmse = gait_rmse(&gait, &problem.reference);
+    let margins = margins.bearing_on(programme, x);
     let violations = programme.violations(x);
     let parts = programme.objective_parts(x);
     let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
@@ -196,6 +207,7 @@ pub(super) fn outcome(context: &Context<'_>, choice: Choice, tally: Tally, start
             barrier: result.mu,
         })
         .filter(|o| o.dual_infeasibility.is_finite() && o.complementarity.is_finite()),
+        tightened_bounds: margins.count(),
         seconds_total: context.started.elapsed().as_secs_f64(),
         seconds_evaluation: tally.evaluation_s,
         seconds_linear_algebra: tally.linear_algebra_s,
@@ -213,7 +225,8 @@ pub(super) fn outcome(context: &Context<'_>, choice: Choice, tally: Tally, start
     } else {
         violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
     };
-    let warm_start = WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point() };
+    let warm_start =
+        WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point(), margins };
     SolveOutcome { report, gait, warm_start, violations }
 }
 

@@ -178,12 +178,17 @@ impl<'a> Run<'a> {
 
     /// Begins with the barrier parameter that a cold start ends with: a larger one forgets the point, and with a smaller
     /// or larger one the same problem would end elsewhere.
-    pub(super) fn warm(&mut self, point: WarmPoint) -> Result<NlpResult, SolveError> {
+    pub(super) fn warm(
+        &mut self,
+        phase: Phase,
+        programme: &GaitProgramme,
+        point: WarmPoint,
+    ) -> Result<NlpResult, SolveError> {
         let solver = self.context.options.solver;
         let mu_warm = self.context.options.tolerance / (solver.kappa_epsilon + 1.0);
         self.phase(
-            Phase::Cost,
-            self.context.programme,
+            phase,
+            programme,
             &StartPoint::Warm(point),
             &NlpSettings {
                 tolerance: self.context.options.tolerance,

@@ -1,11 +1,11 @@
 //! Where an earlier solve ended, as a start.
 
 use super::{GaitProblem, SolveError};
+use crate::gait_problem::margins::Margins;
 use crate::gait_problem::{GaitProgramme, mesh_transfer};
 use crate::nlp::{NonlinearProgram, WarmPoint};
 use crate::settings::Mesh;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 
 /// Primal-dual point of an earlier solve of a problem of the same variant, on this mesh or another.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -17,14 +17,25 @@ pub struct WarmStart {
     pub mesh: Mesh,
     /// Scaled primal variables and all multipliers.
     pub point: WarmPoint,
+    /// Bounds that were tightened for the sake of the gait between its mesh points.
+    #[serde(default, skip_serializing_if = "Margins::is_empty")]
+    pub margins: Margins,
 }
 
-/// The start on the mesh of `programme`. Refuses one of another variant or size.
-pub(super) fn on_mesh_of<'a>(
+/// A start on the mesh of a problem.
+pub(super) struct Start {
+    pub(super) point: WarmPoint,
+    pub(super) margins: Margins,
+    pub(super) strategy: &'static str,
+}
+
+/// The start on the mesh of `programme`; margins are of a mesh and do not come along to another. Refuses one of another
+/// variant or size.
+pub(super) fn on_mesh_of(
     problem: &GaitProblem,
     programme: &GaitProgramme,
-    warm: &'a WarmStart,
-) -> Result<Cow<'a, WarmPoint>, SolveError> {
+    warm: &WarmStart,
+) -> Result<Start, SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
             "it is {} muscles, the problem is {} muscles",
@@ -33,17 +44,22 @@ pub(super) fn on_mesh_of<'a>(
         )));
     }
     if warm.mesh == problem.settings.mesh {
-        check_shape(programme, &warm.point)?;
-        return Ok(Cow::Borrowed(&warm.point));
+        check_shape(programme, warm)?;
+        return Ok(Start { point: warm.point.clone(), margins: warm.margins.clone(), strategy: "warm start" });
     }
     let mut of_its_mesh = problem.clone();
     of_its_mesh.settings.mesh = warm.mesh;
     let own = of_its_mesh.programme(problem.muscles)?;
-    check_shape(&own, &warm.point)?;
-    Ok(Cow::Owned(mesh_transfer::transfer(&own, programme, &warm.point)))
+    check_shape(&own, warm)?;
+    Ok(Start {
+        point: mesh_transfer::transfer(&own, programme, &warm.point),
+        margins: Margins::default(),
+        strategy: "warm start from another mesh",
+    })
 }
 
-fn check_shape(programme: &GaitProgramme, point: &WarmPoint) -> Result<(), SolveError> {
+fn check_shape(programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveError> {
+    let point = &warm.point;
     let (n, m) = (programme.variables(), programme.rows());
     for (name, found, expected) in [
         ("variables", point.x.len(), n),
@@ -57,6 +73,9 @@ fn check_shape(programme: &GaitProgramme, point: &WarmPoint) -> Result<(), Solve
         if found != expected {
             return Err(SolveError::WarmStartShape(format!("{found} {name}, expected {expected}")));
         }
+    }
+    if !warm.margins.fit(n, m) {
+        return Err(SolveError::WarmStartShape("its margins are not of its variables and rows, or below 0".to_owned()));
     }
     Ok(())
 }

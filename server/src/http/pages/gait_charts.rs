@@ -298,6 +298,7 @@ fn phase_in_words(phase: Phase) -> &'static str {
         Phase::MuscleTracking => "tracking with muscles",
         Phase::PlainCost => "cost without muscles",
         Phase::Cost => "cost",
+        Phase::BetweenPoints => "bounds tightened between mesh points",
     }
 }
 
@@ -314,7 +315,8 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
         }
         last = Some((r.guess, r.phase));
         let phase = phase_in_words(r.phase);
-        let name = if several { format!("guess {}: {phase}", r.guess + 1) } else { phase.to_owned() };
+        let of_guess = several && r.phase != Phase::BetweenPoints;
+        let name = if of_guess { format!("guess {}: {phase}", r.guess + 1) } else { phase.to_owned() };
         starts.push((i as f64, name));
     }
     starts
