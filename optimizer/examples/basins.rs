@@ -1,12 +1,12 @@
 //! Which local optima the cold guesses reach: objective, Gait RMSE and iterations of each.
 //!
 //! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--grid off]`: the guesses of the
-//! catalogue, or with `--grid on` a grid of routes, timings and knee flexions; one CSV row each.
+//! catalogue, or with `--grid on` a grid of timings, knee flexions, strides and barriers; one CSV row each.
 
 mod arguments;
 
 use arguments::argument;
-use gait_optimizer::{CancelToken, ColdGuess, ColdRoute, GaitProblem, SolveOptions, Subject, solve_from_guesses};
+use gait_optimizer::{CancelToken, ColdGuess, GaitProblem, SolveOptions, Subject, solve_from_guesses};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -14,11 +14,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let muscles = argument("--muscles", "on") == "on";
     let mut guesses = ColdGuess::CATALOGUE.to_vec();
     if argument("--grid", "off") == "on" {
-        let base = ColdGuess::EARLY_RISE;
         guesses.clear();
-        for route in [ColdRoute::Direct, ColdRoute::MuscleTracking] {
-            for knee_flexion in [0.5, 1.0] {
-                guesses.push(ColdGuess { route, knee_flexion, ..base });
+        for base in [ColdGuess::NATURAL, ColdGuess::EARLY_RISE] {
+            for knee_flexion in [0.7, 1.0] {
+                for (stride_time_s, stride_length_m) in [(1.2, 1.15), (1.1, 1.25), (1.0, 1.0)] {
+                    for barrier in [1e-5, 1e-3] {
+                        guesses.push(ColdGuess { knee_flexion, stride_time_s, stride_length_m, barrier, ..base });
+                    }
+                }
             }
         }
     }

@@ -42,8 +42,10 @@ pub struct Relaxation {
     pub from: f64,
     /// The value nearest to it, of those tried, with which a gait converged; `None`: not even with the loosest.
     pub to: Option<f64>,
-    /// The tightest value tried with which none did.
+    /// The loosest value tried with which none did.
     pub not_with: f64,
+    /// Whether a solve without a gait gave up, at a limit or stalled: that there is no gait is not known then.
+    pub undecided: bool,
     /// Solves that this took.
     pub solves: usize,
     /// Where the gait with `to` was found. It came from its neighbours: other starts may not reach it.
@@ -147,10 +149,12 @@ fn relax(
     cancel: &CancelToken,
 ) -> Result<Option<Relaxation>, SolveError> {
     let from = problem.bounds.to_array()[bound];
-    let mut solves = 0;
+    let (mut solves, mut undecided) = (0, false);
     let mut try_value = |value: f64, warm: Option<&WarmStart>| -> Result<SolveOutcome, SolveError> {
         solves += 1;
-        solve(&with_bound(problem, bound, value)?, warm, options, &mut |_| {}, cancel)
+        let outcome = solve(&with_bound(problem, bound, value)?, warm, options, &mut |_| {}, cancel)?;
+        undecided |= !matches!(outcome.report.status, SolveStatus::Converged | SolveStatus::Infeasible);
+        Ok(outcome)
     };
     let mut last = try_value(loosest(bound), None)?;
     let (mut not_with, mut to, mut warm_start) = (from, None, None);
@@ -176,7 +180,7 @@ fn relax(
         return Ok(None);
     }
     let (name, meaning) = (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned());
-    Ok(Some(Relaxation { bound: name, meaning, from, to, not_with, solves, warm_start }))
+    Ok(Some(Relaxation { bound: name, meaning, from, to, not_with, undecided, solves, warm_start }))
 }
 
 /// Explains an outcome that did not converge, by relaxing each bound that it runs into alone and solving again.
@@ -250,6 +254,7 @@ mod tests {
             from,
             to,
             not_with: from,
+            undecided: false,
             solves: 1,
             warm_start: None,
         };

@@ -16,8 +16,8 @@ mod solver_settings;
 mod warm_start;
 
 pub use attempts::CONVERGED_VIOLATION;
-use attempts::{Tried, choose, keep_between_points, try_catalogue, try_guesses, try_warm};
-pub use cold_guesses::{ColdGuess, ColdRoute, GuessTiming};
+use attempts::{Tried, choose, keep_between_points, number_basins, try_catalogue, try_guesses, try_warm};
+pub use cold_guesses::{ColdGuess, ColdRoute, CostStrategy, GuessTiming};
 pub use options::{BasinChoice, SolveOptions};
 pub use problem::GaitProblem;
 pub use progress::{CancelToken, IterationRecord, Phase};
@@ -70,6 +70,7 @@ pub fn solve(
     if !tried.iter().any(Tried::is_final) {
         tried.extend(try_catalogue(&context, observer)?);
     }
+    number_basins(&mut tried);
     let chosen = choose(&tried, options.basin_choice);
     let started_from = match (warm_start, chosen) {
         (None, _) => StartedFrom::Cold,
@@ -99,7 +100,8 @@ pub fn solve_from_guesses(
     ModelError::check_range("number of guesses", guesses.len() as f64, 1.0, 1e3)?;
     let programme = problem.programme(problem.muscles)?;
     let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
-    let tried = try_guesses(&context, guesses, 0, observer)?;
+    let mut tried = try_guesses(&context, guesses, 0, observer)?;
+    number_basins(&mut tried);
     let chosen = choose(&tried, options.basin_choice);
     finish(&context, tried, chosen, StartedFrom::Cold)
 }

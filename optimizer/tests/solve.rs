@@ -37,6 +37,10 @@ fn cold_then_warm() {
     assert!(report.cost_of_transport > 0.01 && report.cost_of_transport < 0.2, "{}", report.cost_of_transport);
     assert!(report.gait_rmse_rad > 0.1 && report.gait_rmse_rad < 3.0, "{}", report.gait_rmse_rad);
     assert_eq!(COLD.gait.domains.len(), 8);
+    // Two guesses, each in a local optimum of its own or both in one.
+    let basins: Vec<_> = report.attempts.iter().map(|a| (a.basin, a.objective)).collect();
+    assert_eq!(basins[0].0, Some(1));
+    assert_eq!(basins[1].0 == Some(1), (basins[1].1 / basins[0].1 - 1.0).abs() < 1e-4, "{basins:?}");
 
     let warm = solved(&problem("a5=0.013"), Some(&COLD.warm_start), 400);
     assert_eq!((warm.report.status, warm.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
@@ -117,9 +121,13 @@ fn bounds_that_leave_no_posture_are_tried_all_the_same() {
         "cold, direct",
         "cold, direct, early rise",
         "cold, direct, whole Hessian",
+        "cold, direct, stride time 1.1 s, stride length 1.25 m",
+        "cold, direct, early rise, stride time 1.1 s, stride length 1.25 m",
+        "cold, direct, more regularisation",
         "cold, direct, adaptive barrier",
+        "cold, direct, early elastic phase",
     ];
-    for (bounds, retry, tried) in [("a6=0,a7=10,a8=10", true, 5), ("a7=5,a8=5", false, 3)] {
+    for (bounds, retry, tried) in [("a6=0,a7=10,a8=10", true, 9), ("a7=5,a8=5", false, 3)] {
         let attempt = |warm: Option<&WarmStart>, retry: bool| {
             let options = SolveOptions { max_iterations: 15, retry, ..SolveOptions::default() };
             solve(&problem(bounds), warm, &options, &mut |_| {}, &CancelToken::new()).unwrap()

@@ -122,6 +122,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
                 objective: 0.1,
                 gait_rmse_rad: rmse,
                 reason: String::new(),
+                basin: Some(1),
                 chosen: true,
             }],
         },

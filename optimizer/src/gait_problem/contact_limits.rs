@@ -20,22 +20,17 @@ fn side_of(foot_point: usize) -> Side {
     if foot_point < 2 { Side::Left } else { Side::Right }
 }
 
-/// The contact rows of each foot on the ground, stance foot first: (is x, index of the force).
-fn feet(context: &PointContext<'_>) -> impl Iterator<Item = (usize, Vec<(bool, usize)>)> {
+/// Each foot on the ground with its number, stance foot first.
+fn feet(context: &PointContext<'_>) -> impl Iterator<Item = (usize, Side)> {
     let stance = context.layout.domain.stance;
-    [stance, stance.other()]
-        .into_iter()
-        .map(|side| {
-            context
-                .contacts
-                .iter()
-                .enumerate()
-                .filter(|(_, row)| row.side == side)
-                .map(|(c, row)| (row.axis == Axis::X, c))
-                .collect::<Vec<_>>()
-        })
-        .filter(|rows| !rows.is_empty())
-        .enumerate()
+    let on_the_ground = |side: &Side| context.contacts.iter().any(|row| row.side == *side);
+    [stance, stance.other()].into_iter().filter(on_the_ground).enumerate()
+}
+
+/// The forces of a foot: whether along x, and their index.
+fn forces_of(context: &PointContext<'_>, side: Side) -> impl Iterator<Item = (bool, usize)> {
+    let rows = context.contacts.iter().enumerate().filter(move |(_, row)| row.side == side);
+    rows.map(|(c, row)| (row.axis == Axis::X, c))
 }
 
 /// Share w of the swing that is over, as `(alpha T_SS2 + beta T_SS1) / (T_SS2 + T_SS1)`, with the two duration
@@ -92,9 +87,9 @@ pub(super) fn values(
     x: &[f64],
     g: &mut [f64],
 ) {
-    for (foot, forces) in feet(context) {
+    for (foot, side) in feet(context) {
         let (mut tangential, mut normal) = (0.0, 0.0);
-        for (is_x, c) in forces {
+        for (is_x, c) in forces_of(context, side) {
             if is_x {
                 tangential += point.force[c];
             } else {
@@ -126,9 +121,9 @@ pub(super) fn jacobian(
     p: usize,
     out: &mut Entries<'_>,
 ) {
-    for (foot, forces) in feet(context) {
+    for (foot, side) in feet(context) {
         let row = rows.friction + 2 * foot;
-        for (is_x, c) in forces {
+        for (is_x, c) in forces_of(context, side) {
             let variable = p + FORCE + c;
             if is_x {
                 out.jacobian(row, variable, -FRICTION_SCALE);

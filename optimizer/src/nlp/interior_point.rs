@@ -69,6 +69,8 @@ pub(super) struct Run<'p> {
     pub rhs: PrimalDual,
     pub search: Search,
     free_mu: FreeMu,
+    /// Work vector: the rows without the elastics.
+    own_rows: Vec<f64>,
     /// Whether the violation has been small enough for the rows' curvature (`NlpSettings::curvature_from_violation`).
     rows_curve: bool,
 }
@@ -106,6 +108,7 @@ impl<'p> Run<'p> {
             at,
             objective: 0.0,
             c: vec![0.0; form.m],
+            own_rows: vec![0.0; form.m],
             gradient: vec![0.0; length],
             lagrangian: vec![0.0; length],
             mu,
@@ -202,13 +205,13 @@ impl<'p> Run<'p> {
     }
 
     /// Largest violation of the program's own rows, unscaled, elastics left out.
-    pub(super) fn program_violation(&self) -> f64 {
+    pub(super) fn program_violation(&mut self) -> f64 {
         let Goal::Feasibility { first, .. } = self.form.goal else { return self.largest_violation() };
-        let mut own = self.c.clone();
+        self.own_rows.copy_from_slice(&self.c);
         for (a, t) in self.form.attached.iter().zip(&self.point.w[self.form.n..]).skip(first) {
-            own[a.row] -= a.sign * t;
+            self.own_rows[a.row] -= a.sign * t;
         }
-        unscaled_violation(&own, &self.form.row_scale)
+        unscaled_violation(&self.own_rows, &self.form.row_scale)
     }
 
     pub(super) fn current_optimality(&mut self) -> Optimality {

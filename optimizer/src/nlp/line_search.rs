@@ -13,16 +13,21 @@ pub(super) struct Search {
     trial_c: Vec<f64>,
     trial_objective: f64,
     corrected_c: Vec<f64>,
+    corrected_rhs: Vec<f64>,
     correction: PrimalDual,
+    /// The point before a soft step.
+    before: PrimalDual,
     /// Shortened steps in a row.
     shortened: usize,
-    watch: Option<Box<Watch>>,
+    watch: Option<Watch>,
+    /// Where the watchdog goes back to.
+    watched_point: PrimalDual,
+    watched_direction: PrimalDual,
 }
 
-/// Where the watchdog goes back to.
+/// The watchdog, what it compares with, and the first of its steps.
+#[derive(Clone, Copy)]
 struct Watch {
-    point: PrimalDual,
-    direction: PrimalDual,
     reference: Reference,
     alpha: f64,
     trials: usize,
@@ -35,9 +40,13 @@ impl Search {
             trial_c: vec![0.0; form.m],
             trial_objective: f64::NAN,
             corrected_c: vec![0.0; form.m],
+            corrected_rhs: vec![0.0; form.m],
             correction: PrimalDual::zeros(form),
+            before: PrimalDual::zeros(form),
             shortened: 0,
             watch: None,
+            watched_point: PrimalDual::zeros(form),
+            watched_direction: PrimalDual::zeros(form),
         }
     }
 
@@ -118,13 +127,9 @@ impl Run<'_> {
         }
         if settings.watchdog_trigger > 0 && self.search.shortened >= settings.watchdog_trigger {
             self.search.shortened = 0;
-            self.search.watch = Some(Box::new(Watch {
-                point: self.point.clone(),
-                direction: self.direction.clone(),
-                reference,
-                alpha,
-                trials: 0,
-            }));
+            self.search.watched_point.copy_from(&self.point);
+            self.search.watched_direction.copy_from(&self.direction);
+            self.search.watch = Some(Watch { reference, alpha, trials: 0 });
         }
         if let Some(mut watch) = self.search.watch.take() {
             let (theta, phi, finite) = self.try_step(alpha, false);
@@ -139,8 +144,8 @@ impl Run<'_> {
                 return true;
             }
             // Back to where it began, and an ordinary search there; the matrix of its corrections is gone.
-            self.point = watch.point;
-            self.direction = watch.direction;
+            self.point.copy_from(&self.search.watched_point);
+            self.direction.copy_from(&self.search.watched_direction);
             self.evaluate();
             (reference, alpha, corrects) = (watch.reference, watch.alpha, false);
         }
@@ -186,13 +191,13 @@ impl Run<'_> {
         if !finite {
             return false;
         }
-        let point = self.point.clone();
+        self.search.before.copy_from(&self.point);
         self.accept(session, alpha, tau, 1);
         if self.is_finite() && self.primal_dual_error() <= SOFT_REDUCTION * before {
             self.filter.add(theta, phi);
             return true;
         }
-        self.point = point;
+        self.point.copy_from(&self.search.before);
         self.evaluate();
         false
     }
@@ -264,8 +269,10 @@ impl Run<'_> {
             for (s, t) in self.search.corrected_c.iter_mut().zip(&self.search.trial_c) {
                 *s = step * *s + t;
             }
-            let keep = std::mem::take(&mut self.rhs.y);
-            self.rhs.y = self.search.corrected_c.iter().map(|c| -c).collect();
+            for (rhs, c) in self.search.corrected_rhs.iter_mut().zip(&self.search.corrected_c) {
+                *rhs = -c;
+            }
+            std::mem::swap(&mut self.rhs.y, &mut self.search.corrected_rhs);
             let ratio = session.newton.solve(
                 &self.form,
                 settings,
@@ -274,7 +281,7 @@ impl Run<'_> {
                 &self.rhs,
                 &mut self.search.correction,
             );
-            self.rhs.y = keep;
+            std::mem::swap(&mut self.rhs.y, &mut self.search.corrected_rhs);
             if ratio > settings.residual_limit {
                 return None;
             }

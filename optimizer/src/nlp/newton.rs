@@ -34,6 +34,13 @@ impl PrimalDual {
         Self { w: vec![0.0; length], y: vec![0.0; form.m], zl: vec![0.0; length], zu: vec![0.0; length] }
     }
 
+    /// Takes the values of another of the same size.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        for (a, b) in self.parts_mut().into_iter().zip(other.parts()) {
+            a.copy_from_slice(b);
+        }
+    }
+
     fn add(&mut self, other: &Self) {
         for (a, b) in self.parts_mut().into_iter().zip(other.parts()) {
             for (x, y) in a.iter_mut().zip(b) {

@@ -74,6 +74,12 @@ impl Schedule {
         workspaces: &mut [W],
         work: impl Fn(Piece, &mut [T], &mut W) + Sync,
     ) {
+        if let ([workspace], 1) = (&mut *workspaces, self.threads) {
+            for piece in &self.pieces {
+                work(*piece, &mut items[piece.start..piece.end], workspace);
+            }
+            return;
+        }
         let mut hands: Vec<Vec<(Piece, &mut [T])>> = (0..self.threads).map(|_| Vec::new()).collect();
         let (mut rest, mut at) = (items, 0);
         for piece in &self.pieces {

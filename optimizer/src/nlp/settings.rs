@@ -34,7 +34,8 @@ pub enum BoundMultiplierStart {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum DualRegularisation {
-    /// Only after a factorisation that looked singular (WB06 algorithm IC).
+    /// Only after a factorisation that looked singular (WB06 algorithm IC). The gait problem stalls with it: some of its
+    /// rows become dependent.
     WhenSingular,
     /// Always: redundant rows then cost no extra factorisation.
     #[default]
@@ -54,7 +55,8 @@ pub enum LinearSolver {
     Multifrontal,
 }
 
-/// Settings of [`solve`](super::solve). `NlpSettings::default()` is a good general choice.
+/// Settings of [`solve`](super::solve). `NlpSettings::default()` is a good general choice. Numbers for which no range is
+/// given are positive, counts zero or more.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NlpSettings {
@@ -68,7 +70,7 @@ pub struct NlpSettings {
     pub complementarity_tolerance: f64,
     /// Iterations (feasibility phase included) before [`NlpStatus::IterationLimit`](super::NlpStatus). Default 1000.
     pub max_iterations: usize,
-    /// Wall time in seconds before [`NlpStatus::TimeLimit`](super::NlpStatus). Default infinity (JSON: null).
+    /// Wall time in seconds before [`NlpStatus::TimeLimit`](super::NlpStatus). Default infinity (JSON: null). From 0.
     #[serde(with = "infinite_as_null")]
     pub max_seconds: f64,
     /// |x| beyond which the problem is called unbounded. Default 1e20 (IPOPT `diverging_iterates_tol`).
@@ -83,28 +85,30 @@ pub struct NlpSettings {
     pub mu_warm: Option<f64>,
     /// Error to which a barrier problem is solved, in units of mu. Default 10 (WB06 kappa_epsilon).
     pub kappa_epsilon: f64,
-    /// Linear decrease of mu. Default 0.2 (WB06 kappa_mu).
+    /// Linear decrease of mu. Default 0.2 (WB06 kappa_mu). 1e-6 to 0.999.
     pub kappa_mu: f64,
-    /// Superlinear decrease mu^theta_mu. Default 1.5 (WB06 theta_mu).
+    /// Superlinear decrease mu^theta_mu. Default 1.5 (WB06 theta_mu). 1 to 1.999.
     pub theta_mu: f64,
-    /// Smallest fraction to the boundary. Default 0.99 (WB06 tau_min).
+    /// Smallest fraction to the boundary. Default 0.99 (WB06 tau_min). 0.1 to 0.999999.
     pub tau_min: f64,
 
     /// Widening of every bound, relative to max(1, |bound|). Default 1e-8 (WB06 section 3.5).
+    /// 0 to `violation_tolerance`.
     pub bound_relaxation: f64,
     /// Smallest distance of a cold start from its bounds, relative to max(1, |bound|). Default 0.01 (WB06 kappa_1).
+    /// Up to 1e10.
     pub bound_push: f64,
-    /// The same relative to the distance between two bounds. Default 0.01 (WB06 kappa_2).
+    /// The same relative to the distance between two bounds. Default 0.01 (WB06 kappa_2). Up to 0.5.
     pub bound_fraction: f64,
-    /// [`bound_push`](Self::bound_push) of a warm start. Default 1e-6.
+    /// [`bound_push`](Self::bound_push) of a warm start. Default 1e-6. Up to 1e10.
     pub warm_bound_push: f64,
-    /// [`bound_fraction`](Self::bound_fraction) of a warm start. Default 1e-6.
+    /// [`bound_fraction`](Self::bound_fraction) of a warm start. Default 1e-6. Up to 0.5.
     pub warm_bound_fraction: f64,
-    /// Smallest bound multiplier of a warm start. Default 1e-9.
+    /// Smallest bound multiplier of a warm start. Default 1e-9. Up to 1e10.
     pub warm_multiplier_push: f64,
     /// First bound multipliers of a cold start. Default one.
     pub bound_multiplier_start: BoundMultiplierStart,
-    /// Least-squares row multipliers larger than this are replaced by zero. Default 1000 (WB06 lambda_max).
+    /// Least-squares row multipliers larger than this are replaced by zero. Default 1000 (WB06 lambda_max). From 0.
     pub multiplier_limit: f64,
 
     /// Gradient-based scaling at the start: objective and rows are scaled down until their largest derivative is
@@ -113,30 +117,31 @@ pub struct NlpSettings {
 
     /// Until the unscaled violation has once been as small as this, the Hessian is that of the objective alone: far from
     /// a feasible point the multipliers are large and mean little, and the curvature they give the rows only calls for
-    /// regularisation and short steps. Default infinite (JSON: null): always the whole Hessian.
+    /// regularisation and short steps. Default infinite (JSON: null): always the whole Hessian. From 0.
     #[serde(with = "infinite_as_null")]
     pub curvature_from_violation: f64,
     /// First regularisation of the Hessian. Default 1e-4 (WB06 delta_w^0).
     pub hessian_regularisation_first: f64,
-    /// Smallest regularisation of the Hessian. Default 1e-20 (WB06 delta_w^min).
+    /// Smallest regularisation of the Hessian. Default 1e-20 (WB06 delta_w^min). At most the first.
     pub hessian_regularisation_min: f64,
-    /// Regularisation of the Hessian that counts as failure. Default 1e20.
+    /// Regularisation of the Hessian that counts as failure. Default 1e20. At least the first.
     pub hessian_regularisation_max: f64,
     /// Once the unregularised matrix has had the wrong inertia in two iterations in a row, the next iterations begin with
     /// the last regularisation, fading, instead of factorising it again: one more for each further refusal, at most
     /// this many. Default 0 (WB06: always try).
     pub regularisation_memory: usize,
-    /// First weight of the proximal term that follows steps cut by the line search; 0: none. Default 1e-4.
+    /// First weight of the proximal term that follows steps cut by the line search; 0: none. Default 1e-4. 0 to 1e4.
     pub proximal_first: f64,
     /// When delta_c > 0. Default always.
     pub dual_regularisation: DualRegularisation,
-    /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c).
+    /// delta_c = this * mu^(1/4). Default 1e-8 (WB06 delta_c bar, kappa_c). 1e-20 to 1.
     pub dual_regularisation_value: f64,
 
     /// Relative residual of the full KKT system that ends iterative refinement. Default 1e-7: smaller ones cost substitutions
-    /// and save no iterations.
+    /// and save no iterations. 1e-16 to 1.
     pub residual_target: f64,
     /// Relative residual above which the step is refused and the matrix treated as singular. Default 1e-5.
+    /// From the target to 1.
     pub residual_limit: f64,
     /// Refinement steps per system. Default 10.
     pub max_refinements: usize,
@@ -152,10 +157,10 @@ pub struct NlpSettings {
     /// feasibility phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
     pub max_soft_steps: usize,
 
-    /// Weight of the l1 violation in the feasibility phase. Default 1000 (WB06 rho).
+    /// Weight of the l1 violation in the feasibility phase. Default 1000 (WB06 rho). 1 to 1e12.
     pub elastic_weight: f64,
     /// The feasibility phase ends when the violation has fallen to this share of its first value and the filter
-    /// accepts. Default 0.9 (WB06 kappa_resto).
+    /// accepts. Default 0.9 (WB06 kappa_resto). 0 to 0.999999.
     pub required_reduction: f64,
     /// Steps below 0.05 in a row after which the feasibility phase is entered without waiting for the line search to
     /// fail: a point pressed against its bounds with growing multipliers rarely recovers by itself. Default 5; 0: never.
@@ -242,7 +247,7 @@ impl NlpSettings {
         in_range("kappa_mu", self.kappa_mu, 1e-6, 0.999)?;
         in_range("theta_mu", self.theta_mu, 1.0, 1.999)?;
         in_range("tau_min", self.tau_min, 0.1, 0.999_999)?;
-        in_range("bound_relaxation", self.bound_relaxation, 0.0, 1e-2)?;
+        in_range("bound_relaxation", self.bound_relaxation, 0.0, self.violation_tolerance)?;
         in_range("bound_push", self.bound_push, f64::MIN_POSITIVE, 1e10)?;
         in_range("bound_fraction", self.bound_fraction, f64::MIN_POSITIVE, 0.5)?;
         in_range("warm_bound_push", self.warm_bound_push, f64::MIN_POSITIVE, 1e10)?;
@@ -254,13 +259,9 @@ impl NlpSettings {
         }
         in_range("curvature_from_violation", self.curvature_from_violation, 0.0, f64::INFINITY)?;
         positive("hessian_regularisation_first", self.hessian_regularisation_first)?;
-        positive("hessian_regularisation_min", self.hessian_regularisation_min)?;
-        in_range(
-            "hessian_regularisation_max",
-            self.hessian_regularisation_max,
-            self.hessian_regularisation_first,
-            f64::MAX,
-        )?;
+        let first = self.hessian_regularisation_first;
+        in_range("hessian_regularisation_min", self.hessian_regularisation_min, f64::MIN_POSITIVE, first)?;
+        in_range("hessian_regularisation_max", self.hessian_regularisation_max, first, f64::MAX)?;
         in_range("proximal_first", self.proximal_first, 0.0, 1e4)?;
         in_range("dual_regularisation_value", self.dual_regularisation_value, 1e-20, 1.0)?;
         in_range("residual_target", self.residual_target, 1e-16, 1.0)?;

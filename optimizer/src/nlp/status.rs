@@ -160,12 +160,22 @@ impl NlpResult {
     }
 }
 
+/// A range in words; what is open has no end.
+fn range(low: f64, high: f64) -> String {
+    match (low == f64::MIN_POSITIVE, high >= f64::MAX) {
+        (true, true) => "any positive number".to_owned(),
+        (true, false) => format!("more than 0, up to {high}"),
+        (false, true) => format!("{low} and more"),
+        (false, false) => format!("{low} to {high}"),
+    }
+}
+
 /// Why a solve could not begin.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NlpError {
     /// A setting is out of range.
-    #[error("setting {field} is {value}, allowed is {low} to {high}")]
+    #[error("setting {field} is {value}, allowed is {}", range(*low, *high))]
     InvalidSetting {
         /// Name of the field.
         field: &'static str,

@@ -16,6 +16,10 @@ use std::sync::mpsc;
 /// Largest scaled violation of a gait that is called converged.
 pub const CONVERGED_VIOLATION: f64 = 1e-6;
 
+/// Local optima that differ by less are one: what is left of an objective and of a Gait RMSE at the tolerance of a solve.
+const SAME_OBJECTIVE: f64 = 1e-4;
+const SAME_RMSE_RAD: f64 = 5e-3;
+
 /// A result with what choosing needs.
 pub(super) struct Choice {
     pub(super) result: NlpResult,
@@ -58,6 +62,7 @@ impl Choice {
             objective: self.objective,
             gait_rmse_rad: self.rmse,
             reason: run.reason.clone(),
+            basin: None,
             chosen: false,
         }
     }
@@ -110,6 +115,22 @@ pub(super) fn try_warm(
     Ok(Tried::new(context, result, strategy, margins, &run))
 }
 
+/// Numbers the local optima in which the attempts ended: those whose objective and Gait RMSE agree are one.
+pub(super) fn number_basins(tried: &mut [Tried]) {
+    let mut known: Vec<(f64, f64)> = Vec::new();
+    for attempt in tried.iter_mut().map(|t| &mut t.attempt).filter(|a| a.status == SolveStatus::Converged) {
+        let (objective, rmse) = (attempt.objective, attempt.gait_rmse_rad);
+        let same = |&(other, other_rmse): &(f64, f64)| {
+            (objective - other).abs() <= SAME_OBJECTIVE * other.abs() && (rmse - other_rmse).abs() <= SAME_RMSE_RAD
+        };
+        let number = known.iter().position(same).unwrap_or_else(|| {
+            known.push((objective, rmse));
+            known.len() - 1
+        });
+        attempt.basin = Some(number + 1);
+    }
+}
+
 /// Solves on from the chosen gait with bounds tightened where it exceeds them between its mesh points, until it does not
 /// or the rounds are over. Index of the answer: the last gait that converged, or what was cancelled.
 pub(super) fn keep_between_points(
@@ -133,7 +154,8 @@ pub(super) fn keep_between_points(
         let mut run = Run::new(context, context.options.threads, observer);
         run.guess = tried.len();
         let result = run.warm(Phase::BetweenPoints, &context.programme.tightened(&margins), point)?;
-        let next = Tried::new(context, result, "bounds tightened between mesh points", margins, &run);
+        let mut next = Tried::new(context, result, "bounds tightened between mesh points", margins, &run);
+        next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.choice.status == SolveStatus::Converged);
         let status = next.choice.status;
         tried.push(next);
         if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {

@@ -4,6 +4,7 @@ use super::GaitProblem;
 use crate::cold_start::{self, GuessSettings};
 use crate::gait_problem::GaitProgramme;
 use crate::gait_problem::programme::{EVEN_TIMING, StrideTiming};
+use crate::nlp::{BarrierStrategy, NlpSettings};
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,47 @@ impl GuessTiming {
     }
 }
 
+/// How the interior point goes about the cost phase.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum CostStrategy {
+    /// By the options of the solve.
+    #[default]
+    Usual,
+    /// The barrier parameter may rise and fall with the complementarity that is met.
+    AdaptiveBarrier,
+    /// Regularisation of the Hessian and the proximal term begin a hundred times as large: shorter steps.
+    MoreRegularisation,
+    /// The feasibility phase is entered after two short steps and left when the violation has fallen to a tenth.
+    EarlyElasticPhase,
+}
+
+impl CostStrategy {
+    /// The usual settings of the phase, changed.
+    pub(super) fn applied(self, usual: &NlpSettings) -> NlpSettings {
+        match self {
+            Self::Usual => *usual,
+            Self::AdaptiveBarrier => NlpSettings { barrier_strategy: BarrierStrategy::Adaptive, ..*usual },
+            Self::MoreRegularisation => NlpSettings {
+                hessian_regularisation_first: 100.0 * usual.hessian_regularisation_first,
+                hessian_regularisation_max: 100.0 * usual.hessian_regularisation_max,
+                proximal_first: 100.0 * usual.proximal_first,
+                ..*usual
+            },
+            Self::EarlyElasticPhase => NlpSettings { short_step_limit: 2, required_reduction: 0.1, ..*usual },
+        }
+    }
+
+    fn in_words(self) -> Option<&'static str> {
+        match self {
+            Self::Usual => None,
+            Self::AdaptiveBarrier => Some("adaptive barrier"),
+            Self::MoreRegularisation => Some("more regularisation"),
+            Self::EarlyElasticPhase => Some("early elastic phase"),
+        }
+    }
+}
+
 /// One way to begin cold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -63,8 +105,8 @@ pub struct ColdGuess {
     pub barrier: f64,
     /// Scaled violation from which on the constraints' curvature counts (`NlpSettings::curvature_from_violation`).
     pub curvature_from: f64,
-    /// Whether the cost phase may raise and lower the barrier parameter by the complementarity it meets.
-    pub adaptive_barrier: bool,
+    /// How the cost phase is gone about.
+    pub strategy: CostStrategy,
 }
 
 impl ColdGuess {
@@ -77,7 +119,7 @@ impl ColdGuess {
         timing: GuessTiming::Even,
         barrier: 1e-5,
         curvature_from: 0.03,
-        adaptive_barrier: false,
+        strategy: CostStrategy::Usual,
     };
     /// With muscles mostly the basin with the lowest objective and a stiff swing knee.
     pub const EARLY_RISE: Self = Self { timing: GuessTiming::EarlyRise, curvature_from: 0.3, ..Self::NATURAL };
@@ -86,14 +128,18 @@ impl ColdGuess {
     /// others one after the other only while none has converged.
     /// The timing decides the basin most (with muscles: natural or stiff swing knee), then when the curvature of the
     /// constraints counts; route, knee flexion, stride and barrier hardly matter (`examples/basins.rs`).
-    pub const CATALOGUE: [Self; 7] = [
+    pub const CATALOGUE: [Self; 11] = [
         Self::NATURAL,
         Self::EARLY_RISE,
         Self { curvature_from: WHOLE_HESSIAN, ..Self::NATURAL },
         Self { route: ColdRoute::MuscleTracking, ..Self::NATURAL },
         Self { route: ColdRoute::MuscleTracking, ..Self::EARLY_RISE },
         Self { route: ColdRoute::PlainOptimum, ..Self::NATURAL },
-        Self { adaptive_barrier: true, ..Self::NATURAL },
+        Self { stride_time_s: 1.1, stride_length_m: 1.25, ..Self::NATURAL },
+        Self { stride_time_s: 1.1, stride_length_m: 1.25, ..Self::EARLY_RISE },
+        Self { strategy: CostStrategy::MoreRegularisation, ..Self::NATURAL },
+        Self { strategy: CostStrategy::AdaptiveBarrier, ..Self::NATURAL },
+        Self { strategy: CostStrategy::EarlyElasticPhase, ..Self::NATURAL },
     ];
 
     /// Checks every field.
@@ -155,8 +201,9 @@ impl ColdGuess {
         if self.timing == GuessTiming::EarlyRise {
             label.push_str(", early rise");
         }
-        if self.adaptive_barrier {
-            label.push_str(", adaptive barrier");
+        if let Some(strategy) = self.strategy.in_words() {
+            label.push_str(", ");
+            label.push_str(strategy);
         }
         let normal = match self.timing {
             GuessTiming::Even => Self::NATURAL,

@@ -72,6 +72,10 @@ pub struct Attempt {
     /// Why it could not be carried through, in words; empty when it could.
     #[serde(default)]
     pub reason: String,
+    /// Which of the local optima that were found it ended in, from 1 in the order of the attempts; none where it did not
+    /// converge. Attempts of one number ended in the same gait.
+    #[serde(default)]
+    pub basin: Option<usize>,
     /// Whether it is the answer.
     pub chosen: bool,
 }

@@ -5,8 +5,8 @@ use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveO
 use crate::cold_start;
 use crate::gait_problem::GaitProgramme;
 use crate::nlp::{
-    self, BarrierStrategy, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, Residuals,
-    StartPoint, Timing, WarmPoint,
+    self, Counts, NlpError, NlpResult, NlpSettings, NlpStatus, NonlinearProgram, Residuals, StartPoint, Timing,
+    WarmPoint,
 };
 use std::time::Instant;
 
@@ -169,23 +169,19 @@ impl<'a> Run<'a> {
         if Self::interrupted(&tracked) {
             return Ok(tracked);
         }
-        let barrier_strategy =
-            if guess.adaptive_barrier { BarrierStrategy::Adaptive } else { BarrierStrategy::Monotone };
         let tolerance = self.context.options.tolerance;
-        let settings = NlpSettings { tolerance, mu_initial: guess.barrier, barrier_strategy, ..every_phase };
-        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), &settings)
+        let usual = NlpSettings { tolerance, mu_initial: guess.barrier, ..every_phase };
+        self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), &guess.strategy.applied(&usual))
     }
 
-    /// Begins with the barrier parameter that a cold start ends with: a larger one forgets the point, and with a smaller
-    /// or larger one the same problem would end elsewhere.
+    /// Begins with the barrier parameter that the point's own complementarity has in the mean: larger ones, by the violation
+    /// of the changed bounds, forget the point (twice to four times the iterations), smaller ones take more as well.
     pub(super) fn warm(
         &mut self,
         phase: Phase,
         programme: &GaitProgramme,
         point: WarmPoint,
     ) -> Result<NlpResult, SolveError> {
-        let solver = self.context.options.solver;
-        let mu_warm = self.context.options.tolerance / (solver.kappa_epsilon + 1.0);
         self.phase(
             phase,
             programme,
@@ -193,10 +189,9 @@ impl<'a> Run<'a> {
             &NlpSettings {
                 tolerance: self.context.options.tolerance,
                 mu_initial: MU_COST,
-                mu_warm: Some(mu_warm),
                 warm_bound_push: 1e-7,
                 warm_bound_fraction: 1e-7,
-                ..solver
+                ..self.context.options.solver
             },
         )
     }

@@ -81,8 +81,14 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     if let Some(field) = DECIDED_BY_PHASES.into_iter().find(|&field| given.contains_key(field)) {
         return Err(D::Error::custom(decided(field)));
     }
-    all.extend(given);
-    serde_json::from_value(Value::Object(all)).map_err(D::Error::custom)
+    let mut settings = default();
+    for (field, value) in given {
+        all.insert(field.clone(), value);
+        // One after the other: what is wrong is then known by name.
+        settings = serde_json::from_value(Value::Object(all.clone()))
+            .map_err(|error| D::Error::custom(format!("solver.{field}: {error}")))?;
+    }
+    Ok(settings)
 }
 
 #[cfg(test)]
@@ -115,7 +121,11 @@ mod tests {
         for (text, expected) in [
             (r#"{"solver": {"tau_min": 1.5}}"#, "tau_min"),
             (r#"{"solver": {"tau_mni": 0.9}}"#, "unknown field `tau_mni`"),
-            (r#"{"solver": {"tau_min": "high"}}"#, "invalid type: string"),
+            (r#"{"solver": {"tau_min": "high"}}"#, "solver.tau_min: invalid type: string"),
+            (r#"{"solver": {"kappa_epsilon": 5, "linear_solver": "ma57"}}"#, "solver.linear_solver: unknown variant"),
+            (r#"{"solver": {"bound_relaxation": 1e-3}}"#, "bound_relaxation is 0.001, allowed is 0 to 0.000001"),
+            (r#"{"solver": {"hessian_regularisation_min": 1}}"#, "allowed is more than 0, up to 0.0001"),
+            (r#"{"solver": {"kappa_epsilon": 0}}"#, "kappa_epsilon is 0, allowed is any positive number"),
             (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial is decided by the phases of a solve"),
             (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial is decided by the phases of a solve"),
             (r#"{"solver": {"threads": 2}}"#, "threads is decided by the phases of a solve"),

@@ -157,11 +157,17 @@ fn in_words(explanation: &Explanation) -> Vec<String> {
         let BoundAtLimit { bound, meaning, value, domains } = at_limit;
         lines.push(format!("  at its limit: {bound} = {value} ({meaning}) in {}", domains.join(", ")));
     }
-    for Relaxation { bound, meaning, from, to, not_with, .. } in &explanation.relaxations {
+    for Relaxation { bound, meaning, from, to, not_with, undecided, .. } in &explanation.relaxations {
         lines.push(match to {
             Some(to) => format!(
-                "  with {bound} = {to} instead of {from} alone, a gait converges ({meaning}; not with {not_with})"
+                "  with {bound} = {to} instead of {from} alone, a gait converges ({meaning}; {} with {not_with})",
+                if *undecided { "none was found" } else { "not" }
             ),
+            None if *undecided => {
+                format!(
+                    "  {bound} alone, up to {not_with}: no gait was found within the limits of the solves ({meaning})"
+                )
+            }
             None => format!("  {bound} alone does not help, up to {not_with} ({meaning})"),
         });
     }
