@@ -3,6 +3,7 @@
 //! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
 //! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
 
+use super::examiner::Examiner;
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::record;
@@ -16,7 +17,7 @@ use crate::store::{
     Store, StoreError, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies,
     subjects, trials,
 };
-use crate::workers::{Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
+use crate::workers::{Assignment, Attempt, Board, Dispatch, Examine, Finding, IN_PROCESS, News};
 use gait_optimizer::{GaitProblem, SolveStatus, TunedBounds};
 use serde_json::json;
 use std::collections::HashMap;
@@ -47,6 +48,8 @@ struct Inner {
     rehearsals: Rehearsals,
     /// Where the studies stand that wait for an answer, as of the last plan: what may be rehearsed.
     waiting: watch::Sender<Arc<[Standing]>>,
+    /// What examines the best gaits of studies that ended.
+    examiner: Option<Examiner>,
     /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
     /// where no job of a trial is.
     hand_over: Mutex<()>,
@@ -70,9 +73,15 @@ impl fmt::Debug for Inner {
 }
 
 impl Director {
-    /// A director over a record; [`Self::run`] sets it to work.
-    pub fn new(store: Store, engine: Arc<dyn Dispatch>, only: Option<StudyId>) -> Self {
+    /// A director over a record; [`Self::run`] sets it to work. Without `examine`, a gait is examined when somebody asks.
+    pub fn new(
+        store: Store,
+        engine: Arc<dyn Dispatch>,
+        only: Option<StudyId>,
+        examine: Option<Arc<dyn Examine>>,
+    ) -> Self {
         Self(Arc::new(Inner {
+            examiner: examine.map(|examine| Examiner::new(store.clone(), examine)),
             store,
             engine,
             board: Arc::default(),
@@ -118,6 +127,17 @@ impl Director {
         self.0.wake.notify_one();
     }
 
+    /// Asks for the best gaits of a study to be examined, where the record has no certificate of `next`. `false`: that is done
+    /// only when somebody asks for one gait.
+    pub fn examine(&self, study: StudyId, next: TrialId) -> bool {
+        self.0.examiner.as_ref().is_some_and(|examiner| examiner.ask(study, next))
+    }
+
+    /// Whether a gait of a study is being examined, or waits for that.
+    pub fn is_examining(&self, study: StudyId, gait: TrialId) -> bool {
+        self.0.examiner.as_ref().is_some_and(|examiner| examiner.is_at(study, gait))
+    }
+
     /// Asks the solve of a trial to stop within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
         self.0.engine.withdraw(self.0.rehearsals.name_of(trial)).await;
@@ -141,11 +161,19 @@ impl Director {
             () = self.keep_planning() => {}
             () = self.keep_listening() => {}
             () = self.keep_rehearsing() => {}
+            () = self.keep_examining() => {}
         }
         self.0.tasks.close();
         self.0.tasks.wait().await;
         self.withdraw(self.0.rehearsals.forget_running()).await;
         self.take_back_leases().await
+    }
+
+    async fn keep_examining(&self) {
+        match &self.0.examiner {
+            Some(examiner) => examiner.run(self.pulse(), || self.changed()).await,
+            None => std::future::pending().await,
+        }
     }
 
     async fn keep_planning(&self) {
