@@ -125,3 +125,39 @@ async fn a_trial_gets_its_certificate_once() {
     assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");
     service.stop().await;
 }
+
+#[tokio::test]
+async fn what_a_trial_solved_is_solved_again_at_the_command_line_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
+    let study = service
+        .study(|new| {
+            (new.muscles, new.trial_budget) = (false, 2);
+            new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    for trial in service.trials(study).await {
+        let file = format!("problem-trial-{}.json", trial.number);
+        let address = format!("/api/v1/trials/{}/problem.json", trial.id);
+        let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+        assert!(page.contains(&format!("href=\"{address}\" download=\"{file}\"")), "{page}");
+        let problem = service.fetch(&address).await;
+        assert!(problem.headers["content-disposition"].to_str().unwrap().contains(&file));
+        assert_eq!(problem.json()["warm_start"].is_object(), trial.warm_started_from.is_some());
+        std::fs::write(folder.path().join(&file), &problem.text).unwrap();
+        let figures = done(folder.path(), &["solve", "--problem", &file, "--json"]);
+        let figures: Value = serde_json::from_str(&figures).unwrap();
+        let report = serde_json::to_value(trial.report.unwrap()).unwrap();
+        for same in ["status", "started_from", "iterations", "objective", "gait_rmse_rad", "max_violation"] {
+            assert_eq!(figures[same], report[same], "trial {}: {same}", trial.number);
+        }
+        let mut wrong = problem.json();
+        wrong["problem"]["subject"]["height_m"] = json!(9.0);
+        std::fs::write(folder.path().join("wrong.json"), wrong.to_string()).unwrap();
+        refused(folder.path(), &["solve", "--problem", "wrong.json"], "height_m");
+        let both = ["solve", "--problem", &file, "--muscles", "off"];
+        refused(folder.path(), &both, "cannot be used with");
+    }
+    service.stop().await;
+}

@@ -8,17 +8,15 @@ use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::record;
 use super::rehearsal::{LikelyNext, PREPARED, Prepared, Rehearsals};
+use super::solve_input::SolveInput;
 use super::standing::Standing;
 use crate::error::Error;
 use crate::store::jobs::Lease;
-use crate::store::studies::{Study, StudyPlan, StudyState};
+use crate::store::studies::{Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
-use crate::store::{
-    Store, StoreError, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies,
-    subjects, trials,
-};
+use crate::store::{Store, StoreError, StudyId, TrialId, commit, events, feedback, gaits, jobs, now, studies, trials};
 use crate::workers::{Assignment, Attempt, Board, Dispatch, Examine, Finding, IN_PROCESS, News};
-use gait_optimizer::{GaitProblem, SolveStatus, TunedBounds};
+use gait_optimizer::SolveStatus;
 use serde_json::json;
 use std::collections::HashMap;
 use std::fmt;
@@ -385,9 +383,10 @@ impl Director {
             }
             // No trial has this name: what comes of it is kept here until one asks.
             let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
-            let start = new.warm_started_from;
-            let assignment =
-                assignment_of(&self.0.store, &study.plan, (attempt, new.number), new.action, start).await?;
+            let mut reader = self.0.store.read().await?;
+            let input = SolveInput::of(&mut reader, &study.plan, new.action, new.warm_started_from).await?;
+            drop(reader);
+            let assignment = assigned(attempt, new.number, input);
             let _hand_over = self.0.hand_over.lock().await;
             if self.busy().await? < self.0.engine.size()
                 && self.0.rehearsals.begin(study.id, &assignment)
@@ -524,30 +523,12 @@ impl Director {
 /// The solve of a leased job.
 async fn assignment(store: &Store, lease: &Lease) -> Result<Assignment, Error> {
     let mut reader = store.read().await?;
-    let trial = trials::get(&mut reader, lease.trial).await?;
-    let plan = studies::get(&mut reader, lease.study).await?.plan;
-    drop(reader);
-    let attempt = Attempt { trial: lease.trial, number: lease.attempt };
-    assignment_of(store, &plan, (attempt, trial.number), trial.action, trial.warm_started_from).await
+    let number = trials::get(&mut reader, lease.trial).await?.number;
+    let input = SolveInput::of_trial(&mut reader, lease.trial).await?;
+    Ok(assigned(Attempt { trial: lease.trial, number: lease.attempt }, number, input))
 }
 
-/// Collects what a solve needs: of a trial with this number, or of one that may come.
-async fn assignment_of(
-    store: &Store,
-    plan: &StudyPlan,
-    (attempt, number): (Attempt, u32),
-    bounds: TunedBounds,
-    start: Option<TrialId>,
-) -> Result<Assignment, Error> {
-    let mut reader = store.read().await?;
-    let subject = subjects::get(&mut reader, plan.subject_id).await?.body();
-    let device = devices::get(&mut reader, plan.device_id).await?.definition;
-    let reference = reference_gaits::get(&mut reader, plan.reference_gait_id).await?.definition;
-    let warm_start = match start {
-        Some(from) => Some(gaits::warm_start(&mut reader, from).await?),
-        None => None,
-    };
-    let (muscles, settings) = (plan.muscles, *plan.gait_settings);
-    let problem = GaitProblem { subject, device, bounds, muscles, settings, reference };
-    Ok(Assignment { attempt, number, problem, warm_start, options: plan.solve_options })
+fn assigned(attempt: Attempt, number: u32, input: SolveInput) -> Assignment {
+    let SolveInput { problem, options, warm_start } = input;
+    Assignment { attempt, number, problem, warm_start, options }
 }

@@ -34,6 +34,7 @@ pub mod safety_review;
 pub mod script;
 pub mod search;
 pub mod seed;
+pub mod solve_input;
 pub mod standing;
 pub mod suggestion;
 pub mod summary;

@@ -5,8 +5,10 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{TrialId, consents, gaits, trials};
+use crate::studies::solve_input::SolveInput;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -25,6 +27,28 @@ pub(super) struct Sampling {
 
 pub(super) fn two_hundred() -> f64 {
     200.0
+}
+
+/// `GET /trials/{id}/problem.json`: everything that the solve of the trial depends on.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/problem.json",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial; what it started from was not dropped")),
+    responses((status = 200, description = "What `gaitwright solve --problem` does again: subject, device, bounds, settings, reference gait, limits, start", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn problem(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Response, Error> {
+    let mut reader = app.read().await?;
+    let number = trials::get(&mut reader, id).await?.number;
+    let input = SolveInput::of_trial(&mut reader, id).await?;
+    drop(reader);
+    let text = serde_json::to_string(&input).map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
 }
 
 /// `GET /trials/{id}/gait.mot`: OpenSim motion file.

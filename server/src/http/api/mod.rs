@@ -85,6 +85,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::attempts))
         .routes(routes!(gaits::get))
         .routes(routes!(gaits::get_csv))
+        .routes(routes!(exports::problem))
         .routes(routes!(exports::motion_file))
         .routes(routes!(exports::controller))
         .routes(routes!(motion::get))

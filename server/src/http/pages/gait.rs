@@ -45,8 +45,6 @@ struct GaitPage {
     bounds: Vec<BoundUse>,
     /// Why there is no gait.
     explanation: Option<&'static str>,
-    /// The command that looks for the bound that must give way.
-    explain: String,
     phases: [(&'static str, &'static str); 4],
     /// Who called it unsafe.
     unsafe_by: Vec<Closed>,
@@ -114,7 +112,6 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         figures: figures(&trial),
         bounds: drawn.bounds,
         explanation: trial.status.and_then(explanation),
-        explain: explain(&trial, &study),
         from,
         reference: reference_name,
         has_gait,
@@ -185,15 +182,6 @@ fn explanation(status: SolveStatus) -> Option<&'static str> {
             "The optimiser ended before every constraint was met. That is no proof that these bounds have no gait.",
         ),
     }
-}
-
-/// The command line that relaxes one bound after the other until there is a gait.
-fn explain(trial: &Trial, study: &Study) -> String {
-    let values = trial.action.to_array();
-    let bounds: Vec<String> =
-        TunedBounds::NAMES.iter().zip(values).map(|(name, value)| format!("{name}={value}")).collect();
-    let muscles = if study.plan.muscles { "on" } else { "off" };
-    format!("gaitwright solve --muscles {muscles} --bounds {} --explain", bounds.join(","))
 }
 
 fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
