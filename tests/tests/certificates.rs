@@ -107,7 +107,7 @@ async fn a_trial_gets_its_certificate_once() {
     assert!(motion.text.contains("inDegrees=yes") && motion.text.contains("knee_angle_l"), "{}", motion.text);
     let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
     assert_eq!(ControllerFile::from_json(&controller.text).unwrap().domains.len(), 8);
-    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("controller-"));
+    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("device-trial-1.json"));
     let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json?rate_hz=1", trial.id)).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
     assert!(refused.text.contains("rate_hz") && page.contains("/controller.json"), "{}", refused.text);

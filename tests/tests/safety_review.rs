@@ -99,8 +99,10 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let remarks = format!("/api/v1/studies/{study}/remarks");
     service.post(&remarks, &remark).await;
     assert_ne!(recommended().await["trial_id"], best);
-
     let best_id = best.as_str().unwrap();
+    let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
+    assert_eq!(for_the_device.status, StatusCode::CONFLICT);
+    assert!(for_the_device.text.contains("no device gets it"), "{}", for_the_device.text);
     let seen = objections(&service, study).await[0]["at"].clone();
     tokio::time::sleep(std::time::Duration::from_millis(2)).await;
     service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
@@ -115,6 +117,12 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let sent = service.post_text(&format!("/trials/{best_id}/safety-review"), FORM, &form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     assert_eq!(recommended().await["trial_id"], best);
+    let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
+    assert_ne!(
+        for_the_device.status,
+        StatusCode::CONFLICT,
+        "what the analytic solver gives is no gait, but that is all"
+    );
     let study_page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(study_page.contains("may be walked with again, K2: tried slowly"), "{study_page}");
     let twice = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r"})).await;

@@ -55,7 +55,13 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let remark = json!({"first": unsafe_one, "second": converged[3].id, "answer": "unsafe_first", "author": "K1",
         "note": "stumbled twice"});
     site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    let lifted = converged[4].id;
+    let remark = json!({"first": lifted, "second": converged[3].id, "answer": "unsafe_first", "author": "K1"});
+    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    let decision = json!({"verdict": "walkable", "author": "K2", "reason": "walked slowly, with a harness"});
+    site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;
     vec![
+        ("lifted-gait", format!("/trials/{lifted}")),
         ("lab-question", format!("/lab/{}", walked[0])),
         ("lab-answered", format!("/lab/{}", walked[1])),
         ("lab-session-told", format!("/lab-sessions/{}", walked[1])),

@@ -75,6 +75,8 @@ struct Live {
     running: Vec<RunningRow>,
     best: Option<Best>,
     unanswered: bool,
+    /// Whether people alone say what is better.
+    people_answer: bool,
     chart: Option<Drawn>,
     table: TrialsTable,
     /// Which gait grew out of which.
@@ -382,6 +384,7 @@ fn view(
         running,
         best,
         unanswered: figures.unanswered,
+        people_answer: standing.study.plan.feedback_mode == FeedbackMode::Human,
         chart: course(&[(&standing, figures)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
         tree: warm_starts(&standing, figures.best).map(|figure| Drawn::of(&figure, &files, "")),
