@@ -49,7 +49,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     assert_eq!((&said[0]["stands"], &said[0]["review"]), (&json!(true), &Value::Null));
     let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
     let page = service.fetch(&format!("/trials/{gait}")).await.text;
-    assert!(page.contains("do not walk with it") && page.contains("Decide about this"), "{page}");
+    assert!(page.contains("do not walk with it") && page.contains("May this gait be walked with again?"), "{page}");
     assert!(waits_at_home(&service).await);
 
     // It stays unsafe: nobody needs to look again, and it can still be lifted.

@@ -56,11 +56,6 @@ struct GaitPage {
 }
 
 impl GaitPage {
-    /// Whether staff decided about every objection that stands.
-    fn is_reviewed(&self) -> bool {
-        self.unsafe_by.iter().all(|closed| closed.review.is_some())
-    }
-
     /// When the newest of the objections was made.
     fn said_until(&self) -> Option<Instant> {
         self.unsafe_by.iter().map(|closed| closed.at).max()

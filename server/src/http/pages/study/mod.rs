@@ -270,7 +270,7 @@ pub(super) struct Figures {
 
 impl Figures {
     /// Gait RMSE of the best action by iteration.
-    fn course(&self) -> Vec<(f64, f64)> {
+    pub(super) fn course(&self) -> Vec<(f64, f64)> {
         let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
         self.history.iter().filter_map(point).collect()
     }
