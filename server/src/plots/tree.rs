@@ -17,9 +17,12 @@ pub struct Node {
     pub class: &'static str,
 }
 
-const STEP: f64 = 86.0;
+const STEP: f64 = 96.0;
 const ROW: f64 = 26.0;
 const MARGIN: f64 = 18.0;
+/// From the middle of a mark to its name, and the width of a character of that, as far as a branch needs to know it.
+const LABEL: f64 = 10.0;
+const CHARACTER: f64 = 7.4;
 /// Width of what one mark means.
 const LEGEND: f64 = 140.0;
 
@@ -81,9 +84,13 @@ impl Tree {
     fn draw(&self, svg: &mut String, links: bool) -> std::fmt::Result {
         let places = places(&self.nodes);
         for (node, (x, y)) in self.nodes.iter().zip(&places) {
-            if let Some((from_x, from_y)) = node.parent.and_then(|parent| places.get(parent)) {
-                let bend = from_x + STEP / 2.0;
-                write!(svg, "<path class=\"branch\" d=\"M{from_x} {from_y}C{bend} {from_y} {bend} {y} {x} {y}\"/>")?;
+            let Some(parent) = node.parent else { continue };
+            if let (Some((from_x, from_y)), Some(grown)) = (places.get(parent), self.nodes.get(parent)) {
+                // From the end of the parent's name, as far as there is room.
+                let name = LABEL + CHARACTER * grown.label.chars().count() as f64;
+                let start = (from_x + name).min(x - LABEL);
+                let bend = f64::midpoint(start, *x);
+                write!(svg, "<path class=\"branch\" d=\"M{start} {from_y}C{bend} {from_y} {bend} {y} {x} {y}\"/>")?;
             }
         }
         for (node, place) in self.nodes.iter().zip(&places) {
@@ -101,7 +108,7 @@ impl Tree {
 
 fn mark(svg: &mut String, class: &str, label: &str, (x, y): (f64, f64)) -> std::fmt::Result {
     write!(svg, "<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"6\"/>")?;
-    write!(svg, "<text x=\"{}\" y=\"{}\">{}</text>", x + 10.0, y + 4.5, escape(label))
+    write!(svg, "<text x=\"{}\" y=\"{}\">{}</text>", x + LABEL, y + 4.5, escape(label))
 }
 
 /// The first child continues the row of its parent, every other one begins a row below all that grew before.
