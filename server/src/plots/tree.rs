@@ -90,7 +90,7 @@ impl Tree {
                 let name = LABEL + CHARACTER * grown.label.chars().count() as f64;
                 let start = (from_x + name).min(x - LABEL);
                 let bend = f64::midpoint(start, *x);
-                write!(svg, "<path class=\"branch\" d=\"M{start} {from_y}C{bend} {from_y} {bend} {y} {x} {y}\"/>")?;
+                write!(svg, "<path class=\"branch\" d=\"M{start} {from_y}H{bend}V{y}H{x}\"/>")?;
             }
         }
         for (node, place) in self.nodes.iter().zip(&places) {

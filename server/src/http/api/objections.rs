@@ -41,8 +41,10 @@ impl From<Closed> for Objection {
     }
 }
 
-/// `GET /studies/{id}/objections`: by raters, in remarks and in lab sessions, those that were lifted included; what its author
-/// took back is left out. Of a lab session whose order was not told both gaits are named.
+/// `GET /studies/{id}/objections`: every time that a gait was called unsafe, also what was lifted since.
+///
+/// By raters, in remarks and in lab sessions; what its author took back is left out. Of a lab session whose order was not told
+/// both gaits are named.
 #[utoipa::path(
     get,
     path = "/studies/{id}/objections",
@@ -64,9 +66,11 @@ pub(super) async fn of_study(
     Ok(Json(all))
 }
 
-/// `POST /trials/{id}/safety-reviews`: staff looked at a gait that was called unsafe, and decide. Where it may be walked with
-/// again it can be recommended, asked about and planned; what was said stays in the record, and what the learner heard of it is
-/// taken back. When the order of a lab session is told later, what was said there closes the gait again that it was said of.
+/// `POST /trials/{id}/safety-reviews`: staff looked at a gait that was called unsafe, and decide.
+///
+/// Where it may be walked with again it can be recommended, asked about and planned; what was said stays in the record, and what
+/// the learner heard of it is taken back. When the order of a lab session is told later, what was said there closes the gait
+/// again that it was said of.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",
