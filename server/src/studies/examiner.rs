@@ -105,6 +105,10 @@ impl Examiner {
         let study = studies::get(&mut reader, id).await?;
         let standing = Standing::read(&mut reader, study).await?;
         drop(reader);
+        if standing.waits_for_first_answer() {
+            // Nothing is recommended yet.
+            return Ok(false);
+        }
         let ranking = tokio::task::spawn_blocking(move || ranking(&standing));
         let ranking = ranking.await.map_err(|e| Error::Internal(e.to_string()))?.map_err(Error::Learner)?;
         let refused = self.state().refused.clone();
