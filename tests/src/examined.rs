@@ -1,6 +1,9 @@
 //! What an examination leaves, without one.
 
 use gait_optimizer::certificate::{Certificate, FORMAT_VERSION};
+use gait_optimizer::{Gait, ModelError};
+use gaitwright::workers::Examine;
+use std::time::Duration;
 
 /// A certificate that passed, or one of a walker that falls.
 pub fn certificate(passed: bool) -> Certificate {
@@ -14,5 +17,20 @@ pub fn certificate(passed: bool) -> Certificate {
         return_map: None,
         free_hip_return_map: None,
         pushes: None,
+    }
+}
+
+/// An examiner that takes its time, and passes the gaits that it is told to.
+pub struct Verdicts<P> {
+    /// How long an examination takes.
+    pub pause: Duration,
+    /// Which gaits pass.
+    pub passes: P,
+}
+
+impl<P: Fn(&Gait) -> bool + Send + Sync + 'static> Examine for Verdicts<P> {
+    fn examine(&self, gait: &Gait) -> Result<Certificate, ModelError> {
+        std::thread::sleep(self.pause);
+        Ok(certificate((self.passes)(gait)))
     }
 }

@@ -14,7 +14,7 @@ use gaitwright::store::{
 use gaitwright::studies::catalogue;
 use gaitwright::studies::director::Director;
 use gaitwright::studies::plan::{self, NewStudy};
-use gaitwright::workers::{Dispatch, Evaluate, InProcess};
+use gaitwright::workers::{Dispatch, Evaluate, Examine, InProcess};
 use http_body_util::BodyExt;
 use serde_json::Value;
 use std::path::Path;
@@ -65,20 +65,22 @@ impl Service {
 
     /// Starts a service whose jobs go to an engine.
     pub async fn start_with(database: &Path, engine: Arc<dyn Dispatch>) -> Self {
-        let store = Store::open(database).await.unwrap();
-        let mut writer = store.write().await.unwrap();
-        catalogue::ensure(&mut writer).await.unwrap();
-        commit(writer).await.unwrap();
-        Self::over(store, engine)
+        Self::over(with_catalogue(database).await, engine, None)
+    }
+
+    /// Starts a service that examines gaits by itself.
+    pub async fn start_examining(database: &Path, solver: impl Evaluate, examine: impl Examine) -> Self {
+        let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
+        Self::over(with_catalogue(database).await, engine, Some(Arc::new(examine)))
     }
 
     /// Starts a service on a record as it is, adding nothing to it.
     pub async fn start_as_is(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
-        Self::over(Store::open(database).await.unwrap(), Arc::new(InProcess::new(workers, Arc::new(solver))))
+        Self::over(Store::open(database).await.unwrap(), Arc::new(InProcess::new(workers, Arc::new(solver))), None)
     }
 
-    fn over(store: Store, engine: Arc<dyn Dispatch>) -> Self {
-        let director = Director::new(store.clone(), engine, None);
+    fn over(store: Store, engine: Arc<dyn Dispatch>, examine: Option<Arc<dyn Examine>>) -> Self {
+        let director = Director::new(store.clone(), engine, None, examine);
         let work = tokio::spawn({
             let director = director.clone();
             async move { Box::pin(director.run()).await.unwrap() }
@@ -192,4 +194,13 @@ impl Service {
         let bytes = response.into_body().collect().await.unwrap().to_bytes();
         Answer { status, headers, text: String::from_utf8(bytes.to_vec()).unwrap() }
     }
+}
+
+/// A record with what every service begins with.
+async fn with_catalogue(database: &Path) -> Store {
+    let store = Store::open(database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    catalogue::ensure(&mut writer).await.unwrap();
+    commit(writer).await.unwrap();
+    store
 }

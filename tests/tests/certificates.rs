@@ -107,7 +107,7 @@ async fn a_trial_gets_its_certificate_once() {
     assert!(motion.text.contains("inDegrees=yes") && motion.text.contains("knee_angle_l"), "{}", motion.text);
     let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
     assert_eq!(ControllerFile::from_json(&controller.text).unwrap().domains.len(), 8);
-    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("controller-"));
+    assert!(controller.headers["content-disposition"].to_str().unwrap().contains("device-trial-1.json"));
     let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json?rate_hz=1", trial.id)).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
     assert!(refused.text.contains("rate_hz") && page.contains("/controller.json"), "{}", refused.text);
@@ -123,5 +123,41 @@ async fn a_trial_gets_its_certificate_once() {
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     let word = if certificate["passed"] == true { ">passed<" } else { ">failed<" };
     assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_a_trial_solved_is_solved_again_at_the_command_line_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
+    let study = service
+        .study(|new| {
+            (new.muscles, new.trial_budget) = (false, 2);
+            new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    for trial in service.trials(study).await {
+        let file = format!("problem-trial-{}.json", trial.number);
+        let address = format!("/api/v1/trials/{}/problem.json", trial.id);
+        let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+        assert!(page.contains(&format!("href=\"{address}\" download=\"{file}\"")), "{page}");
+        let problem = service.fetch(&address).await;
+        assert!(problem.headers["content-disposition"].to_str().unwrap().contains(&file));
+        assert_eq!(problem.json()["warm_start"].is_object(), trial.warm_started_from.is_some());
+        std::fs::write(folder.path().join(&file), &problem.text).unwrap();
+        let figures = done(folder.path(), &["solve", "--problem", &file, "--json"]);
+        let figures: Value = serde_json::from_str(&figures).unwrap();
+        let report = serde_json::to_value(trial.report.unwrap()).unwrap();
+        for same in ["status", "started_from", "iterations", "objective", "gait_rmse_rad", "max_violation"] {
+            assert_eq!(figures[same], report[same], "trial {}: {same}", trial.number);
+        }
+        let mut wrong = problem.json();
+        wrong["problem"]["subject"]["height_m"] = json!(9.0);
+        std::fs::write(folder.path().join("wrong.json"), wrong.to_string()).unwrap();
+        refused(folder.path(), &["solve", "--problem", "wrong.json"], "height_m");
+        let both = ["solve", "--problem", &file, "--muscles", "off"];
+        refused(folder.path(), &both, "cannot be used with");
+    }
     service.stop().await;
 }

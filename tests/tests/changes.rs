@@ -126,6 +126,13 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let made = scene.one(done, "post /studies/{id}/remarks", &made, unsafe_one).await;
     let retract = format!("{api}/remarks/{}/retract", text(&made["id"]));
     scene.one(done, "post /remarks/{id}/retract", &retract, json!({"reason": "r"})).await;
+    let again = json!({"first": trials[0].id, "second": trials[1].id, "answer": "unsafe_both"});
+    service.post(&format!("{api}/studies/{finished}/remarks"), &again).await;
+    for (trial, verdict) in [(&trials[0], "walkable"), (&trials[1], "unsafe"), (&trials[1], "walkable")] {
+        let review = format!("{api}/trials/{}/safety-reviews", trial.id);
+        let decision = json!({"verdict": verdict, "reason": "looked at the video"});
+        scene.one(done, "post /trials/{id}/safety-reviews", &review, decision).await;
+    }
 
     let better = json!({"over": trials[0].id, "bounds": {"a6": elsewhere(&trials[0])}});
     let suggest = format!("{api}/studies/{finished}/suggestions");

@@ -56,7 +56,8 @@ async fn every_figure_of_a_page_is_there_in_every_form() {
         assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
     }
     for (page, least) in [
-        (format!("/studies/{}", studies[0]), 1),
+        (format!("/studies/{}", studies[0]), 1 + 1),
+        (format!("/studies/{}/compare?a={}&b={}", studies[0], gaits[0].id, gaits[1].id), 5),
         (format!("/studies/compare?a={}&b={}", studies[0], studies[1]), 1),
         (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 5 + 2 + 7),
         (format!("/trials/{}", gaits[0].id), 1 + 6 + 2 + 6 + 6 + 2 + 7 + 1),
@@ -144,5 +145,25 @@ async fn a_reference_of_several_strides_has_its_band_and_one_without_says_so() {
             assert!((high - low - 2.0 * deviation.to_degrees()).abs() < 1e-6, "{low} {high} {deviation}");
         }
     }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_running_solve_has_its_figure_and_keeps_it_when_it_has_ended() {
+    let folder = tempfile::tempdir().unwrap();
+    let solver = Analytic::slow(std::time::Duration::from_millis(60));
+    let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    let page = format!("/studies/{study}");
+    let mut drawings = Vec::new();
+    while drawings.is_empty() {
+        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+        drawings = linked(&service.fetch(&page).await.text, "/solve-objective-violation-and-barrier-by-iteration.csv");
+    }
+    let rows = async |address: &str| String::from_utf8(file(&service, address).await.1).unwrap().lines().count();
+    let running = rows(&drawings[0]).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let ended = rows(&drawings[0]).await;
+    assert!(2 < running && running < ended, "{running} {ended}");
     service.stop().await;
 }

@@ -68,6 +68,18 @@ fn wait_until_finished(address: &str, study: &str) {
     panic!("the study does not finish");
 }
 
+/// The certificate of the best gait, and the number of the one that passes where it does not, once the service is done.
+fn examined(address: &str, study: &str) -> (Value, Value) {
+    for _ in 0..3000 {
+        let found = get(address, &format!("/api/v1/studies/{study}/recommendation")).unwrap().json();
+        if found["examining"] == false {
+            return (found["certificate"].clone(), found["passing"]["number"].clone());
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("the gaits of the study are not examined");
+}
+
 /// Everything but identifiers and times.
 fn essence(address: &str, study: &str) -> Vec<String> {
     let page = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().json();
@@ -109,6 +121,8 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     wait_until_finished(&quiet.address, &undisturbed);
     let expected = essence(&quiet.address, &undisturbed);
     let expected_answers = labels(&quiet.address, &undisturbed);
+    let certified = examined(&quiet.address, &undisturbed);
+    assert!(["passed", "failed"].contains(&certified.0.as_str().unwrap()), "{certified:?}");
     assert_eq!(expected.len(), TRIALS as usize);
     drop(quiet);
 
@@ -148,6 +162,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     wait_until_finished(&process.address, &study);
     assert_eq!(essence(&process.address, &study), expected);
     assert_eq!(labels(&process.address, &study), expected_answers, "no answer is given twice");
+    assert_eq!(examined(&process.address, &study), certified);
     let present = pseudonyms(&process.address);
     let acknowledged = acknowledged.into_inner().unwrap();
     assert!(!acknowledged.is_empty());

@@ -114,7 +114,14 @@ async fn old_trajectories_are_dropped_and_the_best_kept() {
     }
     assert_eq!(kept, 6);
     tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    assert_eq!(prune(&service.store, 0).await.unwrap(), 0, "each may still be the best that passes its certificate");
+    let best = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
+    let best = best["trial_id"].as_str().unwrap().parse().unwrap();
+    let mut writer = service.store.write().await.unwrap();
+    certificates::keep(&mut writer, best, &certificate(true)).await.unwrap();
+    commit(writer).await.unwrap();
     assert_eq!(prune(&service.store, 0).await.unwrap(), 5);
+    assert!(gaits::get(&mut service.store.read().await.unwrap(), best).await.is_ok());
     service.stop().await;
 }
 

@@ -3,12 +3,19 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_optimizer::{Gait, TunedBounds};
+use gaitwright::cli::study::prune;
+use gaitwright::store::audit::{self, Actor};
+use gaitwright::store::gaits;
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::{StudyId, TrialId, certificates, commit};
+use gaitwright::studies::choice::ranking;
+use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::examined::certificate;
+use gaitwright_tests::examined::{Verdicts, certificate};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
+use std::time::Duration;
 
 async fn examined(service: &Service, trial: TrialId, passed: bool) {
     let mut writer = service.store.write().await.unwrap();
@@ -70,5 +77,102 @@ async fn a_gait_that_passed_is_said_to_have_passed() {
     let passed = recommendation(&service, study).await;
     assert_eq!((&passed["certificate"], &passed["passing"]), (&json!("passed"), &Value::Null));
     assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait passed its"));
+    service.stop().await;
+}
+
+/// An examiner that takes some time and passes only the gait of these bounds.
+fn only(bounds: Option<TunedBounds>) -> Verdicts<impl Fn(&Gait) -> bool> {
+    Verdicts { pause: Duration::from_millis(200), passes: move |gait: &Gait| Some(gait.bounds) == bounds }
+}
+
+/// What is recommended once nothing is being examined any more.
+async fn settled(service: &Service, study: StudyId) -> Value {
+    for _ in 0..1000 {
+        let found = recommendation(service, study).await;
+        if found["examining"] == json!(false) {
+            return found;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    panic!("the gaits are not examined");
+}
+
+async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
+    let study = service.get(study).await;
+    ranking(&Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap()).unwrap()
+}
+
+/// The trials whose gaits the service examined by itself, in order.
+async fn examined_by_service(service: &Service) -> Vec<String> {
+    let mut trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    trail.retain(|row| row.action == "trial.certify" && row.actor == Actor::program().as_str());
+    trail.iter().rev().map(|row| row.object.clone()).collect()
+}
+
+#[tokio::test]
+async fn when_a_study_has_ended_its_ten_best_gaits_are_examined_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start_examining(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
+    let study = service.study(|new| new.trial_budget = 20).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let early = recommendation(&service, study).await;
+    assert_eq!((&early["certificate"], &early["examining"]), (&json!("being_examined"), &json!(true)));
+    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait is being examined"));
+
+    let found = settled(&service, study).await;
+    assert_eq!((&found["certificate"], &found["passing"]), (&json!("failed"), &Value::Null));
+    let best = ranked(&service, study).await;
+    assert!(best.len() > 10);
+    let expected: Vec<String> = best[..10].iter().map(|trial| format!("trial {trial}")).collect();
+    assert_eq!(examined_by_service(&service).await, expected);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_ended_before_the_process_began_is_examined_until_one_passes_and_that_one_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 12).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let best = ranked(&service, study).await;
+    let third = service.trials(study).await.into_iter().find(|trial| trial.id == best[2]).unwrap();
+    service.stop().await;
+
+    let service = Service::start_examining(&database, Analytic::default(), only(Some(third.action))).await;
+    let found = settled(&service, study).await;
+    assert_eq!((&found["certificate"], &found["passing"]["trial_id"]), (&json!("failed"), &json!(third.id)));
+    assert_eq!(examined_by_service(&service).await.len(), 3);
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains("The best gait that passed") && !page.contains("being examined"), "{page}");
+
+    tokio::time::sleep(Duration::from_millis(5)).await;
+    prune(&service.store, 0).await.unwrap();
+    for (place, trial) in best.iter().enumerate() {
+        let kept = gaits::get(&mut service.store.read().await.unwrap(), *trial).await.is_ok();
+        assert_eq!(kept, place == 0 || place == 2, "place {place}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_recommendation_that_is_asked_for_while_the_study_runs_is_examined_beside_its_solves() {
+    let folder = tempfile::tempdir().unwrap();
+    let solver = Analytic::slow(Duration::from_millis(20));
+    let passes = Verdicts { pause: Duration::from_millis(20), passes: |_: &Gait| true };
+    let service = Service::start_examining(&folder.path().join("a.db"), solver, passes).await;
+    let study = service.study(|new| new.trial_budget = 500).await;
+    service.wait_for_trials(study, 3).await;
+    assert!(examined_by_service(&service).await.is_empty(), "nobody asked");
+    recommendation(&service, study).await;
+    let ended = async || service.trials(study).await.iter().filter(|trial| !trial.state.is_open()).count();
+    let before = ended().await;
+    while examined_by_service(&service).await.is_empty() {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    service.wait_for_trials(study, before + 1).await;
+    assert_eq!(service.get(study).await.state, StudyState::Running);
+    service.post(&format!("/api/v1/studies/{study}/stop"), &json!({"reason": "enough"})).await;
+    assert_eq!(settled(&service, study).await["certificate"], "passed");
     service.stop().await;
 }

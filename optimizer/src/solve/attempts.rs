@@ -248,7 +248,8 @@ pub(super) fn try_catalogue(
 }
 
 /// Index of the answer: a cancelled attempt if there is one (the caller wants no answer), otherwise by `choice` among
-/// the converged, otherwise the one with the smallest violation.
+/// the converged, otherwise the one with the smallest violation, of those that end at a stationary point if there are any:
+/// they know why there is no gait, others only gave up.
 pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
     if let Some(cancelled) = tried.iter().position(|t| t.choice.status == SolveStatus::Cancelled) {
         return cancelled;
@@ -261,11 +262,12 @@ pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
             .map(|(index, t)| (index, t.choice.objective))
     };
     let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
+        let gave_up = |t: &Tried| t.choice.status != SolveStatus::Infeasible;
         let violation = |t: &Tried| t.choice.violation;
         return tried
             .iter()
             .enumerate()
-            .min_by(|a, b| violation(a.1).total_cmp(&violation(b.1)))
+            .min_by(|(_, a), (_, b)| gave_up(a).cmp(&gave_up(b)).then(violation(a).total_cmp(&violation(b))))
             .map_or(0, |(index, _)| index);
     };
     match choice {

@@ -13,7 +13,7 @@ pub enum Right {
     Read,
     /// Make, start, hold and end studies; ask for trials and tell what they gave.
     Run,
-    /// Say which gait is better, knowing which is which.
+    /// Say which gait is better, knowing which is which; decide about gaits that were called unsafe.
     Answer,
     /// Compare gaits blindly.
     Rate,

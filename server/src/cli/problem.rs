@@ -122,7 +122,7 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
 }
 
 /// A file, read and checked; what is wrong is told with its name.
-fn read_document<T: DeserializeOwned>(
+pub(super) fn read_document<T: DeserializeOwned>(
     path: &Path,
     what: &str,
     check: impl Fn(&T) -> Result<(), Error>,

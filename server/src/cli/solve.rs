@@ -3,15 +3,16 @@
 use super::Ended;
 use super::out_file::OutFile;
 use super::output::data;
-use super::problem::{ProblemFlags, cancelled_by_signal};
+use super::problem::{ProblemFlags, cancelled_by_signal, read_document};
 use crate::error::Error;
+use crate::studies::solve_input::SolveInput;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, BoundAtLimit, Explanation, Relaxation};
 use gait_optimizer::{SolveError, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve};
 use indicatif::ProgressBar;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct Solve {
@@ -26,6 +27,16 @@ pub(super) struct Solve {
         allow_hyphen_values = true
     )]
     bounds: String,
+    /// What a trial of the service solved, as its page gives it: in place of every flag that says what to solve and from where.
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = [
+            "subject", "height_m", "mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
+            "max_iterations", "time_limit_s", "bounds"
+        ]
+    )]
+    problem: Option<PathBuf>,
     /// Write the whole outcome (figures, gait, multipliers) as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -52,10 +63,21 @@ struct Figures<'a> {
 }
 
 impl Solve {
+    fn input(&self) -> Result<SolveInput, Error> {
+        if let Some(path) = &self.problem {
+            return read_document(path, "what a trial solved", SolveInput::check);
+        }
+        Ok(SolveInput {
+            problem: self.flags.problem(TunedBounds::parse(&self.bounds)?)?,
+            options: self.flags.options()?,
+            warm_start: self.flags.warm_start()?,
+        })
+    }
+
     pub(super) async fn run(self) -> Result<Ended, Error> {
-        let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
-        let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
-        let out = self.out.as_deref().map(|out| OutFile::open(out, &self.flags.inputs())).transpose()?;
+        let SolveInput { problem, options, warm_start: warm } = self.input()?;
+        let inputs: Vec<&Path> = self.flags.inputs().into_iter().chain(self.problem.as_deref()).collect();
+        let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
         let cancel = cancelled_by_signal();
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();

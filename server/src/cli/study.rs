@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
 use crate::store::{Store, StoreError, StudyId, archive, backup, commit, events, gaits, studies};
-use crate::studies::choice::best_to_show;
+use crate::studies::choice::ranking;
+use crate::studies::recommended;
 use crate::studies::standing::Standing;
 use clap::Args;
 use serde_json::json;
@@ -108,7 +109,7 @@ impl Prune {
     }
 }
 
-/// Drops the trajectories of studies that ended so many days ago, but those of their best trials.
+/// Drops the trajectories of studies that ended so many days ago, but those that are recommended or may still be.
 ///
 /// # Errors
 /// What the database or the learner reports.
@@ -118,14 +119,15 @@ pub async fn prune(store: &Store, days: u32) -> Result<u64, Error> {
     for study in studies::ended_before(&mut *store.read().await?, before).await? {
         let id = study.id;
         let standing = Standing::read(&mut *store.read().await?, study).await?;
-        let best = tokio::task::spawn_blocking(move || best_to_show(&standing))
+        let ranking = tokio::task::spawn_blocking(move || ranking(&standing))
             .await
             .map_err(|e| Error::Internal(e.to_string()))?
             .map_err(Error::Learner)?;
         let mut writer = store.write().await?;
-        let count = gaits::drop_of_study(&mut writer, id, best).await?;
+        let kept = recommended::worth_keeping(&mut writer, &ranking).await?;
+        let count = gaits::drop_of_study(&mut writer, id, &kept).await?;
         if count > 0 {
-            let detail = json!({ "trajectories": count, "kept": best });
+            let detail = json!({ "trajectories": count, "kept": kept });
             audit::append(&mut writer, &Actor::terminal(), "study.prune", &format!("study {id}"), &detail).await?;
             commit(writer).await?;
         }

@@ -4,6 +4,7 @@ use super::chart::Chart;
 use super::gait_tiles;
 use super::heat_map::HeatMap;
 use super::standalone::{self, Inside};
+use super::tree::Tree;
 use gait_optimizer::walking::stick_figure::StickFigure;
 use resvg::usvg::fontdb::Source;
 use std::fmt::Write;
@@ -12,6 +13,8 @@ use thiserror::Error;
 
 /// Pixels of a PNG per unit of the drawing: 1280 across a chart.
 const SCALE: f32 = 2.0;
+/// No PNG has more pixels: of a large tree each unit gets fewer.
+const MOST_PIXELS: f32 = 1.2e7;
 
 /// A drawing with the name of its file.
 #[derive(Debug, Clone)]
@@ -31,6 +34,8 @@ pub enum Drawing {
     Tiles(String, Vec<StickFigure>),
     /// A shaded table.
     Map(HeatMap),
+    /// What grew out of what.
+    Tree(Tree),
 }
 
 /// Why there is no PNG.
@@ -55,6 +60,11 @@ impl Figure {
         Self { name: file_name(group, &map.title), drawing: Drawing::Map(map) }
     }
 
+    /// What grew out of what.
+    pub fn tree(tree: Tree) -> Self {
+        Self { name: file_name("", &tree.title), drawing: Drawing::Tree(tree) }
+    }
+
     /// The stride as a row of pictures.
     pub fn tiles(title: &str, figures: Vec<StickFigure>) -> Self {
         Self { name: file_name("", title), drawing: Drawing::Tiles(title.to_owned(), figures) }
@@ -66,6 +76,7 @@ impl Figure {
             Drawing::Chart(chart) => &chart.title,
             Drawing::Tiles(title, _) => title,
             Drawing::Map(map) => &map.title,
+            Drawing::Tree(tree) => &tree.title,
         }
     }
 
@@ -88,6 +99,10 @@ impl Figure {
                 let inside = Inside { class: "chart map", size: map.size(), body: map.body() };
                 standalone::svg(self.title(), &inside, &[])
             }
+            Drawing::Tree(tree) => {
+                let inside = Inside { class: "tree", size: tree.size(), body: tree.body() };
+                standalone::svg(self.title(), &inside, &[])
+            }
         }
     }
 
@@ -99,11 +114,12 @@ impl Figure {
         let mut options = resvg::usvg::Options { font_family: "DejaVu Sans".to_owned(), ..Default::default() };
         options.fontdb_mut().load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
         let tree = resvg::usvg::Tree::from_str(&self.svg(), &options)?;
-        let size = tree.size().to_int_size().scale_by(SCALE);
+        let scale = SCALE.min((MOST_PIXELS / (tree.size().width() * tree.size().height())).sqrt());
+        let size = tree.size().to_int_size().scale_by(scale);
         let size = size.ok_or_else(|| PngError::Pixels("it has no size".to_owned()))?;
         let pixels = resvg::tiny_skia::Pixmap::new(size.width(), size.height());
         let mut pixels = pixels.ok_or_else(|| PngError::Pixels("it is too large".to_owned()))?;
-        let transform = resvg::tiny_skia::Transform::from_scale(SCALE, SCALE);
+        let transform = resvg::tiny_skia::Transform::from_scale(scale, scale);
         resvg::render(&tree, transform, &mut pixels.as_mut());
         pixels.encode_png().map_err(|e| PngError::Pixels(e.to_string()))
     }
@@ -116,6 +132,7 @@ impl Figure {
             Drawing::Chart(chart) => chart_csv(&mut text, chart),
             Drawing::Tiles(_, figures) => tiles_csv(&mut text, figures),
             Drawing::Map(map) => map_csv(&mut text, map),
+            Drawing::Tree(tree) => tree_csv(&mut text, tree),
         };
         text
     }
@@ -166,6 +183,15 @@ fn map_csv(text: &mut String, map: &HeatMap) -> std::fmt::Result {
     Ok(())
 }
 
+fn tree_csv(text: &mut String, tree: &Tree) -> std::fmt::Result {
+    writeln!(text, "what,grew_out_of,state")?;
+    for node in &tree.nodes {
+        let parent = node.parent.and_then(|parent| tree.nodes.get(parent)).map_or("", |parent| &parent.label);
+        writeln!(text, "{},{},{}", cell(&node.label), cell(parent), node.class)?;
+    }
+    Ok(())
+}
+
 /// A cell of a table: in quotes where it has a comma or a quote.
 fn cell(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
@@ -181,7 +207,7 @@ fn file_name(group: &str, title: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plots::{Cell, Stroke};
+    use crate::plots::{Cell, Node, Stroke};
 
     fn figure() -> Figure {
         let chart = Chart::new("Knee, \"left\" <a>", "cycle, %", "angle, °")
@@ -220,6 +246,26 @@ mod tests {
         let expected =
             "\"a6: lean, rad\",\"a5: clearance, m\",Utility,beside it\n0.1,0,0.25,± 0.10\n0.1,0.013,-0.5,± 0.10\n";
         assert_eq!(figure.csv(), expected);
+    }
+
+    #[test]
+    fn a_large_tree_stands_alone_says_what_its_marks_mean_and_is_no_larger_than_a_png_may_be() {
+        let node = |i: usize| Node {
+            parent: i.checked_sub(1),
+            label: format!("trial {}", i + 1),
+            link: "/trials/x".to_owned(),
+            class: if i == 3 { "best" } else { "not_converged" },
+        };
+        let forest = (0..400).map(|i| Node { parent: node(i).parent.map(|p| p / 2), ..node(i) }).collect();
+        let figure = Figure::tree(Tree { title: "Warm starts".to_owned(), nodes: forest });
+        let svg = figure.svg();
+        assert!(svg.contains(".tree circle") && !svg.contains("var(--") && !svg.contains("href"), "{}", &svg[..3000]);
+        assert!(svg.contains(">not converged</text>") && svg.contains(">best</text>"));
+        assert!(
+            figure.csv().starts_with("what,grew_out_of,state\ntrial 1,,not_converged\ntrial 2,trial 1,not_converged\n")
+        );
+        let pixels = resvg::tiny_skia::Pixmap::decode_png(&figure.png().unwrap()).unwrap();
+        assert!((pixels.width() * pixels.height()) as f32 <= MOST_PIXELS * 1.01);
     }
 
     #[test]

@@ -20,4 +20,4 @@ pub use gait_tiles::gait_tiles;
 pub use heat_map::{Cell, HeatMap};
 pub use reference_band::{band_in_words, over_reference};
 pub use sparkline::sparkline;
-pub use tree::{Node, tree};
+pub use tree::{Node, Tree};

@@ -103,7 +103,8 @@ fn style() -> String {
 fn concerns_drawings(line: &str) -> bool {
     let palette = line.strip_prefix(".c").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
     let chart = line.starts_with(".chart ") && !line.starts_with(".chart {");
-    chart || line.starts_with(".chart.map ") || line.starts_with(".tiles ") || palette
+    let tree = line.starts_with(".tree ") && !line.starts_with(".tree {") && !line.starts_with(".tree a:");
+    chart || line.starts_with(".chart.map ") || line.starts_with(".tiles ") || tree || palette
 }
 
 /// The first value of each name: those of the light scheme come first.

@@ -1,6 +1,7 @@
 //! A tree drawn from left to right: what grew out of what.
 
 use super::chart::escape;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// One node.
@@ -16,45 +17,98 @@ pub struct Node {
     pub class: &'static str,
 }
 
-const STEP: f64 = 86.0;
+const STEP: f64 = 96.0;
 const ROW: f64 = 26.0;
 const MARGIN: f64 = 18.0;
+/// From the middle of a mark to its name, and the width of a character of that, as far as a branch needs to know it.
+const LABEL: f64 = 10.0;
+const CHARACTER: f64 = 7.4;
+/// Width of what one mark means.
+const LEGEND: f64 = 140.0;
 
-/// The tree as an SVG element.
-pub fn tree(title: &str, nodes: &[Node]) -> String {
-    let places = places(nodes);
-    let width = places.iter().map(|p| p.0).fold(0.0, f64::max) + MARGIN + STEP;
-    let height = places.iter().map(|p| p.1).fold(0.0, f64::max) + MARGIN;
-    let mut svg = String::with_capacity(8 * 1024);
-    // Writing to a String cannot fail.
-    let _ = draw(&mut svg, title, nodes, &places, (width, height));
-    svg
+/// What grew out of what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tree {
+    /// What it shows.
+    pub title: String,
+    /// Parents before their children.
+    pub nodes: Vec<Node>,
 }
 
-fn draw(
-    svg: &mut String,
-    title: &str,
-    nodes: &[Node],
-    places: &[(f64, f64)],
-    (width, height): (f64, f64),
-) -> std::fmt::Result {
-    write!(
-        svg,
-        "<svg class=\"tree\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" role=\"group\" aria-label=\"{}\">",
-        escape(title)
-    )?;
-    for (node, (x, y)) in nodes.iter().zip(places) {
-        if let Some((from_x, from_y)) = node.parent.and_then(|parent| places.get(parent)) {
-            let bend = from_x + STEP / 2.0;
-            write!(svg, "<path class=\"branch\" d=\"M{from_x} {from_y}C{bend} {from_y} {bend} {y} {x} {y}\"/>")?;
+impl Tree {
+    /// As an SVG element for a page, whose nodes lead somewhere.
+    pub fn svg(&self) -> String {
+        let (width, height) = self.size_of_nodes();
+        let (title, mut svg) = (escape(&self.title), String::with_capacity(8 * 1024));
+        // Writing to a String cannot fail.
+        let _ = write!(
+            svg,
+            "<svg class=\"tree\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" role=\"group\" \
+             aria-label=\"{title}\">"
+        );
+        let _ = self.draw(&mut svg, true);
+        svg.push_str("</svg>");
+        svg
+    }
+
+    /// Width and height of [`Self::body`].
+    pub(super) fn size(&self) -> (f64, f64) {
+        let (width, height) = self.size_of_nodes();
+        (width.max(MARGIN + LEGEND * self.classes().len() as f64), height + ROW)
+    }
+
+    /// Its elements where nothing is beside it: no links, and below it what the marks mean.
+    pub(super) fn body(&self) -> String {
+        let mut svg = String::with_capacity(8 * 1024);
+        // Writing to a String cannot fail.
+        let _ = self.draw(&mut svg, false);
+        let y = self.size_of_nodes().1 + ROW / 2.0;
+        for (place, class) in self.classes().iter().enumerate() {
+            let x = MARGIN + LEGEND * place as f64;
+            let _ = mark(&mut svg, class, &class.replace('_', " "), (x, y));
         }
+        svg
     }
-    for (node, (x, y)) in nodes.iter().zip(places) {
-        let (link, label) = (escape(&node.link), escape(&node.label));
-        write!(svg, "<a href=\"{link}\"><circle class=\"{}\" cx=\"{x}\" cy=\"{y}\" r=\"6\"/>", node.class)?;
-        write!(svg, "<text x=\"{}\" y=\"{}\">{label}</text></a>", x + 10.0, y + 4.5)?;
+
+    /// The marks that are used.
+    fn classes(&self) -> BTreeSet<&'static str> {
+        self.nodes.iter().map(|node| node.class).collect()
     }
-    write!(svg, "</svg>")
+
+    fn size_of_nodes(&self) -> (f64, f64) {
+        let places = places(&self.nodes);
+        let width = places.iter().map(|place| place.0).fold(0.0, f64::max) + MARGIN + STEP;
+        (width, places.iter().map(|place| place.1).fold(0.0, f64::max) + MARGIN)
+    }
+
+    fn draw(&self, svg: &mut String, links: bool) -> std::fmt::Result {
+        let places = places(&self.nodes);
+        for (node, (x, y)) in self.nodes.iter().zip(&places) {
+            let Some(parent) = node.parent else { continue };
+            if let (Some((from_x, from_y)), Some(grown)) = (places.get(parent), self.nodes.get(parent)) {
+                // From the end of the parent's name, as far as there is room.
+                let name = LABEL + CHARACTER * grown.label.chars().count() as f64;
+                let start = (from_x + name).min(x - LABEL);
+                let bend = f64::midpoint(start, *x);
+                write!(svg, "<path class=\"branch\" d=\"M{start} {from_y}H{bend}V{y}H{x}\"/>")?;
+            }
+        }
+        for (node, place) in self.nodes.iter().zip(&places) {
+            if links {
+                write!(svg, "<a href=\"{}\">", escape(&node.link))?;
+            }
+            mark(svg, node.class, &node.label, *place)?;
+            if links {
+                svg.push_str("</a>");
+            }
+        }
+        Ok(())
+    }
+}
+
+fn mark(svg: &mut String, class: &str, label: &str, (x, y): (f64, f64)) -> std::fmt::Result {
+    write!(svg, "<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"6\"/>")?;
+    write!(svg, "<text x=\"{}\" y=\"{}\">{}</text>", x + LABEL, y + 4.5, escape(label))
 }
 
 /// The first child continues the row of its parent, every other one begins a row below all that grew before.
@@ -98,7 +152,9 @@ mod tests {
     fn a_chain_is_one_row_and_text_cannot_leave_it() {
         let chain = nodes(&[None, Some(0), Some(1)]);
         assert_eq!(places(&chain).iter().map(|p| p.1).collect::<Vec<_>>(), [MARGIN; 3]);
-        assert!(!tree("\"", &chain).contains("<1>"));
+        let chain = Tree { title: "\"".to_owned(), nodes: chain };
+        assert!(!chain.svg().contains("<1>") && !chain.body().contains("<1>"));
+        assert!(chain.svg().contains("<a href=") && !chain.body().contains("<a"));
     }
 
     proptest! {

@@ -17,7 +17,7 @@ const READ: [&str; 2] = ["gaitwright study 1", FORMAT];
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 23] = [
+const TABLES: [(&str, &str); 24] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -35,6 +35,7 @@ const TABLES: [(&str, &str); 23] = [
     ("unblindings", "study_id = ? order by seq"),
     ("remarks", "study_id = ? order by id"),
     ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
+    ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by id"),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_acts", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),

@@ -13,7 +13,7 @@ pub struct Event {
     /// The study.
     pub study_id: StudyId,
     /// `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`, `feedback_retracted`,
-    /// `lab_session_answered`.
+    /// `lab_session_answered`, `safety_reviewed`, `gait_examined`.
     pub kind: String,
     /// What exactly, as JSON.
     pub payload: serde_json::Value,
@@ -63,6 +63,21 @@ pub async fn after(db: &mut Connection, study: StudyId, seq: i64, limit: u32) ->
             })
         })
         .collect()
+}
+
+/// The studies that have ended, of subjects who did not withdraw, in which something happened after a sequence number, and the
+/// newest sequence number.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_ended_studies(db: &mut Connection, after: i64) -> StoreResult<(Vec<StudyId>, i64)> {
+    let newest = sqlx::query_scalar("select coalesce(max(seq), 0) from events").fetch_one(&mut *db).await?;
+    let ended = sqlx::query_scalar(
+        "select s.id from studies s where s.state in ('finished', 'stopped') \
+         and s.subject_id not in (select subject_id from withdrawn_subjects) \
+         and exists (select 1 from events e where e.study_id = s.id and e.seq > ?)",
+    );
+    Ok((ended.bind(after).fetch_all(db).await?, newest))
 }
 
 /// The sequence number of the last event of a study; 0 when there is none.

@@ -115,17 +115,17 @@ pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<
     parse_column(db, trial, "select iterations from gaits where trial_id = ?").await
 }
 
-/// Drops the gaits of a study but that of one trial: how many.
+/// Drops the gaits of a study but those of these trials: how many.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: Option<TrialId>) -> StoreResult<u64> {
+pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[TrialId]) -> StoreResult<u64> {
     let done = sqlx::query(
-        "delete from gaits where trial_id in (select id from trials where study_id = ? and (? is null or id <> ?))",
+        "delete from gaits where trial_id in (select id from trials where study_id = ?) \
+         and trial_id not in (select value from json_each(?))",
     )
     .bind(study)
-    .bind(kept)
-    .bind(kept)
+    .bind(json::to_text("trials", &kept)?)
     .execute(db)
     .await?;
     Ok(done.rows_affected())

@@ -77,6 +77,7 @@ identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(PresentationId, "presentation");
 identifier!(RemarkId, "remark");
+identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
 identifier!(LabRecordingId, "recording of a lab session");
 identifier!(EmgResultId, "result of electromyograms");

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 17] = [
+const FILES: [(i64, &str, &str); 18] = [
     (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
     (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
@@ -25,6 +25,7 @@ const FILES: [(i64, &str, &str); 17] = [
     (39, "sessions_by_link", include_str!("../../../migrations/0039_sessions_by_link.sql")),
     (40, "remarks", include_str!("../../../migrations/0040_remarks.sql")),
     (41, "lab_answers", include_str!("../../../migrations/0041_lab_answers.sql")),
+    (42, "safety_reviews", include_str!("../../../migrations/0042_safety_reviews.sql")),
 ];
 
 /// Length of the header of an SQLite file.

@@ -29,6 +29,7 @@ pub mod reference_gaits;
 pub mod remarks;
 pub mod restore;
 pub mod results;
+pub mod safety_reviews;
 pub mod schema;
 pub mod seals;
 pub mod sessions;
@@ -44,7 +45,7 @@ mod writing;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
     DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, RemarkId,
-    StudyId, SubjectId, TokenId, TrialId, UserId,
+    SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use time::{Instant, now};
 pub use writing::Writer;

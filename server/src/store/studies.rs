@@ -306,6 +306,35 @@ pub async fn waiting_for_people(db: &mut Connection, limit: u32) -> StoreResult<
     rows.iter().map(from_row).collect()
 }
 
+/// The newest studies in which somebody called a gait unsafe and did not take it back, of subjects who did not withdraw.
+///
+/// # Errors
+/// What the database reports.
+pub async fn with_objections(db: &mut Connection, limit: u32) -> StoreResult<Vec<Study>> {
+    let rows = sqlx::query(
+        "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and s.id in (\
+         select m.study_id from remarks m where m.answer glob 'unsafe*' \
+         and m.id not in (select remark_id from remark_retractions) \
+         union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
+         where a.answer glob 'unsafe*' \
+         union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
+         where a.answer glob 'unsafe*') order by s.id desc limit ?",
+    )
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The newest studies of a subject.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_subject(db: &mut Connection, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
+    let query = sqlx::query("select * from studies where subject_id = ? order by id desc limit ?");
+    query.bind(subject).bind(limit).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
 /// Studies of a subject that did not end.
 ///
 /// # Errors

@@ -3,21 +3,20 @@
 //! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
 //! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
 
+use super::examiner::Examiner;
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::record;
 use super::rehearsal::{LikelyNext, PREPARED, Prepared, Rehearsals};
+use super::solve_input::SolveInput;
 use super::standing::Standing;
 use crate::error::Error;
 use crate::store::jobs::Lease;
-use crate::store::studies::{Study, StudyPlan, StudyState};
+use crate::store::studies::{Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
-use crate::store::{
-    Store, StoreError, StudyId, TrialId, commit, devices, events, feedback, gaits, jobs, now, reference_gaits, studies,
-    subjects, trials,
-};
-use crate::workers::{Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
-use gait_optimizer::{GaitProblem, SolveStatus, TunedBounds};
+use crate::store::{Store, StoreError, StudyId, TrialId, commit, events, feedback, gaits, jobs, now, studies, trials};
+use crate::workers::{Assignment, Attempt, Board, Dispatch, Examine, Finding, IN_PROCESS, News};
+use gait_optimizer::SolveStatus;
 use serde_json::json;
 use std::collections::HashMap;
 use std::fmt;
@@ -47,6 +46,8 @@ struct Inner {
     rehearsals: Rehearsals,
     /// Where the studies stand that wait for an answer, as of the last plan: what may be rehearsed.
     waiting: watch::Sender<Arc<[Standing]>>,
+    /// What examines the best gaits of studies that ended.
+    examiner: Option<Examiner>,
     /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
     /// where no job of a trial is.
     hand_over: Mutex<()>,
@@ -70,9 +71,15 @@ impl fmt::Debug for Inner {
 }
 
 impl Director {
-    /// A director over a record; [`Self::run`] sets it to work.
-    pub fn new(store: Store, engine: Arc<dyn Dispatch>, only: Option<StudyId>) -> Self {
+    /// A director over a record; [`Self::run`] sets it to work. Without `examine`, a gait is examined when somebody asks.
+    pub fn new(
+        store: Store,
+        engine: Arc<dyn Dispatch>,
+        only: Option<StudyId>,
+        examine: Option<Arc<dyn Examine>>,
+    ) -> Self {
         Self(Arc::new(Inner {
+            examiner: examine.map(|examine| Examiner::new(store.clone(), examine)),
             store,
             engine,
             board: Arc::default(),
@@ -118,6 +125,17 @@ impl Director {
         self.0.wake.notify_one();
     }
 
+    /// Asks for the best gaits of a study to be examined, where the record has no certificate of `next`. `false`: that is done
+    /// only when somebody asks for one gait.
+    pub fn examine(&self, study: StudyId, next: TrialId) -> bool {
+        self.0.examiner.as_ref().is_some_and(|examiner| examiner.ask(study, next))
+    }
+
+    /// Whether a gait of a study is being examined, or waits for that.
+    pub fn is_examining(&self, study: StudyId, gait: TrialId) -> bool {
+        self.0.examiner.as_ref().is_some_and(|examiner| examiner.is_at(study, gait))
+    }
+
     /// Asks the solve of a trial to stop within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
         self.0.engine.withdraw(self.0.rehearsals.name_of(trial)).await;
@@ -141,11 +159,19 @@ impl Director {
             () = self.keep_planning() => {}
             () = self.keep_listening() => {}
             () = self.keep_rehearsing() => {}
+            () = self.keep_examining() => {}
         }
         self.0.tasks.close();
         self.0.tasks.wait().await;
         self.withdraw(self.0.rehearsals.forget_running()).await;
         self.take_back_leases().await
+    }
+
+    async fn keep_examining(&self) {
+        match &self.0.examiner {
+            Some(examiner) => examiner.run(self.pulse(), || self.changed()).await,
+            None => std::future::pending().await,
+        }
     }
 
     async fn keep_planning(&self) {
@@ -357,9 +383,10 @@ impl Director {
             }
             // No trial has this name: what comes of it is kept here until one asks.
             let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
-            let start = new.warm_started_from;
-            let assignment =
-                assignment_of(&self.0.store, &study.plan, (attempt, new.number), new.action, start).await?;
+            let mut reader = self.0.store.read().await?;
+            let input = SolveInput::of(&mut reader, &study.plan, new.action, new.warm_started_from).await?;
+            drop(reader);
+            let assignment = assigned(attempt, new.number, input);
             let _hand_over = self.0.hand_over.lock().await;
             if self.busy().await? < self.0.engine.size()
                 && self.0.rehearsals.begin(study.id, &assignment)
@@ -496,30 +523,12 @@ impl Director {
 /// The solve of a leased job.
 async fn assignment(store: &Store, lease: &Lease) -> Result<Assignment, Error> {
     let mut reader = store.read().await?;
-    let trial = trials::get(&mut reader, lease.trial).await?;
-    let plan = studies::get(&mut reader, lease.study).await?.plan;
-    drop(reader);
-    let attempt = Attempt { trial: lease.trial, number: lease.attempt };
-    assignment_of(store, &plan, (attempt, trial.number), trial.action, trial.warm_started_from).await
+    let number = trials::get(&mut reader, lease.trial).await?.number;
+    let input = SolveInput::of_trial(&mut reader, lease.trial).await?;
+    Ok(assigned(Attempt { trial: lease.trial, number: lease.attempt }, number, input))
 }
 
-/// Collects what a solve needs: of a trial with this number, or of one that may come.
-async fn assignment_of(
-    store: &Store,
-    plan: &StudyPlan,
-    (attempt, number): (Attempt, u32),
-    bounds: TunedBounds,
-    start: Option<TrialId>,
-) -> Result<Assignment, Error> {
-    let mut reader = store.read().await?;
-    let subject = subjects::get(&mut reader, plan.subject_id).await?.body();
-    let device = devices::get(&mut reader, plan.device_id).await?.definition;
-    let reference = reference_gaits::get(&mut reader, plan.reference_gait_id).await?.definition;
-    let warm_start = match start {
-        Some(from) => Some(gaits::warm_start(&mut reader, from).await?),
-        None => None,
-    };
-    let (muscles, settings) = (plan.muscles, *plan.gait_settings);
-    let problem = GaitProblem { subject, device, bounds, muscles, settings, reference };
-    Ok(Assignment { attempt, number, problem, warm_start, options: plan.solve_options })
+fn assigned(attempt: Attempt, number: u32, input: SolveInput) -> Assignment {
+    let SolveInput { problem, options, warm_start } = input;
+    Assignment { attempt, number, problem, warm_start, options }
 }

@@ -1,12 +1,16 @@
-//! The certificate of a trial's gait: made when somebody asks for it, then kept.
+//! The certificate of a trial's gait: made when somebody asks for it or the study has ended, then kept.
 
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::trials::TrialState;
-use crate::store::{Connection, TrialId, Writer, certificates, consents, gaits, trials};
+use crate::store::{Connection, Store, TrialId, Writer, certificates, commit, consents, events, gaits, trials};
+use crate::workers::Examine;
+use crate::workers::stand_back::{self, stand_back};
 use gait_optimizer::Gait;
 use gait_optimizer::certificate::{Certificate, certify};
 use serde_json::json;
+use std::sync::Arc;
+use tokio::sync::oneshot;
 
 /// What there is to begin with.
 #[derive(Debug)]
@@ -47,6 +51,27 @@ pub async fn certificate(examination: Examination) -> Result<Certificate, Error>
     }
 }
 
+/// Examines the gait of a trial on a thread of its own that gives way to every solve, and keeps the certificate. Nobody waits
+/// for the thread when this is dropped.
+///
+/// # Errors
+/// As [`begin`] and [`certificate`].
+pub async fn aside(store: &Store, actor: &Actor, trial: TrialId, examiner: &Arc<dyn Examine>) -> Result<(), Error> {
+    let Examination::Ahead(gait) = begin(&mut *store.read().await?, trial).await? else { return Ok(()) };
+    let (examiner, (tell, told)) = (Arc::clone(examiner), oneshot::channel());
+    let work = move || {
+        stand_back(stand_back::EXAMINER);
+        // Nobody listens any more when the process is shutting down.
+        let _ = tell.send(examiner.examine(&gait));
+    };
+    let thread = std::thread::Builder::new().name("examiner".to_owned()).spawn(work);
+    thread.map_err(|e| Error::Internal(format!("no thread for an examination: {e}")))?;
+    let found = told.await.map_err(|_| Error::Internal("the examination panicked".to_owned()))?;
+    let mut writer = store.write().await?;
+    record(&mut writer, actor, trial, &found?).await?;
+    Ok(commit(writer).await?)
+}
+
 /// Keeps a certificate.
 ///
 /// # Errors
@@ -58,6 +83,9 @@ pub async fn record(
     certificate: &Certificate,
 ) -> Result<(), Error> {
     if certificates::keep(writer, trial, certificate).await? {
+        let study = trials::get(writer, trial).await?.study_id;
+        let payload = json!({ "trial_id": trial, "passed": certificate.passed });
+        events::append(writer, study, "gait_examined", &payload).await?;
         let detail = json!({ "passed": certificate.passed, "objections": certificate.objections });
         audit::append(writer, actor, "trial.certify", &format!("trial {trial}"), &detail).await?;
     }

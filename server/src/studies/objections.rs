@@ -3,7 +3,12 @@
 
 use crate::error::Error;
 use crate::store::presentations::Said;
-use crate::store::{Connection, Instant, StoreResult, StudyId, TrialId, lab_sessions, presentations, remarks};
+use crate::store::safety_reviews::{self, SafetyReview, SafetyVerdict};
+use crate::store::studies::{self, Study};
+use crate::store::{
+    Connection, Instant, PresentationId, RemarkId, StoreResult, StudyId, TrialId, lab_sessions, presentations, remarks,
+};
+use std::collections::HashSet;
 
 /// A gait that somebody called unsafe: nobody is asked about it, and it is not recommended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,6 +19,37 @@ pub struct Closed {
     pub by: String,
     /// When.
     pub at: Instant,
+    /// Where it was said.
+    pub said: Statement,
+    /// What staff decided who looked at it.
+    pub review: Option<SafetyReview>,
+}
+
+/// Where somebody called a gait unsafe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Statement {
+    /// A rater, comparing blindly.
+    Rater(PresentationId),
+    /// In a remark.
+    Staff(RemarkId),
+    /// The person who walked, in a lab session whose order was not told.
+    Subject,
+}
+
+/// Studies with gaits about which staff decided nothing since somebody called them unsafe, and how many gaits that are.
+///
+/// # Errors
+/// What the database reports.
+pub async fn undecided(db: &mut Connection, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
+    let mut found = Vec::new();
+    for study in studies::with_objections(db, limit).await? {
+        let closed = Objections::read(db, study.id).await?.closed.into_iter();
+        let waiting: HashSet<TrialId> = closed.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
+        if !waiting.is_empty() {
+            found.push((study, waiting.len()));
+        }
+    }
+    Ok(found)
 }
 
 /// What was objected to in a study.
@@ -21,6 +57,8 @@ pub struct Closed {
 pub struct Objections {
     /// Gaits that must not be walked.
     pub closed: Vec<Closed>,
+    /// What closed a gait until staff let it be walked with again.
+    pub lifted: Vec<Closed>,
     /// Pairs that are not asked about again.
     pub skipped: Vec<(TrialId, TrialId)>,
 }
@@ -34,11 +72,15 @@ impl Objections {
         let mut found = Self::default();
         for shown in presentations::of_study(db, study).await? {
             if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
-                found.hear(said, shown.pair(), &format!("rater {}", shown.rater), at);
+                let by = format!("rater {}", shown.rater);
+                let closed =
+                    |trial| Closed { trial, by: by.clone(), at, said: Statement::Rater(shown.id), review: None };
+                found.hear(said, shown.pair(), closed);
             }
         }
         for remark in remarks::of_study(db, study).await?.iter().filter(|remark| remark.retraction.is_none()) {
-            found.hear(remark.answer, remark.pair(), &remark.author, remark.created_at);
+            let (by, at, said) = (&remark.author, remark.created_at, Statement::Staff(remark.id));
+            found.hear(remark.answer, remark.pair(), |trial| Closed { trial, by: by.clone(), at, said, review: None });
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
@@ -48,19 +90,36 @@ impl Objections {
             if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
                 // Which of the two it is would tell the order: both are closed until that is told.
                 let by = format!("the subject in lab session {}, of one of its two gaits or both", session.number);
-                let closed = |trial| Closed { trial, by: by.clone(), at: answer.at };
+                let (at, said) = (answer.at, Statement::Subject);
+                let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
                 found.closed.extend([session.gait_one, session.gait_two].map(closed));
             }
         }
+        found.review(&safety_reviews::of_study(db, study).await?);
         Ok(found)
     }
 
-    fn hear(&mut self, said: Said, pair: (TrialId, TrialId), by: &str, at: Instant) {
+    /// What was said before staff let a gait be walked with again closes it no more.
+    fn review(&mut self, reviews: &[SafetyReview]) {
+        for mut closed in std::mem::take(&mut self.closed) {
+            let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && closed.at <= review.said_until;
+            closed.review = reviews.iter().rfind(of_it).cloned();
+            let lifted = closed.review.as_ref().is_some_and(|review| review.verdict == SafetyVerdict::Walkable);
+            if lifted { self.lifted.push(closed) } else { self.closed.push(closed) }
+        }
+    }
+
+    fn hear(&mut self, said: Said, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
         if said == Said::CannotTell {
             self.skipped.push(pair);
         }
-        let closed = |trial| Closed { trial, by: by.to_owned(), at };
         self.closed.extend(said.unsafe_of(pair).into_iter().map(closed));
+    }
+
+    /// What closes the gait of this trial.
+    pub fn closing(mut self, trial: TrialId) -> Vec<Closed> {
+        self.closed.retain(|closed| closed.trial == trial);
+        self.closed
     }
 
     /// Whether somebody called the gait of this trial unsafe.

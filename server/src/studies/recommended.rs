@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Connection, Store, StoreResult, TrialId, certificates, commit};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use utoipa::ToSchema;
 
 /// So many of the best gaits are examined in search of one that passes.
@@ -20,6 +21,8 @@ pub enum CertificateState {
     Passed,
     /// Something is not.
     Failed,
+    /// The service is at it.
+    BeingExamined,
     /// Nobody asked for it yet.
     #[default]
     NotExamined,
@@ -31,6 +34,7 @@ impl CertificateState {
         match self {
             Self::Passed => "passed",
             Self::Failed => "failed",
+            Self::BeingExamined => "being_examined",
             Self::NotExamined => "not_examined",
         }
     }
@@ -45,8 +49,20 @@ pub struct Judged {
     pub objections: Vec<String>,
     /// Where the best one failed: the best gait that is known to pass.
     pub passing: Option<TrialId>,
-    /// The best gait that was not examined, where no better one passed.
+    /// The best gait that was not examined, where no better one passed; of the first [`MOST_EXAMINED`].
     pub unexamined: Option<TrialId>,
+    /// The service is examining that one by itself.
+    pub examining: bool,
+}
+
+impl Judged {
+    /// Says whether the service is examining the best gait that was not examined.
+    pub fn examined_by_service(&mut self, examining: bool) {
+        self.examining = examining;
+        if examining && self.verdict == CertificateState::NotExamined {
+            self.verdict = CertificateState::BeingExamined;
+        }
+    }
 }
 
 /// Reads what is known of the certificates of gaits, the best one first.
@@ -70,13 +86,53 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
                 break;
             }
             CertificateState::Failed => {}
-            CertificateState::NotExamined => drop(judged.unexamined.get_or_insert(trial)),
+            _ if place < MOST_EXAMINED => drop(judged.unexamined.get_or_insert(trial)),
+            _ => {}
         }
     }
     if let Some(&best) = ranking.first().filter(|_| judged.verdict == CertificateState::Failed) {
         judged.objections = certificates::find(db, best).await?.map(|found| found.objections).unwrap_or_default();
     }
     Ok(judged)
+}
+
+/// The next gait to examine in search of one that passes: none when one has passed, or the first [`MOST_EXAMINED`] have
+/// failed. `refused`: what cannot be examined.
+///
+/// # Errors
+/// What the database reports.
+pub async fn next_to_examine(
+    db: &mut Connection,
+    ranking: &[TrialId],
+    refused: &BTreeSet<TrialId>,
+) -> StoreResult<Option<TrialId>> {
+    for &trial in ranking.iter().take(MOST_EXAMINED) {
+        match certificates::passed(db, trial).await? {
+            Some(true) => return Ok(None),
+            None if !refused.contains(&trial) => return Ok(Some(trial)),
+            Some(false) | None => {}
+        }
+    }
+    Ok(None)
+}
+
+/// The gaits that a study recommends or may still recommend: the best one, the best one that passes its certificate, and, as long
+/// as none is known to pass, those that are still to be examined.
+///
+/// # Errors
+/// What the database reports.
+pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Vec<TrialId>> {
+    let mut kept = Vec::new();
+    for (place, &trial) in ranking.iter().enumerate() {
+        let passed = certificates::passed(db, trial).await?;
+        if place == 0 || passed == Some(true) || (passed.is_none() && place < MOST_EXAMINED) {
+            kept.push(trial);
+        }
+        if passed == Some(true) {
+            break;
+        }
+    }
+    Ok(kept)
 }
 
 /// Examines the gaits of a study, the best one first, until one passes or [`MOST_EXAMINED`] have failed.
@@ -87,12 +143,14 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
 /// What learner and database report.
 pub async fn examine(store: &Store, actor: &Actor, standing: &Standing) -> Result<Judged, Error> {
     let ranking = choice::ranking(standing).map_err(Error::Learner)?;
-    for &trial in ranking.iter().take(MOST_EXAMINED) {
+    let mut refused = BTreeSet::new();
+    while let Some(trial) = next_to_examine(&mut *store.read().await?, &ranking, &refused).await? {
         let begun = examination::begin(&mut *store.read().await?, trial).await?;
         let certificate = match examination::certificate(begun).await {
             Ok(certificate) => certificate,
             Err(error) if error.is_input() => {
                 tracing::warn!(%trial, %error, "what a trial gave cannot be examined");
+                refused.insert(trial);
                 continue;
             }
             Err(error) => return Err(error),
@@ -100,9 +158,6 @@ pub async fn examine(store: &Store, actor: &Actor, standing: &Standing) -> Resul
         let mut writer = store.write().await?;
         examination::record(&mut writer, actor, trial, &certificate).await?;
         commit(writer).await?;
-        if certificate.passed {
-            break;
-        }
     }
     Ok(judged(&mut *store.read().await?, &ranking).await?)
 }

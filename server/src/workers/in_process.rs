@@ -1,6 +1,7 @@
 //! The engine of one machine: one named thread per running solve.
 
 use super::dispatch::{Dispatch, DispatchError, Finding, News, Receipt};
+use super::stand_back::{self, stand_back};
 use super::{Assignment, Evaluate};
 use crate::store::TrialId;
 use futures_util::future::BoxFuture;
@@ -79,7 +80,7 @@ impl InProcess {
         let running = Arc::clone(&self.running);
         let work = move || {
             if stands_back {
-                stand_back();
+                stand_back(stand_back::SOLVER);
             }
             // Nobody listens any more when the process is shutting down.
             let _ = news.send(News::Started { attempt, worker: IN_PROCESS.to_owned() });
@@ -178,17 +179,6 @@ fn solve(
         Ok(Ok(outcome)) => Finding::Ended { outcome: Box::new(outcome), iterations },
         Ok(Err(reason)) => Finding::Broke(reason),
         Err(panic) => Finding::Broke(format!("the solver panicked: {}", words_of(panic.as_ref()))),
-    }
-}
-
-/// Lowers the priority of this thread alone; where that is not possible it stays as it is.
-fn stand_back() {
-    /// Of 19.
-    #[cfg(target_os = "linux")]
-    const NICENESS: i32 = 10;
-    #[cfg(target_os = "linux")]
-    if let Err(error) = rustix::process::setpriority_process(None, NICENESS) {
-        tracing::debug!(%error, "a solver thread keeps its priority");
     }
 }
 

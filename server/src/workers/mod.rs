@@ -7,10 +7,13 @@
 mod board;
 mod dispatch;
 mod evaluate;
+mod examine;
 mod in_process;
 pub mod nats;
+pub(crate) mod stand_back;
 
 pub use board::{Board, Progress, Track};
 pub use dispatch::{Attempt, Dispatch, DispatchError, Finding, News, Receipt};
 pub use evaluate::{Assignment, Evaluate, GaitSolver};
+pub use examine::{Examine, GaitExaminer};
 pub use in_process::{IN_PROCESS, InProcess, LEASE};

@@ -4,7 +4,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use gait_optimizer::Gait;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::examined::Verdicts;
 use gaitwright_tests::service::Service;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -15,7 +17,10 @@ async fn main() {
     let database = PathBuf::from(arguments.next().expect("a database"));
     let address = arguments.next().expect("an address");
     let pause = arguments.next().map_or(0, |text| text.parse().expect("milliseconds"));
-    let service = Service::start(&database, Analytic::slow(Duration::from_millis(pause)), 1).await;
+    // About half of the gaits pass.
+    let examiner =
+        Verdicts { pause: Duration::from_millis(20), passes: |gait: &Gait| gait.bounds.to_array()[5] < 0.25 };
+    let service = Service::start_examining(&database, Analytic::slow(Duration::from_millis(pause)), examiner).await;
     let listener = tokio::net::TcpListener::bind(address).await.unwrap();
     println!("http://{}", listener.local_addr().unwrap());
     axum::serve(listener, service.router()).await.unwrap();

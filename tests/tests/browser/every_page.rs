@@ -1,5 +1,6 @@
 //! What holds of every page: it fits, it is clean, it can be used by everybody.
 
+use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
@@ -7,7 +8,7 @@ use gaitwright::store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::measured::{electromyogram, motion};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Every page with something on it: name and address.
 async fn pages(site: &Site) -> Vec<(&'static str, String)> {
@@ -54,7 +55,13 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     let remark = json!({"first": unsafe_one, "second": converged[3].id, "answer": "unsafe_first", "author": "K1",
         "note": "stumbled twice"});
     site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    let lifted = converged[4].id;
+    let remark = json!({"first": lifted, "second": converged[3].id, "answer": "unsafe_first", "author": "K1"});
+    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    let decision = json!({"verdict": "walkable", "author": "K2", "reason": "walked slowly, with a harness"});
+    site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;
     vec![
+        ("lifted-gait", format!("/trials/{lifted}")),
         ("lab-question", format!("/lab/{}", walked[0])),
         ("lab-answered", format!("/lab/{}", walked[1])),
         ("lab-session-told", format!("/lab-sessions/{}", walked[1])),
@@ -138,37 +145,14 @@ async fn own_checks(page: &Tab) -> Vec<String> {
     serde_json::from_str(&page.value(include_str!("accessibility.js")).await).unwrap()
 }
 
-/// axe-core, which is not ours to give on: `.ci/run` brings it.
-fn axe() -> Option<String> {
-    let default = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/axe/node_modules/axe-core/axe.min.js");
-    let file = std::env::var_os("GAITWRIGHT_AXE").map_or(default, PathBuf::from);
-    if let Ok(script) = std::fs::read_to_string(&file) {
-        return Some(script);
-    }
-    assert!(std::env::var_os("GAITWRIGHT_REQUIRE_AXE").is_none(), "no axe-core at {}", file.display());
-    eprintln!("skipped: no axe-core at {}", file.display());
-    None
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn browser_every_page_passes_axe() {
-    let (Some(script), Some(browser)) = (axe(), Chromium::launch().await) else { return };
+    let (Some(axe), Some(browser)) = (Axe::find(), Chromium::launch().await) else { return };
     let site = Site::start(Analytic::default()).await;
     let mut wrong = Vec::new();
     for (name, path) in pages(&site).await {
         let page = browser.open(&site.at(&path)).await;
-        for scheme in ["light", "dark"] {
-            page.prefer("prefers-color-scheme", scheme).await;
-            page.define(&script).await;
-            let found = page
-                .value(
-                    "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }) \
-                     .then(r => r.violations.flatMap(v => v.nodes.map(n => v.id + ': ' + n.html.slice(0, 120))))",
-                )
-                .await;
-            let found: Vec<String> = serde_json::from_str(&found).unwrap();
-            wrong.extend(found.into_iter().map(|complaint| format!("{name}, {scheme}: {complaint}")));
-        }
+        wrong.extend(axe.complaints(&page).await.into_iter().map(|complaint| format!("{name}, {complaint}")));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     browser.close().await;

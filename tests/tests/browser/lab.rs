@@ -149,3 +149,38 @@ async fn browser_staff_call_a_gait_unsafe_and_take_it_back() {
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let (study, _) = planned(&site).await;
+    let watched = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let best = watched.text("[data-part=best] a").await;
+    let trials = site.service.trials(study).await;
+    let gait = trials.iter().find(|trial| format!("trial {}", trial.number) == best).unwrap().id;
+    let other = trials.iter().find(|trial| trial.state == TrialState::Converged && trial.id != gait).unwrap().id;
+    let remark = json!({"first": gait, "second": other, "answer": "unsafe_first", "author": "R7"});
+    site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
+    watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
+
+    // From the first page to the decision.
+    let page = browser.open(&site.at("/")).await;
+    assert!(page.text("main").await.contains("a gait was called unsafe: look at it and decide"));
+    page.click("#waits ~ ul a").await;
+    page.wait_for("[data-part=state] [role=alert] a[href$='#safety-review']").await;
+    page.click("[data-part=state] [role=alert] a[href$='#safety-review']").await;
+    page.wait_for("#safety-review input[value=walkable]").await;
+    page.click("#safety-review input[value=walkable]").await;
+    page.fill("#author", "K1").await;
+    page.fill("#reason", "walked slowly, with a harness").await;
+    page.click("#safety-review button").await;
+    page.wait_until("document.querySelector('#safety-review') === null").await;
+    assert!(page.text("main").await.contains("lets it be walked with again"));
+    assert_eq!(page.count("main [role=alert]").await, 0);
+    watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText === '{best}'")).await;
+    assert_eq!(watched.count(".trials .tag.bad").await, 0);
+    page.is_clean(&site.origin).await;
+    watched.is_clean(&site.origin).await;
+    browser.close().await;
+}

@@ -3,10 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod axe;
 mod chromium;
 mod every_page;
 mod gait;
 mod lab;
+mod lab_session;
 mod rater;
 mod sign_in;
 mod site;

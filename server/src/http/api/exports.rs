@@ -5,8 +5,11 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Id, Params};
 use crate::http::may::May;
+use crate::http::shown::Shown;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{TrialId, consents, gaits, trials};
+use crate::studies::objections::Objections;
+use crate::studies::solve_input::SolveInput;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -27,6 +30,28 @@ pub(super) fn two_hundred() -> f64 {
     200.0
 }
 
+/// `GET /trials/{id}/problem.json`: everything that the solve of the trial depends on.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/problem.json",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial; what it started from was not dropped")),
+    responses((status = 200, description = "What `gaitwright solve --problem` does again: subject, device, bounds, settings, reference gait, limits, start", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn problem(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Response, Error> {
+    let mut reader = app.read().await?;
+    let number = trials::get(&mut reader, id).await?.number;
+    let input = SolveInput::of_trial(&mut reader, id).await?;
+    drop(reader);
+    let text = serde_json::to_string(&input).map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
+}
+
 /// `GET /trials/{id}/gait.mot`: OpenSim motion file.
 #[utoipa::path(
     get,
@@ -42,9 +67,9 @@ pub(super) async fn motion_file(
     Id(id): Id<TrialId>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
-    let (_, gait) = leaving(&app, id).await?;
+    let (trial, gait) = leaving(&app, id).await?;
     let text = export::motion_file(&gait, sampling.rate_hz)?;
-    Ok(file("text/plain; charset=utf-8", &format!("gait-{}.mot", id.short()), text))
+    Ok(file("text/plain; charset=utf-8", &format!("gait-trial-{}.mot", trial.number), text))
 }
 
 /// `GET /trials/{id}/controller.json`: what the device's controller needs.
@@ -52,7 +77,7 @@ pub(super) async fn motion_file(
     get,
     path = "/trials/{id}/controller.json",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial; its gait has converged"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
+    params(("id" = TrialId, Path, description = "The trial; its gait has converged, and nobody calls it unsafe"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
     responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints; it explains its fields", body = Object)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -62,7 +87,15 @@ pub(super) async fn controller(
     Id(id): Id<TrialId>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
-    controller_file(&app, id, sampling.rate_hz, &format!("controller-{}.json", id.short())).await
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, id).await?;
+    if let Some(closed) = Objections::read(&mut reader, trial.study_id).await?.closing(id).first() {
+        let (number, by) = (trial.number, &closed.by);
+        let until = "no device gets it until staff let it be walked with again";
+        return Err(Error::conflict(format!("the gait of trial {number} was called unsafe by {by}: {until}")));
+    }
+    drop(reader);
+    controller_file(&app, id, sampling.rate_hz, &format!("device-trial-{}.json", trial.number)).await
 }
 
 /// The controller file of a converged gait under a name of its own.

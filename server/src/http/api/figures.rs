@@ -14,10 +14,10 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-/// A second study.
+/// A second study, or a second trial.
 #[derive(Debug, Deserialize)]
-pub(super) struct Beside {
-    other: Option<StudyId>,
+pub(super) struct Beside<T> {
+    other: Option<T>,
 }
 
 /// `GET /studies/{id}/figures/{file}`: those of the page with the figures of a study.
@@ -38,19 +38,21 @@ pub(super) async fn of_study(
     State(app): State<AppState>,
     Shown(id): Shown<StudyId>,
     Path((_, file)): Path<(String, String)>,
-    Params(Beside { other }): Params<Beside>,
+    Params(Beside { other }): Params<Beside<StudyId>>,
 ) -> Result<Response, Error> {
     answer(figures::of_study(&app, id, other).await?.into_figures(), file).await
 }
 
-/// `GET /trials/{id}/figures/{file}`: those of the page of a gait.
+/// `GET /trials/{id}/figures/{file}`: those of the page of a gait; while its solve runs, how far that is. With another trial
+/// beside it, the joint angles of both.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",
     tag = "figures",
     params(
         ("id" = TrialId, Path, description = "The trial"),
-        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv")
+        ("file" = String, Path, description = "Name of the figure, as its page links it, with .svg, .png or .csv"),
+        ("other" = Option<TrialId>, Query, description = "A converged trial of the same study that is drawn beside it")
     ),
     responses((status = 200, description = "The figure", content((String = "image/svg+xml"), (Vec<u8> = "image/png"), (String = "text/csv")))),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -60,8 +62,13 @@ pub(super) async fn of_trial(
     State(app): State<AppState>,
     Shown(id): Shown<TrialId>,
     Path((_, file)): Path<(String, String)>,
+    Params(Beside { other }): Params<Beside<TrialId>>,
 ) -> Result<Response, Error> {
-    answer(figures::of_trial(&app, id).await?, file).await
+    let figures = match other {
+        None => figures::of_trial(&app, id).await?,
+        Some(other) => figures::of_pair(&app, id, other).await?,
+    };
+    answer(figures, file).await
 }
 
 /// `GET /lab-sessions/{id}/figures/{file}`: muscle activity and limit cycles of a lab session.

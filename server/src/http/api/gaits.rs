@@ -6,7 +6,7 @@ use crate::http::AppState;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::shown::Shown;
-use crate::store::{TrialId, gaits};
+use crate::store::{TrialId, gaits, trials};
 use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
@@ -54,11 +54,12 @@ pub(super) async fn get_csv(
 
 async fn table(app: &AppState, id: TrialId) -> Result<Response, Error> {
     let mut reader = app.read().await?;
+    let number = trials::get(&mut reader, id).await?.number;
     let gait = gaits::get(&mut reader, id).await?;
     drop(reader);
     let (header, rows) = rows(&gait);
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    csv_answer(&format!("gait-{}.csv", id.short()), &header, rows)
+    csv_answer(&format!("gait-trial-{number}.csv"), &header, rows)
 }
 
 const COORDINATES: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];

@@ -18,6 +18,7 @@ mod jobs;
 mod lab_recordings;
 mod lab_sessions;
 mod motion;
+mod objections;
 mod preferences;
 mod recommendation;
 mod reference_gaits;
@@ -84,6 +85,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::attempts))
         .routes(routes!(gaits::get))
         .routes(routes!(gaits::get_csv))
+        .routes(routes!(exports::problem))
         .routes(routes!(exports::motion_file))
         .routes(routes!(exports::controller))
         .routes(routes!(motion::get))
@@ -127,6 +129,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(remarks::of_study, remarks::create))
         .routes(routes!(remarks::get))
         .routes(routes!(remarks::retract))
+        .routes(routes!(objections::of_study))
+        .routes(routes!(objections::review))
         // access
         .routes(routes!(users::me))
         .routes(routes!(users::list, users::create))

@@ -25,12 +25,14 @@ pub(super) struct Recommendation {
     study: String,
     #[serde(flatten)]
     best: Recommended,
-    /// What the certificate of its gait says.
+    /// What the certificate of its gait says. Asking for a recommendation sets an examination going where there was none.
     certificate: CertificateState,
     /// Why that failed, in words.
     objections: Vec<String>,
     /// Where it failed: the best action whose gait is known to pass.
     passing: Option<Recommended>,
+    /// Gaits of the study are being examined, the best one first, until one passes: ask again.
+    examining: bool,
 }
 
 /// An action that a trial tried.
@@ -130,13 +132,17 @@ async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
     let ranking = ranking.map_err(Error::Learner)?;
     let none = || Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better");
     let best = ranking.first().and_then(|id| standing.trial(*id)).ok_or_else(none)?;
-    let judged = recommended::judged(&mut *app.read().await?, &ranking).await?;
+    let mut judged = recommended::judged(&mut *app.read().await?, &ranking).await?;
+    if let Some(next) = judged.unexamined {
+        judged.examined_by_service(app.director.examine(id, next));
+    }
     Ok(Recommendation {
         study_id: id,
         study: standing.study.plan.name.clone(),
         best: best.into(),
         certificate: judged.verdict,
         objections: judged.objections,
+        examining: judged.examining,
         passing: judged.passing.and_then(|id| standing.trial(id)).map(Into::into),
     })
 }

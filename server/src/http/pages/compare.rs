@@ -2,7 +2,7 @@
 
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
-use super::gait_charts;
+use super::figures;
 use super::study::{answer_in_words, remark_in_words};
 use crate::access::{self, Caller, Read};
 use crate::error::Error;
@@ -11,6 +11,7 @@ use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::http::shown::Shown;
+use crate::plots::Figure;
 use crate::store::feedback::{FeedbackRow, Source};
 use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::Study;
@@ -170,9 +171,9 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     let a = trials.iter().find(|trial| trial.as_a).map(|trial| (trial.id, trial.number));
     let b = trials.iter().find(|trial| trial.as_b).map(|trial| (trial.id, trial.number));
     let pair = match (a, b) {
-        (Some((a, _)), Some((b, _))) if a != b => {
+        (Some((a, of_a)), Some((b, of_b))) if a != b => {
             match (gaits::get(&mut reader, a).await, gaits::get(&mut reader, b).await) {
-                (Ok(a), Ok(b)) => Some((a, b)),
+                (Ok(gait_a), Ok(gait_b)) => Some(((a, of_a, gait_a), (b, of_b, gait_b))),
                 (Err(StoreError::Missing { .. }), _) | (_, Err(StoreError::Missing { .. })) => None,
                 (Err(error), _) | (_, Err(error)) => return Err(error.into()),
             }
@@ -181,9 +182,10 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     };
     drop(reader);
     let draw = move || {
-        let Some((a, b)) = pair else { return Vec::new() };
-        let charts = gait_charts::beside_reference(&[("gait A", &a), ("gait B", &b)], &reference);
-        charts.iter().map(Drawn::new).collect()
+        let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return Vec::new() };
+        let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
+        let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
+        figures::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect()
     };
     let charts = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
     page(&ComparePage {

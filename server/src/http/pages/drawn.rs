@@ -27,6 +27,7 @@ impl Drawn {
             Drawing::Chart(chart) => return Self { files, ..Self::new(chart) },
             Drawing::Tiles(_, stick_figures) => (gait_tiles(stick_figures), Vec::new()),
             Drawing::Map(map) => (map.svg(), Vec::new()),
+            Drawing::Tree(tree) => (tree.svg(), Vec::new()),
         };
         Self { title: figure.title().to_owned(), note: "", svg, legend, files }
     }

@@ -15,6 +15,7 @@ use crate::store::studies::Study;
 use crate::store::{
     Connection, LabSessionId, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials,
 };
+use crate::studies::answer;
 use crate::studies::lab::{self, LimitCycles, SessionView};
 use askama::Template;
 use axum::extract::State;
@@ -43,12 +44,14 @@ pub(crate) struct StudyFigures {
     /// Those of the studies that have no gait to draw.
     without_gait: Vec<String>,
     sections: Vec<Section>,
+    /// Which gait grew out of which: on the study's own page.
+    tree: Option<Figure>,
 }
 
 impl StudyFigures {
     /// All of them.
     pub(crate) fn into_figures(self) -> Vec<Figure> {
-        self.sections.into_iter().flat_map(|section| section.figures).collect()
+        self.sections.into_iter().flat_map(|section| section.figures).chain(self.tree).collect()
     }
 }
 
@@ -116,7 +119,8 @@ pub(crate) async fn of_study(app: &AppState, id: StudyId, other: Option<StudyId>
     .map_err(|e| Error::Internal(e.to_string()))?;
     let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
     let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
-    Ok(StudyFigures { best: first.trial, study: first.side.standing.study, without_gait, sections: sections? })
+    let tree = study::warm_starts(&first.side.standing, first.figures.best);
+    Ok(StudyFigures { best: first.trial, study: first.side.standing.study, without_gait, sections: sections?, tree })
 }
 
 fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
@@ -156,11 +160,14 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
     ])
 }
 
-/// Every figure of the page of a gait; none: there is no gait.
+/// Every figure of the page of a gait; while its solve runs, how far that is.
 ///
 /// # Errors
 /// [`Error::NotFound`], or what the database reports.
 pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
+    if let Some(running) = app.director.board().track(id) {
+        return Ok(gait_charts::solve(&running.records).into_iter().collect());
+    }
     let mut reader = app.read().await?;
     let study = trials::get(&mut reader, id).await?.study_id;
     let reference = studies::get(&mut reader, study).await?.plan.reference_gait_id;
@@ -173,11 +180,36 @@ pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>,
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
         }
-        figures.extend(gait_charts::of_iterations(&iterations).map(|chart| Figure::chart("solve", chart)));
+        figures.extend(gait_charts::solve(&iterations));
         Ok(figures)
     })
     .await
     .map_err(|e| Error::Internal(e.to_string()))?
+}
+
+/// The joint angles of two gaits of a study, as on the page that compares them.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Invalid`] for a trial of another study, or what the database reports.
+pub(crate) async fn of_pair(app: &AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, a).await?;
+    let other = answer::comparable(&mut reader, trial.study_id, "other", b).await?;
+    let reference = studies::get(&mut reader, trial.study_id).await?.plan.reference_gait_id;
+    let reference = reference_gaits::get(&mut reader, reference).await?.definition;
+    let (Some(gait_a), Some(gait_b)) = (gait_of(&mut reader, a).await?, gait_of(&mut reader, b).await?) else {
+        return Ok(Vec::new());
+    };
+    drop(reader);
+    let draw = move || pair((trial.number, &gait_a), (other.number, &gait_b), &reference);
+    tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))
+}
+
+/// Two gaits, each with the number of its trial, over the reference gait.
+pub(super) fn pair((a, gait_a): (u32, &Gait), (b, gait_b): (u32, &Gait), reference: &ReferenceGait) -> Vec<Figure> {
+    let (a, b) = (format!("gait A, trial {a}"), format!("gait B, trial {b}"));
+    let charts = gait_charts::beside_reference(&[(&a, gait_a), (&b, gait_b)], reference);
+    charts.into_iter().map(|chart| Figure::chart("pair", chart)).collect()
 }
 
 /// Every figure of a reference gait.
@@ -250,7 +282,7 @@ pub(super) async fn get(
         None | Some("") => None,
         Some(text) => Some(text.parse::<StudyId>().map_err(|_| Error::invalid("other", text, "a study of the list"))?),
     };
-    let StudyFigures { study, best, without_gait, sections } = of_study(&app, id, other).await?;
+    let StudyFigures { study, best, without_gait, sections, .. } = of_study(&app, id, other).await?;
     let mut reader = app.read().await?;
     let mut offered = studies::page(&mut reader, None, OFFERED).await?;
     offered.retain(|offered| offered.id != id);

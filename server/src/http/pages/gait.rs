@@ -6,7 +6,7 @@ use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::format::{self, words};
 use super::gait_charts;
-use crate::access::{Permission, Read, Run};
+use crate::access::{Answer, Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
@@ -14,7 +14,7 @@ use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
-use crate::store::{StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
+use crate::store::{Instant, StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
 use crate::studies::objections::{Closed, Objections};
 use askama::Template;
 use axum::extract::State;
@@ -45,15 +45,22 @@ struct GaitPage {
     bounds: Vec<BoundUse>,
     /// Why there is no gait.
     explanation: Option<&'static str>,
-    /// The command that looks for the bound that must give way.
-    explain: String,
     phases: [(&'static str, &'static str); 4],
     /// Who called it unsafe.
     unsafe_by: Vec<Closed>,
+    /// Who did, until staff let it be walked with again.
+    lifted: Vec<Closed>,
+    /// Who may decide about that: the name, as far as it is known.
+    reviewer: Option<String>,
     trial: Trial,
 }
 
 impl GaitPage {
+    /// When the newest of the objections was made.
+    fn said_until(&self) -> Option<Instant> {
+        self.unsafe_by.iter().map(|closed| closed.at).max()
+    }
+
     fn missed_by(violation: &Violation) -> String {
         format::number(violation.amount)
     }
@@ -75,9 +82,15 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         Err(error) => return Err(error.into()),
     };
     let iterations = if gait.is_some() { gaits::iterations(&mut reader, id).await? } else { Vec::new() };
-    let mut unsafe_by = Objections::read(&mut reader, study.id).await?.closed;
-    unsafe_by.retain(|closed| closed.trial == id);
+    let Objections { closed: mut unsafe_by, mut lifted, .. } = Objections::read(&mut reader, study.id).await?;
+    for said in [&mut unsafe_by, &mut lifted] {
+        said.retain(|closed| closed.trial == id);
+    }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
+    let may_run = may.caller.may(Run::NEEDED);
+    let reviews = may.caller.may(Answer::NEEDED);
+    // Who did not sign in has no name yet.
+    let reviewer = reviews.then(|| may.caller.user.map_or_else(String::new, |_| may.caller.name));
     drop(reader);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
@@ -94,17 +107,18 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         figures: figures(&trial),
         bounds: drawn.bounds,
         explanation: trial.status.and_then(explanation),
-        explain: explain(&trial, &study),
         from,
         reference: reference_name,
         has_gait,
-        may_run: may.caller.may(Run::NEEDED),
+        may_run,
         certificate,
         groups: drawn.groups,
         solve: drawn.solve,
         tiles: drawn.tiles,
         phases: gait_charts::PHASES,
         unsafe_by,
+        lifted,
+        reviewer,
         trial,
         study,
     })
@@ -145,7 +159,7 @@ fn draw(
     let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
     Ok(Everything {
         groups: groups.into_iter().map(group).collect(),
-        solve: gait_charts::of_iterations(iterations).map(|chart| drawn(&Figure::chart("solve", chart))),
+        solve: gait_charts::solve(iterations).as_ref().map(drawn),
         tiles: tiles.as_ref().map(drawn),
         bounds: bound_use::of(action, gait)?,
     })
@@ -163,15 +177,6 @@ fn explanation(status: SolveStatus) -> Option<&'static str> {
             "The optimiser ended before every constraint was met. That is no proof that these bounds have no gait.",
         ),
     }
-}
-
-/// The command line that relaxes one bound after the other until there is a gait.
-fn explain(trial: &Trial, study: &Study) -> String {
-    let values = trial.action.to_array();
-    let bounds: Vec<String> =
-        TunedBounds::NAMES.iter().zip(values).map(|(name, value)| format!("{name}={value}")).collect();
-    let muscles = if study.plan.muscles { "on" } else { "off" };
-    format!("gaitwright solve --muscles {muscles} --bounds {} --explain", bounds.join(","))
 }
 
 fn figures(trial: &Trial) -> Vec<(&'static str, String)> {

@@ -323,11 +323,12 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
 }
 
 /// How the solve went; none before its first iterations.
-pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Chart> {
+pub(super) fn solve(iterations: &[IterationRecord]) -> Option<Figure> {
     // One point is no line.
-    if iterations.len() < 2 {
-        return None;
-    }
+    (iterations.len() > 1).then(|| Figure::chart("solve", of_iterations(iterations)))
+}
+
+fn of_iterations(iterations: &[IterationRecord]) -> Chart {
     // Guesses that ran side by side are shown one after the other.
     let mut iterations: Vec<&IterationRecord> = iterations.iter().collect();
     iterations.sort_by_key(|r| r.guess);
@@ -342,5 +343,5 @@ pub(super) fn of_iterations(iterations: &[IterationRecord]) -> Option<Chart> {
     chart.whole_x = true;
     chart.log_y = true;
     chart.marks = solve_phases(&iterations);
-    Some(chart)
+    chart
 }

@@ -11,6 +11,7 @@ use crate::plots::sparkline;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, consents, studies, subjects, trials, users};
+use crate::studies::objections;
 use askama::Template;
 use axum::extract::State;
 use serde::Deserialize;
@@ -52,7 +53,7 @@ struct Row {
 
 struct Waiting {
     study: Study,
-    what: &'static str,
+    what: String,
     /// Where to do it.
     link: String,
 }
@@ -72,7 +73,9 @@ pub(super) async fn get(
     for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    let waiting = studies::waiting_for_people(&mut reader, PAGE).await?.into_iter().map(waiting).collect();
+    let unsafe_gaits = objections::undecided(&mut reader, PAGE).await?.into_iter().map(unsafe_gaits);
+    let held = studies::waiting_for_people(&mut reader, PAGE).await?.into_iter().map(waiting);
+    let waiting = unsafe_gaits.chain(held).collect();
     let no_password = match may.caller.user {
         Some(id) => !users::get(&mut reader, id).await?.has_password,
         None => false,
@@ -80,11 +83,24 @@ pub(super) async fn get(
     page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
 }
 
+/// Gaits that somebody called unsafe: staff look at them.
+fn unsafe_gaits((study, count): (Study, usize)) -> Waiting {
+    let what = match count {
+        1 => "a gait was called unsafe: look at it and decide".to_owned(),
+        _ => format!("{count} gaits were called unsafe: look at them and decide"),
+    };
+    Waiting { link: format!("/studies/{}", study.id), what, study }
+}
+
 fn waiting(study: Study) -> Waiting {
     let (what, place) = match study.state {
-        StudyState::Waiting => ("a comparison waits for an answer", "/compare"),
-        StudyState::Paused => ("held: it goes on when somebody resumes it", ""),
-        _ => ("not started yet", ""),
+        StudyState::Waiting => ("a comparison waits for an answer".to_owned(), "/compare"),
+        // Why stands in the record where the program held it.
+        StudyState::Paused if study.state_reason.is_empty() => {
+            ("held: it goes on when somebody resumes it".to_owned(), "")
+        }
+        StudyState::Paused => (format!("held: it goes on when somebody resumes it ({})", study.state_reason), ""),
+        _ => ("not started yet".to_owned(), ""),
     };
     Waiting { link: format!("/studies/{}{place}", study.id), what, study }
 }

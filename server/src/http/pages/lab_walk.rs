@@ -8,7 +8,7 @@ use crate::http::AppState;
 use crate::http::extract::{Form, Id};
 use crate::http::may::May;
 use crate::http::problem::Problem;
-use crate::store::{LabSessionId, commit, lab_sessions};
+use crate::store::{Instant, LabSessionId, commit, lab_sessions};
 use crate::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
 use askama::Template;
 use axum::extract::State;
@@ -20,8 +20,8 @@ const LISTED: u32 = 100;
 #[derive(Template)]
 #[template(path = "lab.html")]
 struct LabPage {
-    /// What each open session is known by: names of studies can say what is tuned.
-    sessions: Vec<(LabSessionId, String)>,
+    /// The open sessions and when they were planned: names of studies can say what is tuned.
+    sessions: Vec<(LabSessionId, Instant)>,
 }
 
 #[derive(Template)]
@@ -37,7 +37,7 @@ struct WalkPage {
 /// `GET /lab`.
 pub(super) async fn list(_: May<Rate>, State(app): State<AppState>) -> Page {
     let open = lab_sessions::open(&mut *app.read().await?, LISTED).await?;
-    page(&LabPage { sessions: open.iter().map(|session| (session.id, session.id.short())).collect() })
+    page(&LabPage { sessions: open.iter().map(|session| (session.id, session.created_at)).collect() })
 }
 
 /// `GET /lab/{id}`.

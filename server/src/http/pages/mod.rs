@@ -24,6 +24,7 @@ mod people;
 mod rate;
 mod reference;
 mod reference_gaits;
+mod safety_review;
 mod side_by_side;
 mod sign_in;
 mod study;
@@ -59,6 +60,7 @@ pub fn routes() -> Router<AppState> {
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
+        .route("/trials/{id}/safety-review", post(safety_review::post))
         .route("/references", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
         .route("/references/{id}", get(reference_gaits::get))
         .route("/rate", get(rate::list))

@@ -23,7 +23,7 @@ use std::str::FromStr;
 const SCOPES: [(Right, &str); 4] = [
     (Right::Read, "see studies, trials and gaits"),
     (Right::Run, "make, start and end studies; ask for trials and tell what they gave"),
-    (Right::Answer, "say which gait is better"),
+    (Right::Answer, "say which gait is better, and decide about unsafe ones"),
     (Right::Rate, "compare gaits blindly"),
 ];
 

@@ -49,6 +49,8 @@ struct Compared {
     a: Study,
     b: Study,
     chart: Option<Drawn>,
+    /// Those that have nothing to draw.
+    without_course: Vec<String>,
     /// What, of the one, of the other, and whether these differ.
     rows: Vec<(String, String, String, bool)>,
 }
@@ -135,8 +137,10 @@ fn compare(a: Side, b: Side) -> Result<Compared, Error> {
         Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.standing.study.id))
     });
     let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
+    let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, figures)| figures.course().is_empty());
     Ok(Compared {
         rows: rows.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
+        without_course: without_course.map(|(side, _)| side.standing.study.plan.name.clone()).collect(),
         chart,
         a: a.standing.study,
         b: b.standing.study,

@@ -1,6 +1,7 @@
 //! Subjects, and the forms for what they signed and that they withdraw.
 
 use super::error::{Page, PageError, page};
+use super::format::{variant, words};
 use crate::access::{Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
@@ -8,15 +9,18 @@ use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::store::consents::{self, Consent, ConsentKind};
+use crate::store::studies::Study;
 use crate::store::subjects::{self, Subject};
-use crate::store::{SubjectId, commit};
+use crate::store::trials::TrialCounts;
+use crate::store::{Connection, SubjectId, commit, lab_sessions, studies, trials};
 use crate::studies::consent::{self, NewConsent, Withdrawal};
+use crate::studies::lab::SessionView;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
 
-/// How many subjects the page shows.
+/// How many subjects the list shows, and how many studies the page of one.
 const PAGE: u32 = 100;
 
 #[derive(Template)]
@@ -39,9 +43,28 @@ struct SubjectPage {
     consents: Vec<Consent>,
     withdrawn: bool,
     may_run: bool,
+    /// The newest ones.
+    studies: Vec<StudyRow>,
+    /// Of these studies; none of a subject who withdrew.
+    sessions: Vec<SessionRow>,
     /// The newest row that the form knows of: sent twice, it is written once.
     after: i64,
     refused: Option<String>,
+}
+
+/// A study of the subject.
+struct StudyRow {
+    study: Study,
+    state: String,
+    variant: &'static str,
+    counts: TrialCounts,
+}
+
+/// A lab session of the subject.
+struct SessionRow {
+    session: SessionView,
+    study: String,
+    state: String,
 }
 
 /// Which subjects to show.
@@ -74,11 +97,36 @@ async fn show(app: &AppState, id: SubjectId, may_run: bool, refused: Option<Stri
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let consents = consents::of_subject(&mut reader, id).await?;
-    drop(reader);
+    let studies = studies_of(&mut reader, id).await?;
+    let mut sessions = Vec::new();
     let last = consents.last();
     let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
+    for row in studies.iter().filter(|_| !withdrawn) {
+        sessions.extend(sessions_of(&mut reader, &row.study).await?);
+    }
+    drop(reader);
     let after = last.map_or(0, |last| last.seq);
-    page(&SubjectPage { subject, consents, withdrawn, may_run, after, refused })
+    page(&SubjectPage { subject, consents, withdrawn, may_run, studies, sessions, after, refused })
+}
+
+/// The studies of a subject, the newest first.
+async fn studies_of(db: &mut Connection, id: SubjectId) -> Result<Vec<StudyRow>, Error> {
+    let mut rows = Vec::new();
+    for study in studies::of_subject(db, id, PAGE).await? {
+        let counts = trials::counts(db, study.id).await?;
+        rows.push(StudyRow { state: words(study.state.as_str()), variant: variant(study.plan.muscles), counts, study });
+    }
+    Ok(rows)
+}
+
+/// The lab sessions of a study, the newest first.
+async fn sessions_of(db: &mut Connection, study: &Study) -> Result<Vec<SessionRow>, Error> {
+    let sessions = lab_sessions::of_study(db, study.id).await?;
+    let row = |session| {
+        let session = SessionView::from(session);
+        SessionRow { state: words(session.state.as_str()), session, study: study.plan.name.clone() }
+    };
+    Ok(sessions.iter().rev().map(row).collect())
 }
 
 /// What was signed.

@@ -17,6 +17,8 @@ const ANGLES: [&str; 5] = ["torso lean", "left hip", "left knee", "left ankle", 
 #[template(path = "chosen_reference.html")]
 struct ChosenReference {
     nearest: String,
+    /// Of some reference gait the distance is known.
+    measured: bool,
     chart: Drawn,
 }
 
@@ -38,7 +40,8 @@ impl Choice {
         let chosen = self.matches.iter().find(|found| found.reference_gait.id == self.chosen);
         let Some(chosen) = chosen else { return Ok(String::new()) };
         let chart = Drawn::new(&chart(&chosen.reference_gait));
-        let part = ChosenReference { nearest: nearest(&self.matches, chosen), chart };
+        let measured = self.matches.iter().any(|found| found.distance.is_some());
+        let part = ChosenReference { nearest: nearest(&self.matches, chosen), measured, chart };
         part.render().map_err(|e| Error::Internal(e.to_string()))
     }
 }
@@ -49,7 +52,7 @@ fn nearest(matches: &[Match], chosen: &Match) -> String {
     let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
     match matches.first() {
         _ if known == 0 => {
-            "Of no reference gait height and body mass are known: none can be proposed as the nearest to the subject."
+            "Height and body mass are not known of any reference gait, so none can be proposed as the nearest."
                 .to_owned()
         }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {

@@ -13,7 +13,7 @@ use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::plots::{Chart, Figure, Node, Stroke, tree};
+use crate::plots::{Chart, Figure, Node, Stroke, Tree};
 use crate::store::feedback::{FeedbackRow, Retraction, Said, Source};
 use crate::store::remarks::{self, Remark};
 use crate::store::studies::{FeedbackMode, Study, StudyState};
@@ -26,7 +26,7 @@ use crate::studies::choice::{MANY, best_to_show, last_believed, ranking};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
-use crate::studies::objections::Closed;
+use crate::studies::objections::{Closed, Statement};
 use crate::studies::recommended::{self, CertificateState, Judged};
 use crate::studies::standing::Standing;
 use crate::studies::{command, lifecycle};
@@ -75,10 +75,12 @@ struct Live {
     running: Vec<RunningRow>,
     best: Option<Best>,
     unanswered: bool,
+    /// Whether people alone say what is better.
+    people_answer: bool,
     chart: Option<Drawn>,
     table: TrialsTable,
     /// Which gait grew out of which.
-    tree: Option<String>,
+    tree: Option<Drawn>,
     answers: Vec<AnswerRow>,
     unsafe_gaits: Vec<UnsafeGait>,
     question: bool,
@@ -128,6 +130,10 @@ impl Best {
     fn passed(&self) -> bool {
         self.judged.verdict == CertificateState::Passed
     }
+
+    fn is_being_examined(&self) -> bool {
+        self.judged.verdict == CertificateState::BeingExamined
+    }
 }
 
 /// A trial whose gait passed its certificate.
@@ -142,8 +148,8 @@ struct AnswerRow {
     /// Where it comes from, and who said it.
     by: String,
     note: String,
-    /// Why it was taken back.
-    retracted: Option<String>,
+    /// That it counts no more, and why.
+    undone: Option<String>,
     at: Instant,
 }
 
@@ -153,6 +159,8 @@ struct UnsafeGait {
     number: u32,
     by: String,
     at: Instant,
+    /// Staff looked at it and left it so.
+    reviewed: bool,
 }
 
 /// So many of the newest trials of a large study are in the chart, and the newest answers in the list.
@@ -262,7 +270,7 @@ pub(super) struct Figures {
 
 impl Figures {
     /// Gait RMSE of the best action by iteration.
-    fn course(&self) -> Vec<(f64, f64)> {
+    pub(super) fn course(&self) -> Vec<(f64, f64)> {
         let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
         self.history.iter().filter_map(point).collect()
     }
@@ -289,6 +297,9 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     .map_err(|e| Error::Internal(e.to_string()))?;
     let mut figures = figures.map_err(Error::Learner)?;
     figures.judged = recommended::judged(&mut *app.read().await?, &figures.ranking).await?;
+    if let Some(next) = figures.judged.unexamined {
+        figures.judged.examined_by_service(app.director.is_examining(id, next));
+    }
     let running = standing
         .trials
         .iter()
@@ -328,7 +339,8 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
         id: trial.id,
         number: trial.number,
         text,
-        chart: gait_charts::of_iterations(records).map(|chart| Drawn::new(&chart)),
+        chart: gait_charts::solve(records)
+            .map(|figure| Drawn::of(&figure, &format!("/api/v1/trials/{}/figures", trial.id), "")),
     }
 }
 
@@ -357,10 +369,12 @@ fn view(
     });
     let unsafe_gait = |closed: &Closed| {
         let number = standing.trial(closed.trial)?.number;
-        Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at })
+        let reviewed = closed.review.is_some();
+        Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at, reviewed })
     };
     let unsafe_gaits = standing.objections.closed.iter().filter_map(unsafe_gait).collect();
     let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
+    let files = format!("/api/v1/studies/{}/figures", standing.study.id);
     let acts = if may_run { acts_of_people(standing.study.state) } else { Vec::new() };
     Live {
         state: words(standing.study.state.as_str()),
@@ -370,12 +384,10 @@ fn view(
         running,
         best,
         unanswered: figures.unanswered,
-        chart: course(&[(&standing, figures)]).map(|chart| {
-            let files = format!("/api/v1/studies/{}/figures", standing.study.id);
-            Drawn::of(&Figure::chart(COURSE, chart), &files, "")
-        }),
+        people_answer: standing.study.plan.feedback_mode == FeedbackMode::Human,
+        chart: course(&[(&standing, figures)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
-        tree: warm_starts(&standing, figures.best),
+        tree: warm_starts(&standing, figures.best).map(|figure| Drawn::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
         question: figures.question && standing.study.state != StudyState::Stopped,
@@ -385,7 +397,7 @@ fn view(
 }
 
 /// Which gait grew out of which; none before anything did.
-fn warm_starts(standing: &Standing, best: Option<TrialId>) -> Option<String> {
+pub(super) fn warm_starts(standing: &Standing, best: Option<TrialId>) -> Option<Figure> {
     let places: HashMap<TrialId, usize> = standing.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
     let node = |trial: &Trial| Node {
         parent: trial.warm_started_from.and_then(|from| places.get(&from).copied()),
@@ -394,20 +406,26 @@ fn warm_starts(standing: &Standing, best: Option<TrialId>) -> Option<String> {
         class: if best == Some(trial.id) { "best" } else { trial.state.as_str() },
     };
     let nodes: Vec<Node> = standing.trials.iter().map(node).collect();
-    nodes.iter().any(|node| node.parent.is_some()).then(|| tree("Which trial started from which", &nodes))
+    let title = format!("Warm starts of {}", standing.study.plan.name);
+    nodes.iter().any(|node| node.parent.is_some()).then(|| Figure::tree(Tree { title, nodes }))
 }
 
 /// What people said, the newest first; what Gait RMSE says is in the table of trials already.
 fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
     let of_remark = |id| remarks.iter().any(|remark| remark.feedback_id == Some(id));
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
-    let why = |retraction: &Option<Retraction>| retraction.as_ref().map(|retraction| retraction.reason.clone());
+    let why = |retraction: &Option<Retraction>| Some(format!("taken back: {}", retraction.as_ref()?.reason));
+    let lifted = |id| {
+        let of_it = |closed: &&Closed| closed.said == Statement::Staff(id);
+        let review = standing.objections.lifted.iter().find(of_it)?.review.as_ref()?;
+        Some(format!("may be walked with again, {}: {}", review.author, review.reason))
+    };
     let preference = |row: &FeedbackRow| {
         Some(AnswerRow {
             text: answer_in_words(row, standing)?,
             by: format!("{}, {}", format::source(row), row.author),
             note: row.note.clone(),
-            retracted: why(&row.retraction),
+            undone: why(&row.retraction),
             at: row.created_at,
         })
     };
@@ -416,7 +434,7 @@ fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
             text: remark_in_words(remark, standing)?,
             by: format!("{}, {}", format::person(remark.source), remark.author),
             note: remark.note.clone(),
-            retracted: why(&remark.retraction),
+            undone: why(&remark.retraction).or_else(|| lifted(remark.id)),
             at: remark.created_at,
         })
     };

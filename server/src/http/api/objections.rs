@@ -1,0 +1,94 @@
+//! Gaits that somebody called unsafe, and what staff decided who looked at them.
+
+use crate::access::{self, Read};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::OnceWith;
+use crate::http::shown::Shown;
+use crate::store::safety_reviews::{SafetyReview, SafetyVerdict};
+use crate::store::{Instant, StudyId, TrialId, studies};
+use crate::studies::objections::{Closed, Objections};
+use crate::studies::safety_review::{self, Decision};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// That somebody called a gait unsafe.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Objection {
+    /// The trial whose gait it is.
+    trial_id: TrialId,
+    /// Who said so.
+    by: String,
+    /// When.
+    at: Instant,
+    /// Whether the gait must not be walked because of it.
+    stands: bool,
+    /// What staff decided who looked at it; none: it waits for that.
+    review: Option<SafetyReview>,
+}
+
+impl From<Closed> for Objection {
+    fn from(closed: Closed) -> Self {
+        let Closed { trial, by, at, review, .. } = closed;
+        let stands = review.as_ref().is_none_or(|review| review.verdict == SafetyVerdict::Unsafe);
+        Self { trial_id: trial, by, at, stands, review }
+    }
+}
+
+/// `GET /studies/{id}/objections`: every time that a gait was called unsafe, also what was lifted since.
+///
+/// By raters, in remarks and in lab sessions; what its author took back is left out. Of a lab session whose order was not told
+/// both gaits are named.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/objections",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Vec<Objection>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<StudyId>,
+) -> Result<Json<Vec<Objection>>, Error> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    let Objections { closed, lifted, .. } = Objections::read(&mut reader, id).await?;
+    let mut all: Vec<Objection> = closed.into_iter().chain(lifted).map(Into::into).collect();
+    all.sort_by_key(|objection| objection.at);
+    Ok(Json(all))
+}
+
+/// `POST /trials/{id}/safety-reviews`: staff looked at a gait that was called unsafe, and decide.
+///
+/// Where it may be walked with again it can be recommended, asked about and planned; what was said stays in the record, and what
+/// the learner heard of it is taken back. When the order of a lab session is told later, what was said there closes the gait
+/// again that it was said of.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/safety-reviews",
+    tag = "preferences",
+    params(("id" = TrialId, Path, description = "The trial whose gait it is")),
+    request_body = Decision,
+    responses((status = 201, description = "Recorded", body = SafetyReview)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn review(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    OnceWith(once, decision): OnceWith<access::Answer, Decision>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = safety_review::give(&mut writer, &once.caller, id, &decision).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+}

@@ -1,0 +1,126 @@
+//! Safety reviews: what staff say who looked at a gait that was called unsafe.
+
+use super::{Connection, Instant, SafetyReviewId, StoreError, StoreResult, StudyId, TrialId, now};
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// What came of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SafetyVerdict {
+    /// The gait may be walked with again.
+    Walkable,
+    /// It stays unsafe.
+    Unsafe,
+}
+
+impl SafetyVerdict {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Walkable => "walkable",
+            Self::Unsafe => "unsafe",
+        }
+    }
+}
+
+impl FromStr for SafetyVerdict {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Walkable, Self::Unsafe]
+            .into_iter()
+            .find(|verdict| verdict.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "verdict of a safety review", reason: text.to_owned() })
+    }
+}
+
+/// A review of the record.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct SafetyReview {
+    /// Identifier.
+    pub id: SafetyReviewId,
+    /// The trial whose gait was looked at.
+    pub trial_id: TrialId,
+    /// What was said of it until then is decided.
+    pub said_until: Instant,
+    /// What came of it.
+    pub verdict: SafetyVerdict,
+    /// Who says so.
+    pub author: String,
+    /// Why.
+    pub reason: String,
+    /// When.
+    pub created_at: Instant,
+}
+
+/// A review to write.
+#[derive(Debug, Clone, Copy)]
+pub struct NewSafetyReview<'a> {
+    /// The trial whose gait was looked at.
+    pub trial: TrialId,
+    /// What was said of it until then is decided.
+    pub said_until: Instant,
+    /// What came of it.
+    pub verdict: SafetyVerdict,
+    /// Who says so.
+    pub author: &'a str,
+    /// Why.
+    pub reason: &'a str,
+}
+
+/// Adds a review.
+///
+/// # Errors
+/// A violated constraint or trigger, or what the database reports.
+pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResult<SafetyReviewId> {
+    let id = SafetyReviewId::fresh();
+    sqlx::query(
+        "insert into safety_reviews (id, trial_id, said_until, verdict, author, reason, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(new.trial)
+    .bind(new.said_until)
+    .bind(new.verdict.as_str())
+    .bind(new.author)
+    .bind(new.reason)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// The review with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: SafetyReviewId) -> StoreResult<SafetyReview> {
+    let row = sqlx::query("select * from safety_reviews where id = ?").bind(id).fetch_optional(db).await?;
+    let missing = || StoreError::Missing { what: "safety review", id: id.to_string() };
+    row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
+}
+
+/// Every review in a study, by time.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReview>> {
+    let sql = "select r.* from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ? order by r.id";
+    let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<SafetyReview> {
+    Ok(SafetyReview {
+        id: row.try_get("id")?,
+        trial_id: row.try_get("trial_id")?,
+        said_until: row.try_get("said_until")?,
+        verdict: row.try_get::<&str, _>("verdict")?.parse()?,
+        author: row.try_get("author")?,
+        reason: row.try_get("reason")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

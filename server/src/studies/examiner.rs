@@ -1,0 +1,138 @@
+//! What the service examines by itself: the best gaits of studies that have ended, and of those whose recommendation was
+//! asked for, until one passes.
+//!
+//! Which gait comes next follows from the record alone, so a process that is killed goes on where it was.
+
+use super::choice::ranking;
+use super::standing::Standing;
+use super::{examination, recommended};
+use crate::error::Error;
+use crate::store::audit::Actor;
+use crate::store::{Store, StoreResult, StudyId, TrialId, consents, events, studies};
+use crate::workers::Examine;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::{Notify, watch};
+
+/// Examines gaits one after the other, beside the solves.
+pub(super) struct Examiner {
+    store: Store,
+    examine: Arc<dyn Examine>,
+    state: Mutex<State>,
+    asked: Notify,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// Studies with gaits to look at.
+    waiting: BTreeSet<StudyId>,
+    /// What is no gait of the walker, as another worker may have sent it, and what the examination broke off at.
+    refused: BTreeSet<TrialId>,
+}
+
+impl Examiner {
+    /// Over a record; [`Self::run`] sets it to work.
+    pub(super) fn new(store: Store, examine: Arc<dyn Examine>) -> Self {
+        Self { store, examine, state: Mutex::default(), asked: Notify::new() }
+    }
+
+    /// Asks for the best gaits of a study; `next` is the one that the record has no certificate of. `false`: that one cannot
+    /// be examined.
+    pub(super) fn ask(&self, study: StudyId, next: TrialId) -> bool {
+        let mut state = self.state();
+        if state.refused.contains(&next) {
+            return false;
+        }
+        state.waiting.insert(study);
+        self.asked.notify_one();
+        true
+    }
+
+    /// Whether a gait of a study is being examined, or waits for that.
+    pub(super) fn is_at(&self, study: StudyId, gait: TrialId) -> bool {
+        let state = self.state();
+        state.waiting.contains(&study) && !state.refused.contains(&gait)
+    }
+
+    /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was.
+    pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn()) {
+        // Beginning with every study that ended before this process did.
+        let mut heard = 0;
+        loop {
+            if let Err(error) = self.hear_of_ended(&mut heard).await {
+                tracing::error!(%error, "cannot tell which studies have ended");
+            }
+            let study = tokio::select! {
+                study = self.next_study() => study,
+                _ = pulse.changed() => continue,
+            };
+            match self.examine_next(study).await {
+                Ok(true) => changed(),
+                Ok(false) => drop(self.state().waiting.remove(&study)),
+                Err(error) => {
+                    tracing::error!(%study, %error, "cannot examine the gaits of a study");
+                    self.state().waiting.remove(&study);
+                }
+            }
+        }
+    }
+
+    /// Looks at studies in which something happened and that have ended.
+    async fn hear_of_ended(&self, heard: &mut i64) -> StoreResult<()> {
+        let (ended, newest) = events::of_ended_studies(&mut *self.store.read().await?, *heard).await?;
+        *heard = newest;
+        self.state().waiting.extend(ended);
+        Ok(())
+    }
+
+    /// The newest study comes first: it is the one that somebody is about to look at.
+    async fn next_study(&self) -> StudyId {
+        loop {
+            if let Some(study) = self.state().waiting.last() {
+                return *study;
+            }
+            self.asked.notified().await;
+        }
+    }
+
+    /// Examines the next gait of a study. `false`: there is none.
+    async fn examine_next(&self, id: StudyId) -> Result<bool, Error> {
+        let mut reader = self.store.read().await?;
+        if consents::is_withdrawn(&mut reader, id).await? {
+            return Ok(false);
+        }
+        let study = studies::get(&mut reader, id).await?;
+        let standing = Standing::read(&mut reader, study).await?;
+        drop(reader);
+        if standing.waits_for_first_answer() {
+            // Nothing is recommended yet.
+            return Ok(false);
+        }
+        let ranking = tokio::task::spawn_blocking(move || ranking(&standing));
+        let ranking = ranking.await.map_err(|e| Error::Internal(e.to_string()))?.map_err(Error::Learner)?;
+        let refused = self.state().refused.clone();
+        let next = recommended::next_to_examine(&mut *self.store.read().await?, &ranking, &refused).await?;
+        let Some(trial) = next else { return Ok(false) };
+        match examination::aside(&self.store, &Actor::program(), trial, &self.examine).await {
+            Err(error @ (Error::Store(_) | Error::Dispatch(_))) => return Err(error),
+            Err(error) => {
+                tracing::warn!(%trial, %error, "what a trial gave cannot be examined");
+                self.state().refused.insert(trial);
+            }
+            Ok(()) => {}
+        }
+        Ok(true)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // The state is whole between any two statements that hold the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Examiner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Examiner").field("state", &self.state).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,166 @@
+//! What was called unsafe waits for somebody of the staff, who decides with a reason; what was said stays in the record.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::store::presentations::{self, Said};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, TrialId, audit, lab_sessions};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::FORM;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+
+async fn started(mode: FeedbackMode, budget: u32) -> (tempfile::TempDir, Service, StudyId) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (budget, mode)).await;
+    service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
+    (folder, service, study)
+}
+
+async fn converged(service: &Service, study: StudyId) -> Vec<TrialId> {
+    let trials = service.trials(study).await;
+    trials.iter().filter(|trial| trial.state == TrialState::Converged).map(|trial| trial.id).collect()
+}
+
+async fn objections(service: &Service, study: StudyId) -> Vec<Value> {
+    let all = service.fetch(&format!("/api/v1/studies/{study}/objections")).await.json();
+    all.as_array().unwrap().clone()
+}
+
+async fn decide(service: &Service, trial: impl std::fmt::Display, decision: &Value) -> Answer {
+    service.post(&format!("/api/v1/trials/{trial}/safety-reviews"), decision).await
+}
+
+async fn waits_at_home(service: &Service) -> bool {
+    service.fetch("/").await.text.contains("a gait was called unsafe: look at it and decide")
+}
+
+#[tokio::test]
+async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record() {
+    let (_folder, service, study) = started(FeedbackMode::Human, 4).await;
+    let pair = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let answer = format!("/api/v1/blind/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::CREATED);
+    let said = objections(&service, study).await;
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert_eq!((&said[0]["stands"], &said[0]["review"]), (&json!(true), &Value::Null));
+    let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
+    let page = service.fetch(&format!("/trials/{gait}")).await.text;
+    assert!(page.contains("do not walk with it") && page.contains("May this gait be walked with again?"), "{page}");
+    assert!(waits_at_home(&service).await);
+
+    // It stays unsafe: nobody needs to look again, and it can still be lifted.
+    let stays =
+        decide(&service, &gait, &json!({"verdict": "unsafe", "reason": "the knee buckles", "author": "K1"})).await;
+    assert_eq!((stays.status, &stays.json()["verdict"]), (StatusCode::CREATED, &json!("unsafe")));
+    assert!(!waits_at_home(&service).await);
+    let shown = service.fetch(&format!("/trials/{gait}")).await.text;
+    assert!(shown.contains("K1 looked at it and leaves it so: <q>the knee buckles</q>"), "{shown}");
+    let heard = service.feedback(study).await;
+    assert!(heard.iter().all(|row| row.retraction.is_none()));
+
+    let walkable = json!({"verdict": "walkable", "reason": "the video was cut", "author": "K2"});
+    assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
+    let said = objections(&service, study).await;
+    assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
+    let shown = service.fetch(&format!("/trials/{gait}")).await.text;
+    assert!(!shown.contains("do not walk with it") && shown.contains("lets it be walked with again"), "{shown}");
+    // The rater's answer stands as it was given; that the other gait is better was never said.
+    let mut reader = service.store.read().await.unwrap();
+    assert_eq!(presentations::of_study(&mut reader, study).await.unwrap()[0].answer, Some(Said::UnsafeSecond));
+    let trail = audit::page(&mut reader, None, 100).await.unwrap();
+    drop(reader);
+    let reviews: Vec<_> = trail.iter().filter(|row| row.action == "gait.review").collect();
+    assert_eq!(reviews.len(), 2);
+    assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
+    let heard = service.feedback(study).await;
+    let taken_back: Vec<_> = heard.iter().filter_map(|row| row.retraction.as_ref()).collect();
+    assert_eq!(
+        taken_back.iter().map(|why| (why.author.as_str(), why.reason.as_str())).collect::<Vec<_>>(),
+        [("K2", "the video was cut")]
+    );
+    // So it is asked about again.
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let again = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    assert!(again["pair"].is_object(), "{again}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
+    let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
+    let recommended = async || service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
+    let best = recommended().await["trial_id"].clone();
+    let other = converged(&service, study).await.into_iter().find(|id| json!(id) != best).unwrap();
+    let remark = json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K1"});
+    let remarks = format!("/api/v1/studies/{study}/remarks");
+    service.post(&remarks, &remark).await;
+    assert_ne!(recommended().await["trial_id"], best);
+    let best_id = best.as_str().unwrap();
+    let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
+    assert_eq!(for_the_device.status, StatusCode::CONFLICT);
+    assert!(for_the_device.text.contains("no device gets it"), "{}", for_the_device.text);
+    let seen = objections(&service, study).await[0]["at"].clone();
+    tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+    service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
+    let late = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r", "said_until": seen})).await;
+    assert_eq!(late.status, StatusCode::CONFLICT);
+    assert!(late.text.contains("called unsafe again, by K3"), "{}", late.text);
+
+    // By the form, which sends what its page has shown.
+    let page = service.fetch(&format!("/trials/{best_id}")).await.text;
+    let seen = page.split("name=\"said_until\" value=\"").nth(1).unwrap().split('"').next().unwrap();
+    let form = format!("verdict=walkable&author=K2&reason=tried+slowly&said_until={}", seen.replace(':', "%3A"));
+    let sent = service.post_text(&format!("/trials/{best_id}/safety-review"), FORM, &form).await;
+    assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
+    assert_eq!(recommended().await["trial_id"], best);
+    let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
+    assert_ne!(
+        for_the_device.status,
+        StatusCode::CONFLICT,
+        "what the analytic solver gives is no gait, but that is all"
+    );
+    let study_page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(study_page.contains("may be walked with again, K2: tried slowly"), "{study_page}");
+    let twice = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r"})).await;
+    assert_eq!(twice.status, StatusCode::CONFLICT);
+    for (decision, field) in [
+        (json!({"verdict": "walkable", "reason": " "}), "reason"),
+        (json!({"verdict": "walkable", "reason": "r", "author": ""}), "author"),
+    ] {
+        let refused = decide(&service, best_id, &decision).await;
+        assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!(field)));
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
+    let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
+    let gaits = converged(&service, study).await;
+    let sessions = format!("/api/v1/studies/{study}/lab-sessions");
+    let plan = json!({"gait_one": gaits[0], "gait_two": gaits[1]});
+    let id = service.post(&sessions, &plan).await.json()["id"].as_str().unwrap().to_owned();
+    for walk in 1..=3 {
+        service.post(&format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+    }
+    service.post(&format!("/api/v1/lab/{id}/answers"), &json!({"number": 1, "answer": "unsafe_first"})).await;
+    assert_eq!(objections(&service, study).await.len(), 2, "which of the two would tell the order");
+    for gait in &gaits[..2] {
+        let lifted =
+            decide(&service, gait, &json!({"verdict": "walkable", "reason": "he stumbled over a cable"})).await;
+        assert_eq!(lifted.status, StatusCode::CREATED, "{}", lifted.text);
+    }
+    let planned = service.post(&sessions, &plan).await;
+    assert_eq!(planned.status, StatusCode::CREATED, "{}", planned.text);
+    tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+    service.post(&format!("/api/v1/lab-sessions/{id}/unblind"), &json!({"reason": "walked"})).await;
+    let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
+    let mut standing = objections(&service, study).await;
+    standing.retain(|objection| objection["stands"] == json!(true));
+    assert_eq!(standing.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().0)]);
+    service.stop().await;
+}
