@@ -8,6 +8,8 @@ pub mod access;
 pub mod cli;
 mod document;
 pub mod error;
+mod gait_series;
+mod gait_table;
 pub mod http;
 pub mod plots;
 mod printable;

@@ -61,6 +61,11 @@ fn a_gait_is_solved_certified_and_converted() {
     let figures: Value = serde_json::from_str(&done(folder, &against)).unwrap();
     assert!(figures["gait_rmse_rad"].as_f64().unwrap() < 0.02, "{}", figures["gait_rmse_rad"]);
 
+    let table = done(folder, &["convert", "gait.json", "--to", "csv"]);
+    let mut rows = table.lines();
+    assert!(rows.next().unwrap().starts_with("time_s,domain,px_m,pz_m,torso_rad,"), "{table}");
+    assert!(rows.clone().count() > 20 && rows.all(|row| row.split(',').count() == 34 && !row.contains("NaN")));
+
     let controller = done(folder, &["convert", "gait.json", "--to", "controller"]);
     assert_eq!(ControllerFile::from_json(&controller).unwrap().domains.len(), 8);
     refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "rate_hz = 0");

@@ -33,14 +33,32 @@ const MUSCLE_SHARE: f64 = 0.025;
 
 /// Tightened bounds, in the units of the stored variables and rows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(into = "MarginLists", from = "MarginLists")]
 pub struct Margins {
     /// By variable: what the lower bound is raised by, the upper one lowered by.
-    #[serde(default)]
     variables: BTreeMap<usize, [f64; 2]>,
     /// By row: what the lower bound is raised by.
-    #[serde(default)]
     rows: BTreeMap<usize, f64>,
+}
+
+/// Margins as they are written: lists, because names of fields are words.
+#[derive(Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct MarginLists {
+    variables: Vec<(usize, [f64; 2])>,
+    rows: Vec<(usize, f64)>,
+}
+
+impl From<Margins> for MarginLists {
+    fn from(margins: Margins) -> Self {
+        Self { variables: margins.variables.into_iter().collect(), rows: margins.rows.into_iter().collect() }
+    }
+}
+
+impl From<MarginLists> for Margins {
+    fn from(lists: MarginLists) -> Self {
+        Self { variables: lists.variables.into_iter().collect(), rows: lists.rows.into_iter().collect() }
+    }
 }
 
 /// What a gait exceeds between its mesh points.

@@ -5,6 +5,9 @@ use crate::opensim::{AngleUnit, StorageFile};
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table};
 
+/// Place of the left knee among the reference's angles.
+const KNEE: usize = 2;
+
 /// Joint angles over time: torso, hip_L, knee_L, ankle_L, hip_R, rad, of the seven-link walker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -164,9 +167,23 @@ impl Recording {
                 return Err(table.malformed_row(row, None, reason));
             }
         }
+        if let Some(reason) = backward_knee(&angles[KNEE]) {
+            return Err(table.malformed_row(0, None, format!("{} {reason}", super::REFERENCE_COLUMNS[KNEE])));
+        }
         let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
         Ok(Self { what: what.to_owned(), time_s: table.times(), angles_rad, knee_r_rad, right_force, steps })
     }
+}
+
+/// Why this is no knee that walks, flexion positive: it is bent backwards, as where a file has the other sign.
+fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
+    let lowest = flexion_rad.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = flexion_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (lowest + highest < 0.0).then(|| {
+        format!(
+            "is from {lowest:.2} to {highest:.2} rad with flexion positive: the file's knee angle has the other sign"
+        )
+    })
 }
 
 /// A table of Camargo et al. 2021: the first column has the time, s.

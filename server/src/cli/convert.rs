@@ -4,6 +4,7 @@ use super::gait_file::read_gait;
 use super::out_file::OutFile;
 use super::output::data;
 use crate::error::Error;
+use crate::gait_table::gait_csv;
 use clap::{Args, ValueEnum};
 use gait_optimizer::export::{ControllerFile, motion_file};
 use std::path::PathBuf;
@@ -11,6 +12,8 @@ use std::path::PathBuf;
 /// What a gait is converted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
+    /// Table of the mesh points (CSV): angles, velocities, torques, forces, activations in SI units.
+    Csv,
     /// OpenSim motion file (.mot), degrees, OpenSim's signs.
     Mot,
     /// Controller file for the device: curves, phase, set points of the prosthetic joints; explains its fields.
@@ -25,7 +28,7 @@ pub(super) struct Convert {
     /// What to convert to.
     #[arg(long, value_enum)]
     to: Form,
-    /// Samples per second, 10 to 5000.
+    /// Samples per second of `mot` and `controller`, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", allow_negative_numbers = true)]
     rate_hz: f64,
     /// Where to write it; default: stdout.
@@ -38,6 +41,7 @@ impl Convert {
         let gait = read_gait(&self.gait)?;
         let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.gait])).transpose()?;
         let text = match self.to {
+            Form::Csv => String::from_utf8(gait_csv(&gait)?).map_err(|e| Error::Internal(e.to_string()))?,
             Form::Mot => motion_file(&gait, self.rate_hz)?,
             Form::Controller => serde_json::to_string_pretty(&ControllerFile::new(&gait, self.rate_hz)?)
                 .map_err(|e| Error::Internal(e.to_string()))?,

@@ -3,7 +3,6 @@
 pub mod api;
 mod blind_motion;
 mod extract;
-mod gait_series;
 mod host;
 mod identify;
 mod may;

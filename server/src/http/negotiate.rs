@@ -1,6 +1,7 @@
 //! JSON or CSV, as the Accept header asks; a `.csv` address is CSV always.
 
 use crate::error::Error;
+use crate::gait_table::csv_bytes;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 
@@ -18,17 +19,15 @@ pub(crate) fn wants_csv(headers: &HeaderMap) -> bool {
 
 /// Rows as a CSV answer that a browser saves under `name`.
 pub(crate) fn csv_answer(name: &str, header: &[&str], rows: Vec<Vec<String>>) -> Result<Response, Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let internal = |e: csv::Error| Error::Internal(e.to_string());
-    writer.write_record(header).map_err(internal)?;
-    for row in rows {
-        writer.write_record(&row).map_err(internal)?;
-    }
-    let bytes = writer.into_inner().map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(csv_file(name, csv_bytes(header, rows)?))
+}
+
+/// A CSV file that a browser saves under `name`.
+pub(crate) fn csv_file(name: &str, bytes: Vec<u8>) -> Response {
     let headers = [
         (header::CONTENT_TYPE, "text/csv; charset=utf-8".to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
         (header::VARY, "Accept".to_owned()),
     ];
-    Ok((headers, bytes).into_response())
+    (headers, bytes).into_response()
 }

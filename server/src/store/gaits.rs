@@ -115,14 +115,18 @@ pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<
     parse_column(db, trial, "select iterations from gaits where trial_id = ?").await
 }
 
-/// Drops the gaits of a study but those of these trials: how many.
+/// Drops the gaits of a study but those of these trials, those that they started from, and those that people walk with in
+/// lab sessions: how many.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[TrialId]) -> StoreResult<u64> {
     let done = sqlx::query(
-        "delete from gaits where trial_id in (select id from trials where study_id = ?) \
-         and trial_id not in (select value from json_each(?))",
+        "delete from gaits where trial_id in (select id from trials where study_id = ?1) \
+         and trial_id not in (select value from json_each(?2)) \
+         and trial_id not in (select warm_started_from from trials where warm_started_from is not null \
+                              and id in (select value from json_each(?2))) \
+         and trial_id not in (select gait_one from lab_sessions union select gait_two from lab_sessions)",
     )
     .bind(study)
     .bind(json::to_text("trials", &kept)?)

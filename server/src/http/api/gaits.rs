@@ -2,15 +2,15 @@
 
 use crate::access::Read;
 use crate::error::Error;
+use crate::gait_table::gait_csv;
 use crate::http::AppState;
 use crate::http::may::May;
-use crate::http::negotiate::{csv_answer, wants_csv};
+use crate::http::negotiate::{csv_file, wants_csv};
 use crate::http::shown::Shown;
 use crate::store::{TrialId, gaits, trials};
 use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
-use gait_optimizer::Gait;
 
 /// `GET /trials/{id}/gait`: as the optimiser wrote it, or its trajectory as CSV.
 #[utoipa::path(
@@ -57,34 +57,5 @@ async fn table(app: &AppState, id: TrialId) -> Result<Response, Error> {
     let number = trials::get(&mut reader, id).await?.number;
     let gait = gaits::get(&mut reader, id).await?;
     drop(reader);
-    let (header, rows) = rows(&gait);
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    csv_answer(&format!("gait-trial-{number}.csv"), &header, rows)
-}
-
-const COORDINATES: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
-const JOINTS: [&str; 6] = ["hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
-
-/// One row per mesh point: time, domain, q, qd, torques, ground forces (the four points, zero where there is no
-/// contact), activations.
-fn rows(gait: &Gait) -> (Vec<String>, Vec<Vec<String>>) {
-    let unit = |name: &str| if name.starts_with('p') { "m" } else { "rad" };
-    let mut header = vec!["time_s".to_owned(), "domain".to_owned()];
-    header.extend(COORDINATES.iter().map(|name| format!("{name}_{}", unit(name))));
-    header.extend(COORDINATES.iter().map(|name| format!("d{name}_{}_s", unit(name))));
-    header.extend(JOINTS.iter().map(|name| format!("torque_{name}_Nm")));
-    let forces = crate::http::gait_series::FORCE_NAMES;
-    header.extend(forces.iter().map(|name| format!("{name}_N")));
-    let muscles = gait.domains.iter().any(|domain| domain.muscles.is_some());
-    if muscles {
-        header.extend(crate::http::gait_series::MUSCLES.iter().map(|name| format!("activation_{name}")));
-    }
-    let mut rows = Vec::new();
-    for point in crate::http::gait_series::points(gait) {
-        let mut row = vec![point.time_s.to_string(), point.domain.to_owned()];
-        row.extend(point.q.iter().chain(point.qd).chain(point.u).chain(&point.forces).map(f64::to_string));
-        row.extend(point.activation.iter().flat_map(|a| a.iter()).map(f64::to_string));
-        rows.push(row);
-    }
-    (header, rows)
+    Ok(csv_file(&format!("gait-trial-{number}.csv"), gait_csv(&gait)?))
 }

@@ -2,8 +2,8 @@
 
 use crate::access::Read;
 use crate::error::Error;
+use crate::gait_series::points;
 use crate::http::AppState;
-use crate::http::gait_series::points;
 use crate::http::may::May;
 use crate::http::shown::Shown;
 use crate::store::{TrialId, gaits};

@@ -1,7 +1,7 @@
 //! The charts of a gait.
 
 use crate::error::Error;
-use crate::http::gait_series::{MUSCLES, Point, points};
+use crate::gait_series::{MUSCLES, Point, points};
 use crate::plots::{Chart, Figure, Span, Stroke, band_in_words, over_reference};
 use gait_optimizer::solve::Phase;
 use gait_optimizer::walking::stick_figure::StickFigure;
