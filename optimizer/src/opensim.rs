@@ -13,6 +13,13 @@ pub enum AngleUnit {
 }
 
 impl AngleUnit {
+    fn in_words(self) -> &'static str {
+        match self {
+            Self::Degrees => "degrees",
+            Self::Radians => "radians",
+        }
+    }
+
     /// Radians per unit.
     pub(crate) fn in_radians(self) -> f64 {
         match self {
@@ -69,10 +76,17 @@ impl StorageFile {
         Ok(Self { table, unit, header_end: end + 1 })
     }
 
-    /// The unit of angles: what the header says, else `unit`.
+    /// The unit of angles: what the header says, else `unit`; both must not differ.
     pub(crate) fn angle_unit(&self, what: &str, unit: Option<AngleUnit>) -> Result<AngleUnit, ModelError> {
         let silent = || malformed(what, self.header_end, None, "the header has no inDegrees=yes or no".to_owned());
-        self.unit.or(unit).ok_or_else(silent)
+        match (self.unit, unit) {
+            (Some(said), Some(told)) if said != told => {
+                let (said, told) = (said.in_words(), told.in_words());
+                let reason = format!("inDegrees says that angles are in {said}, but {told} was asked for");
+                Err(malformed(what, self.header_end, None, reason))
+            }
+            (said, told) => said.or(told).ok_or_else(silent),
+        }
     }
 }
 

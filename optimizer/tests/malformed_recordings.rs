@@ -38,6 +38,18 @@ fn line(text: &str, number: usize) -> String {
     text.lines().nth(number - 1).unwrap().to_owned()
 }
 
+/// A motion file with its angles in radians and everything else as it was.
+fn in_radians(whole: &str) -> String {
+    let (header, rows) = whole.split_at(whole.find("\n0.0000").unwrap() + 1);
+    let angle = |(column, cell): (usize, &str)| match column {
+        1..=8 => cell.parse::<f64>().unwrap().to_radians().to_string(),
+        _ => cell.to_owned(),
+    };
+    let rows: Vec<String> =
+        rows.lines().map(|row| row.split('\t').enumerate().map(angle).collect::<Vec<_>>().join("\t")).collect();
+    format!("{header}{}\n", rows.join("\n"))
+}
+
 #[test]
 fn motion_files_of_opensim() {
     let whole = opensim(2);
@@ -70,6 +82,12 @@ fn motion_files_of_opensim() {
             change("inDegrees=yes", "inDegrees=no"),
             "walk.mot, line 8: torso_rad is 7.0 rad, beyond 3.14 rad; is the unit right?",
         ),
+        (
+            "radians under a header of degrees",
+            in_radians(&whole),
+            "walk.mot, line 8: knee_L_rad moves over 0.012 rad only, less than 0.1 rad; is the unit right?",
+        ),
+        ("an absurd sample", with(9, "120"), "walk.mot, line 11: torso_rad jumps by -2.16 rad in 0.0100 s"),
         ("cut in half", whole[..whole.len() / 2].to_owned(), "walk.mot, line 117: 7 cells, but 10 columns"),
         (
             "a row taken out",
@@ -168,7 +186,7 @@ fn tables_of_camargo_2021_and_own_tables() {
             ("comments alone", "# one adult\n".to_owned(), "own.csv, line 2: the line of column names is missing"),
             (
                 "degrees",
-                own.replace(",0.4,", ",23,"),
+                own.replace(",0.400000,", ",23,"),
                 "own.csv, line 3: knee_L_rad is 23.0 rad, beyond 3.14 rad; is the unit right?",
             ),
             (
@@ -274,7 +292,7 @@ fn joint_angles() {
                 whole.replace("_rad", ""),
                 "angles.csv, line 2: no column is a joint's; there are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
             ),
-            ("degrees", whole.replace(",0.4,", ",23,"), "angles.csv, line 3: knee_L is 23.0 rad: is the unit right?"),
+            ("degrees", whole.replace(",0.400000,", ",23,"), "angles.csv, line 3: knee_L is 23.0 rad: is the unit right?"),
             (
                 "a gap",
                 whole

@@ -6,7 +6,7 @@ mod golden_gaits;
 mod synthetic_recordings;
 
 use gait_optimizer::export::motion_file;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, Walker, distance, nearest};
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, VerticalForce, Walker, distance, nearest};
 use gait_optimizer::{ModelError, ReferenceGait, Subject};
 use golden_gaits::golden_gait;
 use std::f64::consts::TAU;
@@ -94,6 +94,10 @@ fn every_form_of_opensims_files_is_read() {
     let simm = format!("name walk.mot\ndatacolumns 10\ndatarows 221\nrange 0 2.2\nendheader\n{names}\n{rows}");
     assert!(Recording::from_opensim("walk.mot", &simm, None, None).is_err());
     same("motion file of SIMM", &simm, Some(AngleUnit::Degrees));
+    // A header that says the unit is not overruled.
+    let refused = Recording::from_opensim("walk.mot", &opensim(2), Some(AngleUnit::Radians), None);
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("inDegrees says that angles are in degrees, but radians was asked for"), "{refused}");
     let half = simm.replace("datarows 221", "datarows 220");
     let refused = Recording::from_opensim("walk.mot", &half, Some(AngleUnit::Degrees), None).unwrap_err().to_string();
     assert!(refused.contains("line 3: datarows=220, but there are 221"), "{refused}");
@@ -253,8 +257,8 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
     let mut own = "# one adult\ntime_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad\n".to_owned();
     for k in 0..40 {
         let time = f64::from(k) / 200.0;
-        camargo.extend([format!("{time},-30,-10,20,5,3,4,-2,-6\n")]);
-        own.extend([format!("{time},0.1,0.2,0.3,0.4,0.5\n")]);
+        camargo.extend([format!("{time},{},-10,20,5,3,4,-2,-6\n", k - 37)]);
+        own.extend([format!("{time},0.1,0.2,{},0.4,0.5\n", f64::from(k) / 100.0)]);
     }
     let recording = Recording::from_camargo_csv("AB06.csv", &camargo).unwrap();
     let wanted = [8.0, 26.0, 30.0, 3.0, 11.0_f64].map(f64::to_radians);
@@ -262,7 +266,7 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
         assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
     }
     let recording = Recording::from_csv("own.csv", &own).unwrap();
-    assert_eq!(recording.angles_rad[39], [0.1, 0.2, 0.3, 0.4, 0.5]);
+    assert_eq!(recording.angles_rad[39], [0.1, 0.2, 0.39, 0.4, 0.5]);
     assert_eq!(recording.steps[0], "one adult");
 }
 
@@ -297,6 +301,12 @@ fn recordings_without_a_stride_are_refused_with_the_reason() {
     assert!(refused(vec![0.5, 0.9]).contains("none of 1 strides lasts 0.8 to 1.6 s"));
     assert!(refused(vec![1.5, 0.5]).contains("not in order"));
     assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) = 9 is outside"));
+    // Forces that end before the first stride.
+    let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
+    let early = Recording { right_force: Some(force), ..recording.clone() };
+    let early = early.reference("x", &HeelStrikes::Force, Walker::default()).unwrap_err().to_string();
+    let expected = "0 right heel strikes (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s), two make a stride";
+    assert!(early.contains(expected), "{early}");
     let unforced = Recording::from_opensim("x", &opensim(2), None, None).unwrap();
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
     let short = Walker { height_m: Some(0.5), ..Walker::default() };

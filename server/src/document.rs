@@ -66,7 +66,7 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
         _ if message.starts_with("unknown field") => format!("field {field} is not known{place}; known: {allowed}"),
         _ => format!("field {field}: {} is not accepted{place}; allowed: {allowed}", shortened(&value)),
     };
-    Error::Unreadable(Box::new(FieldError { message: said, field, value, allowed }))
+    Error::Unreadable(Box::new(FieldError { message: said, field, value: Some(value), allowed: Some(allowed) }))
 }
 
 /// Line and column in words. An error of the second reading, which reads values, has none: that of the field is looked for.
@@ -259,7 +259,7 @@ mod tests {
         ] {
             match read::<GaitSettings>(text.as_bytes()) {
                 Err(Error::Unreadable(found)) => {
-                    assert_eq!((found.field.as_str(), &found.value, found.allowed.as_str()), (field, &value, allowed));
+                    assert_eq!((found.field.as_str(), &found.value, found.allowed.as_deref()), (field, &Some(value), Some(allowed)));
                 }
                 other => panic!("{text}: {other:?}"),
             }

@@ -13,10 +13,10 @@ use thiserror::Error;
 pub struct FieldError {
     /// Its name, as in the request (`height_m`).
     pub field: String,
-    /// What was given.
-    pub value: Value,
-    /// What would have been accepted, in words or as a range.
-    pub allowed: String,
+    /// What was given; none: it is a file.
+    pub value: Option<Value>,
+    /// What would have been accepted, in words or as a range; none: the sentence says what is wrong with a file.
+    pub allowed: Option<String>,
     /// The whole sentence.
     pub message: String,
 }
@@ -26,7 +26,7 @@ impl FieldError {
     pub fn new(field: &str, value: impl Into<Value>, allowed: &str) -> Self {
         let value = value.into();
         let message = format!("{field}: {value} is not accepted; allowed: {allowed}");
-        Self { field: field.to_owned(), value, allowed: allowed.to_owned(), message }
+        Self { field: field.to_owned(), value: Some(value), allowed: Some(allowed.to_owned()), message }
     }
 }
 
@@ -35,12 +35,12 @@ impl From<ModelError> for FieldError {
         let message = error.to_string();
         match error {
             ModelError::OutOfRange { field, value, minimum, maximum } => {
-                Self { field, value: value.into(), allowed: format!("{minimum} to {maximum}"), message }
+                Self { field, value: Some(value.into()), allowed: Some(format!("{minimum} to {maximum}")), message }
             }
-            ModelError::Unknown { field, value, known } => Self { field, value: value.into(), allowed: known, message },
-            ModelError::Malformed { what, reason } => {
-                Self { field: what, value: Value::Null, allowed: reason, message }
+            ModelError::Unknown { field, value, known } => {
+                Self { field, value: Some(value.into()), allowed: Some(known), message }
             }
+            ModelError::Malformed { what, .. } => Self { field: what, value: None, allowed: None, message },
         }
     }
 }

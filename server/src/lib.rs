@@ -8,6 +8,7 @@ pub mod access;
 pub mod cli;
 mod document;
 pub mod error;
+mod gait_charts;
 mod gait_series;
 mod gait_table;
 pub mod http;

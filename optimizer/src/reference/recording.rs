@@ -7,6 +7,10 @@ use crate::table::{Clock, Separator, Table};
 
 /// Place of the left knee among the reference's angles.
 const KNEE: usize = 2;
+/// A knee that walks bends over more than this, rad; one in radians that was read as degrees does not.
+const SMALLEST_KNEE_RANGE_RAD: f64 = 0.1;
+/// No joint turns faster between two rows, rad/s: walking reaches about 7 (a swinging knee), noise of markers some more.
+const LARGEST_SPEED_RAD_S: f64 = 40.0;
 
 /// Joint angles over time: torso, hip_L, knee_L, ankle_L, hip_R, rad, of the seven-link walker.
 #[derive(Debug, Clone, PartialEq)]
@@ -167,12 +171,38 @@ impl Recording {
                 return Err(table.malformed_row(row, None, reason));
             }
         }
+        if let Some(reason) = still_knee(&angles[KNEE]) {
+            return Err(table.malformed_row(0, None, format!("{} {reason}", super::REFERENCE_COLUMNS[KNEE])));
+        }
+        let time_s = table.times();
+        for (column, name) in angles.iter().zip(super::REFERENCE_COLUMNS) {
+            if let Some((row, jump_rad)) = jump(&time_s, column) {
+                let reason = format!("{name} jumps by {jump_rad:.2} rad in {:.4} s", time_s[row] - time_s[row - 1]);
+                return Err(table.malformed_row(row, None, reason));
+            }
+        }
         if let Some(reason) = backward_knee(&angles[KNEE]) {
             return Err(table.malformed_row(0, None, format!("{} {reason}", super::REFERENCE_COLUMNS[KNEE])));
         }
         let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
-        Ok(Self { what: what.to_owned(), time_s: table.times(), angles_rad, knee_r_rad, right_force, steps })
+        Ok(Self { what: what.to_owned(), time_s, angles_rad, knee_r_rad, right_force, steps })
     }
+}
+
+/// Why this is no knee that walks: it hardly bends.
+fn still_knee(flexion_rad: &[f64]) -> Option<String> {
+    let lowest = flexion_rad.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = flexion_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let range = highest - lowest;
+    (range < SMALLEST_KNEE_RANGE_RAD)
+        .then(|| format!("moves over {range:.3} rad only, less than {SMALLEST_KNEE_RANGE_RAD} rad; is the unit right?"))
+}
+
+/// The first row to which an angle turns faster than any joint does, and by how much, rad.
+fn jump(time_s: &[f64], angle_rad: &[f64]) -> Option<(usize, f64)> {
+    (1..angle_rad.len())
+        .map(|row| (row, angle_rad[row] - angle_rad[row - 1]))
+        .find(|&(row, jump_rad)| jump_rad.abs() > LARGEST_SPEED_RAD_S * (time_s[row] - time_s[row - 1]))
 }
 
 /// Why this is no knee that walks, flexion positive: it is bent backwards, as where a file has the other sign.

@@ -118,7 +118,12 @@ impl Recording {
             }
         };
         if found.len() < 2 {
-            return Err(malformed(format!("{} right heel strikes, two make a stride", found.len())));
+            let force = self.right_force.as_ref().filter(|_| *how == HeelStrikes::Force);
+            let recorded = force.map_or_else(String::new, |force| {
+                let span = |times: &[f64]| format!("{:.3} to {:.3} s", times[0], times[times.len() - 1]);
+                format!(" (angles from {}, forces from {})", span(&self.time_s), span(&force.time_s))
+            });
+            return Err(malformed(format!("{} right heel strikes{recorded}, two make a stride", found.len())));
         }
         Ok(found)
     }

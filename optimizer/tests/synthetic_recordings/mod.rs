@@ -44,8 +44,8 @@ pub(crate) fn own_table() -> String {
     let mut text = "# one adult\ntime_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
     for k in 0..=220 {
         let phase = TAU * f64::from(k) / 110.0;
-        writeln!(text, "{},0.1,{:.6},0.4,0.05,{:.6},0.3", f64::from(k) / 100.0, -phase.cos() / 3.0, phase.cos() / 3.0)
-            .unwrap();
+        let (time_s, hip, knee) = (f64::from(k) / 100.0, phase.cos() / 3.0, 0.4 - 0.2 * phase.sin());
+        writeln!(text, "{time_s},0.1,{:.6},{knee:.6},0.05,{hip:.6},0.3", -hip).unwrap();
     }
     text
 }

@@ -90,7 +90,8 @@ pub async fn import(store: &Store, archive: &Archive) -> Result<StudyId, Error> 
 
 #[derive(Debug, Args)]
 pub(super) struct Prune {
-    /// Trajectories of studies that ended longer ago than this are dropped; the best trial of each is kept.
+    /// Trajectories of studies that ended longer ago than this are dropped; those of gaits that are recommended or may
+    /// still be, of what they started from, and of lab sessions are kept.
     #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=36_500))]
     older_than_days: u32,
     /// The SQLite file; no service may be running on it.

@@ -41,7 +41,7 @@ impl Problem {
 
     fn of(self, field: &FieldError) -> Self {
         let FieldError { field, value, allowed, .. } = field.clone();
-        Self { field: Some(field), value: Some(value), allowed: Some(allowed), ..self }
+        Self { field: Some(field), value, allowed, ..self }
     }
 
     /// The HTTP status of this problem.

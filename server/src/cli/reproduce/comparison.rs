@@ -34,7 +34,9 @@ pub(super) struct Outcome {
     pub(super) trials: usize,
     pub(super) converged: usize,
     /// Sum of the solves' wall times.
-    pub(super) seconds: f64,
+    pub(super) solve_seconds: f64,
+    /// From the first trial's start to the last one's end, solves and learner; an interruption counts.
+    pub(super) wall_seconds: f64,
     /// Gait RMSE of the best action after 1, 2, ... results, rad; none before the first gait.
     pub(super) by_iteration: Vec<Option<f64>>,
     pub(super) best_trial: Option<u32>,
@@ -47,12 +49,18 @@ pub(super) struct Outcome {
     pub(super) objections: Vec<String>,
     /// Where it failed: number and Gait RMSE, rad, of the best trial whose gait passed.
     pub(super) passing: Option<(u32, Option<f64>)>,
-    pub(super) curve: Option<Curve>,
+    /// Best gait.
+    pub(super) gait: Option<Gait>,
     /// What Gait RMSE was measured by.
     pub(super) reference: ReferenceGait,
 }
 
 impl Outcome {
+    /// Joint angles of the best gait.
+    pub(super) fn curve(&self) -> Option<Curve> {
+        self.gait.as_ref().map(Curve::of)
+    }
+
     /// What the certificate of the best gait says, and which gait passes where that one does not.
     pub(super) fn certificate_in_words(&self) -> String {
         match (self.certificate, self.passing) {
@@ -203,19 +211,20 @@ pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
 /// One row per study.
 pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
     let mut text = "subject,seed,muscles,trials,converged,best_trial,best_gait_rmse_rad,best_cost_of_transport,\
-                    solve_seconds,best_bounds,certificate,passing_trial,passing_gait_rmse_rad\n"
+                    solve_seconds,wall_seconds,best_bounds,certificate,passing_trial,passing_gait_rmse_rad\n"
         .to_owned();
     for o in outcomes {
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{:.1},{},{},{},{}",
+            "{},{},{},{},{},{},{:.1},{:.1},{},{},{},{}",
             variant(o),
             o.trials,
             o.converged,
             o.best_trial.map_or_else(String::new, |number| number.to_string()),
             cell(o.best_rmse_rad),
             cell(o.best_cost_of_transport),
-            o.seconds,
+            o.solve_seconds,
+            o.wall_seconds,
             o.best_bounds.as_deref().unwrap_or(""),
             o.certificate.as_str(),
             o.passing.map_or_else(String::new, |(number, _)| number.to_string()),
@@ -241,7 +250,7 @@ pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
         }
     }
     for outcome in outcomes {
-        if let Some(curve) = &outcome.curve {
+        if let Some(curve) = outcome.curve() {
             rows(&variant(outcome), &curve.0);
         }
     }
@@ -259,7 +268,8 @@ mod tests {
             seed,
             trials: by_iteration.len(),
             converged: by_iteration.len(),
-            seconds: 1.0,
+            solve_seconds: 1.0,
+            wall_seconds: 2.0,
             best_rmse_rad: by_iteration.last().copied().flatten(),
             by_iteration,
             best_trial: Some(1),
@@ -268,7 +278,7 @@ mod tests {
             certificate: CertificateState::Failed,
             objections: vec!["the simulated walker falls".to_owned()],
             passing: Some((2, Some(0.625))),
-            curve: None,
+            gait: None,
             reference: ReferenceGait::builtin().unwrap(),
         }
     }
@@ -313,6 +323,6 @@ mod tests {
             iterations_csv(&outcomes),
             "subject,seed,muscles,iteration,best_gait_rmse_rad\n1,1,off,1,\n1,1,off,2,0.5\n"
         );
-        assert!(studies_csv(&outcomes).ends_with("\n1,1,off,2,2,1,0.5,0.06,1.0,,failed,2,0.625\n"));
+        assert!(studies_csv(&outcomes).ends_with("\n1,1,off,2,2,1,0.5,0.06,1.0,2.0,,failed,2,0.625\n"));
     }
 }

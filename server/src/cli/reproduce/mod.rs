@@ -20,7 +20,7 @@ use crate::studies::plan::{self, NewStudy};
 use crate::studies::recommended::Judged;
 use crate::studies::standing::Standing;
 use clap::{Args, ValueEnum};
-use comparison::{Curve, Outcome};
+use comparison::Outcome;
 use gait_optimizer::{ReferenceGait, Subject};
 use std::path::PathBuf;
 
@@ -193,8 +193,8 @@ async fn outcome(
 ) -> Result<Outcome, Error> {
     let milestones = history::of(standing).map_err(Error::Learner)?;
     let best = best_trial(standing).map_err(Error::Learner)?.and_then(|id| standing.trial(id));
-    let curve = match best {
-        Some(trial) => Some(Curve::of(&gaits::get(&mut *store.read().await?, trial.id).await?)),
+    let gait = match best {
+        Some(trial) => Some(gaits::get(&mut *store.read().await?, trial.id).await?),
         None => None,
     };
     Ok(Outcome {
@@ -203,7 +203,8 @@ async fn outcome(
         seed,
         trials: standing.trials.len(),
         converged: standing.trials.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count(),
-        seconds: standing.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        solve_seconds: standing.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        wall_seconds: wall_seconds(standing),
         by_iteration: comparison::by_iteration(&milestones, history::results(standing).len()),
         best_trial: best.map(|trial| trial.number),
         best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
@@ -212,7 +213,14 @@ async fn outcome(
         objections: judged.objections,
         passing: judged.passing.and_then(|id| standing.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
         best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
-        curve,
+        gait,
         reference: reference.clone(),
     })
+}
+
+/// From the first trial's start to the last one's end.
+fn wall_seconds(standing: &Standing) -> f64 {
+    let begun = standing.trials.iter().filter_map(|trial| trial.started_at).min();
+    let ended = standing.trials.iter().filter_map(|trial| trial.finished_at).max();
+    begun.zip(ended).map_or(0.0, |(begun, ended)| ended.seconds_since(begun))
 }

@@ -1,10 +1,13 @@
 //! The report: one HTML file that needs nothing beside it.
 
-use super::comparison::{COORDINATES, Outcome, Verdict, conclusion, verdicts};
+use super::comparison::{Outcome, Verdict, conclusion, verdicts};
 use super::statements::{Statement, statements};
 use crate::error::Error;
-use crate::plots::{Chart, Stroke, band_in_words, over_reference};
+use crate::gait_charts;
+use crate::plots::{Chart, Stroke, band_in_words, gait_tiles};
 use askama::Template;
+use gait_optimizer::Gait;
+use gait_optimizer::walking::stick_figure::stick_figures;
 
 /// The style sheet of the pages: the charts' colours and dashes are its classes.
 const STYLE: &str = include_str!("../../../../web/static/gaitwright.css");
@@ -18,14 +21,27 @@ struct Report<'a> {
     conclusion: String,
     statements: Vec<Statement>,
     /// Of all solves together, s.
-    seconds: f64,
+    solve_seconds: f64,
+    /// Of all studies, one after the other, s.
+    wall_seconds: f64,
     /// Why certificates of best gaits failed.
     failures: Vec<String>,
     /// Name of the reference, and what is to be known of its band.
     reference: Option<(&'a str, &'static str)>,
     verdicts: Vec<Verdict>,
     outcomes: &'a [Outcome],
-    charts: Vec<Drawn>,
+    pairs: Vec<Pair>,
+}
+
+/// The figures of a subject and seed.
+struct Pair {
+    title: String,
+    /// Figures 3b and 3c of the paper.
+    course_and_angles: Vec<Drawn>,
+    /// Figure 4: whose gait, and its tiles.
+    tiles: Vec<(&'static str, String)>,
+    /// Figure 5.
+    orbits: Vec<Drawn>,
 }
 
 struct Drawn {
@@ -40,27 +56,43 @@ struct Drawn {
 /// When the template cannot be rendered.
 pub(super) fn html(outcomes: &[Outcome], trials: u32) -> Result<String, Error> {
     let verdicts = verdicts(outcomes);
-    let mut charts = Vec::new();
-    for verdict in &verdicts {
-        let pair: Vec<&Outcome> =
-            outcomes.iter().filter(|o| (o.subject, o.seed) == (verdict.subject, verdict.seed)).collect();
-        charts.push(drawn(&rmse_chart(verdict, &pair)));
-        charts.extend((0..COORDINATES.len()).map(|coordinate| drawn(&angle_chart(verdict, &pair, coordinate))));
-    }
+    let pairs = verdicts.iter().map(|verdict| pair(verdict, outcomes)).collect::<Result<_, Error>>()?;
     let report = Report {
         style: STYLE,
         version: env!("CARGO_PKG_VERSION"),
         trials,
         conclusion: conclusion(&verdicts),
         statements: statements(outcomes, &verdicts),
-        seconds: outcomes.iter().map(|outcome| outcome.seconds).sum(),
+        solve_seconds: outcomes.iter().map(|outcome| outcome.solve_seconds).sum(),
+        wall_seconds: outcomes.iter().map(|outcome| outcome.wall_seconds).sum(),
         failures: outcomes.iter().filter_map(Outcome::failure_in_words).collect(),
         reference: outcomes.first().map(|o| (o.reference.name.as_str(), band_in_words(&o.reference))),
         verdicts,
         outcomes,
-        charts,
+        pairs,
     };
     report.render().map_err(|e| Error::Internal(e.to_string()))
+}
+
+fn pair(verdict: &Verdict, outcomes: &[Outcome]) -> Result<Pair, Error> {
+    let pair: Vec<&Outcome> =
+        outcomes.iter().filter(|o| (o.subject, o.seed) == (verdict.subject, verdict.seed)).collect();
+    let gaits: Vec<(&'static str, &Gait)> =
+        pair.iter().filter_map(|outcome| Some((label(outcome), outcome.gait.as_ref()?))).collect();
+    let mut course_and_angles = vec![drawn(&rmse_chart(&pair))];
+    if let Some(first) = pair.first() {
+        course_and_angles.extend(gait_charts::beside_reference(&gaits, &first.reference).iter().map(drawn));
+    }
+    let mut tiles = Vec::with_capacity(gaits.len());
+    for (name, gait) in &gaits {
+        tiles.push((*name, gait_tiles(&stick_figures(gait)?)));
+    }
+    Ok(Pair {
+        title: format!("Subject {}, seed {}", verdict.subject, verdict.seed),
+        course_and_angles,
+        tiles,
+        orbits: gait_charts::orbits(&gaits).iter().map(drawn).collect(),
+    })
 }
 
 fn drawn(chart: &Chart) -> Drawn {
@@ -72,43 +104,20 @@ fn label(outcome: &Outcome) -> &'static str {
     if outcome.muscles { "with muscles" } else { "without muscles" }
 }
 
-/// Colour, stroke of what goes in steps, stroke of a curve.
-fn look(outcome: &Outcome) -> (usize, Stroke, Stroke) {
-    if outcome.muscles { (0, Stroke::Steps, Stroke::Solid) } else { (1, Stroke::DashedSteps, Stroke::Dashed) }
+/// Colour and stroke, those that its gait has among two: without muscles the first.
+fn look(outcome: &Outcome) -> (usize, Stroke) {
+    if outcome.muscles { (1, Stroke::DashedSteps) } else { (0, Stroke::Steps) }
 }
 
 /// Figure 3b of the paper.
-fn rmse_chart(verdict: &Verdict, pair: &[&Outcome]) -> Chart {
-    let title = format!("Subject {}, seed {}: Gait RMSE of the best action", verdict.subject, verdict.seed);
-    let mut chart = Chart::new(&title, "iteration", "Gait RMSE, rad");
+fn rmse_chart(pair: &[&Outcome]) -> Chart {
+    let mut chart = Chart::new("Gait RMSE of the best action", "iteration", "Gait RMSE, rad");
     chart.whole_x = true;
     for outcome in pair {
-        let (colour, stroke, _) = look(outcome);
+        let (colour, stroke) = look(outcome);
         let values = outcome.by_iteration.iter().enumerate();
         let points = values.map(|(i, rmse)| ((i + 1) as f64, rmse.unwrap_or(f64::NAN))).collect();
         chart = chart.with(label(outcome), colour, stroke, points);
-    }
-    chart
-}
-
-/// The coordinates as people call them.
-const NAMES: [&str; COORDINATES.len()] = ["torso lean", "left hip", "left knee", "left ankle", "right hip"];
-
-/// Figure 3c of the paper, one coordinate.
-fn angle_chart(verdict: &Verdict, pair: &[&Outcome], coordinate: usize) -> Chart {
-    let name = NAMES[coordinate];
-    let title = format!("Subject {}, seed {}: {name} of the best gaits", verdict.subject, verdict.seed);
-    let mut chart = Chart::new(&title, "gait cycle from right heel strike, %", "angle, °");
-    let points =
-        |curve: &[[f64; 5]]| curve.iter().enumerate().map(|(i, a)| (i as f64, a[coordinate].to_degrees())).collect();
-    if let Some(first) = pair.first() {
-        chart = over_reference(chart, &first.reference, coordinate);
-    }
-    for outcome in pair {
-        if let Some(curve) = &outcome.curve {
-            let (colour, _, stroke) = look(outcome);
-            chart = chart.with(label(outcome), colour, stroke, points(&curve.0));
-        }
     }
     chart
 }

@@ -3,9 +3,10 @@
 use super::drawn::Drawn;
 use super::error::{Page, page};
 use super::side_by_side::Side;
-use super::{gait_charts, lab_charts, study};
+use super::{lab_charts, study};
 use crate::access::Read;
 use crate::error::Error;
+use crate::gait_charts;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;

@@ -1,6 +1,6 @@
 //! The charts of a lab session: muscle activity over the cycle, limit cycles.
 
-use super::gait_charts::orbit;
+use crate::gait_charts::orbit;
 use crate::plots::{Chart, Figure, Stroke};
 use crate::studies::lab::{Condition, EmgView, LimitCycles, SessionView};
 use gait_optimizer::Gait;

@@ -11,7 +11,6 @@ pub mod error;
 pub(super) mod figures;
 mod format;
 mod gait;
-mod gait_charts;
 mod glossary;
 mod home;
 mod lab;

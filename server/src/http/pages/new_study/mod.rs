@@ -250,8 +250,8 @@ fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
         Error::Invalid(field) => Ok(*field),
         Error::Conflict(message) => Ok(FieldError {
             field: "pseudonym".to_owned(),
-            value: fields.pseudonym.clone().into(),
-            allowed: "another pseudonym".to_owned(),
+            value: Some(fields.pseudonym.clone().into()),
+            allowed: Some("another pseudonym".to_owned()),
             message,
         }),
         other => Err(other),

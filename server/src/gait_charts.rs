@@ -9,7 +9,7 @@ use gait_optimizer::walking::{Progress, progress};
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
 
 /// The phases of the stride, in their order, for either leg.
-pub(super) const PHASES: [(&str, &str); 4] = [
+pub(crate) const PHASES: [(&str, &str); 4] = [
     ("DS2", "double support: the heel of the leading foot and the toe of the trailing foot are down"),
     ("DS3", "double support: the leading foot is flat, the toe of the trailing foot is still down"),
     ("SS2", "single support on the flat foot, the other leg swings"),
@@ -36,11 +36,11 @@ const COORDINATES: [&str; 7] =
 const RIGHT: usize = 3;
 
 /// Figures that belong together.
-pub(super) struct Group {
-    pub(super) id: &'static str,
-    pub(super) heading: &'static str,
-    pub(super) hint: String,
-    pub(super) figures: Vec<Figure>,
+pub(crate) struct Group {
+    pub(crate) id: &'static str,
+    pub(crate) heading: &'static str,
+    pub(crate) hint: String,
+    pub(crate) figures: Vec<Figure>,
 }
 
 impl Group {
@@ -106,7 +106,7 @@ impl<'a> Cycle<'a> {
 }
 
 /// The stride as a row of pictures.
-pub(super) fn tiles(figures: Vec<StickFigure>) -> Figure {
+pub(crate) fn tiles(figures: Vec<StickFigure>) -> Figure {
     Figure::tiles("The stride", figures)
 }
 
@@ -114,7 +114,7 @@ pub(super) fn tiles(figures: Vec<StickFigure>) -> Figure {
 ///
 /// # Errors
 /// When its subject or device is invalid.
-pub(super) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Error> {
+pub(crate) fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Error> {
     let gait = &drawn(gait);
     let cycle = Cycle::of(gait);
     let mut groups = vec![angles(&cycle, reference), forces(&cycle), torques(&cycle, gait)];
@@ -248,7 +248,7 @@ fn domains(points: &[Point<'_>], end: f64) -> Vec<Span> {
 }
 
 /// The joint angles of a reference alone: title and chart.
-pub(super) fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
+pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
     let chart = |&(title, _, column): &(&str, usize, usize)| {
         over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column)
     };
@@ -256,7 +256,7 @@ pub(super) fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
 }
 
 /// The human joint angles of gaits over a reference: name and gait.
-pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
+pub(crate) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |&(title, q, column): &(&str, usize, usize)| {
         let mut chart = over_reference(Chart::new(title, CYCLE, "angle, °"), reference, column);
@@ -269,7 +269,7 @@ pub(super) fn beside_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGai
 }
 
 /// The orbit of each joint, of gaits one over the other: name and gait.
-pub(super) fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
+pub(crate) fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |(place, title): (usize, &&str)| {
         let mut chart = Chart::new(title, "angle, °", "velocity, °/s");
@@ -282,7 +282,7 @@ pub(super) fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
 }
 
 /// The orbit of a coordinate of a gait, °, °/s.
-pub(super) fn orbit(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
+pub(crate) fn orbit(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
     Cycle::of(&drawn(gait)).orbit(coordinate)
 }
 
@@ -323,7 +323,7 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
 }
 
 /// How the solve went; none before its first iterations.
-pub(super) fn solve(iterations: &[IterationRecord]) -> Option<Figure> {
+pub(crate) fn solve(iterations: &[IterationRecord]) -> Option<Figure> {
     // One point is no line.
     (iterations.len() > 1).then(|| Figure::chart("solve", of_iterations(iterations)))
 }
