@@ -21,8 +21,8 @@ pub use cold_guesses::{ColdGuess, ColdRoute, CostStrategy, GuessTiming};
 pub use options::{BasinChoice, SolveOptions};
 pub use problem::GaitProblem;
 pub use progress::{CancelToken, IterationRecord, Phase};
-pub use report::{Attempt, Optimality, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation};
-use report::{Tally, outcome};
+pub use report::{Attempt, Optimality, OtherBasin, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation};
+use report::{Tally, other_basin, outcome};
 use run::Context;
 pub use warm_start::WarmStart;
 use warm_start::on_mesh_of;
@@ -114,19 +114,27 @@ fn finish(
     started_from: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
     let mut tally = Tally::default();
-    let mut answer = None;
+    let (mut answer, mut others) = (None, Vec::<OtherBasin>::new());
+    let chosen_basin = tried.get(chosen).and_then(|one| one.attempt.basin);
     for (index, mut one) in tried.into_iter().enumerate() {
         one.attempt.chosen = index == chosen;
         tally.iterations += one.attempt.iterations;
         tally.evaluation_s += one.evaluation_s;
         tally.linear_algebra_s += one.linear_algebra_s;
-        tally.attempts.push(one.attempt);
         if index == chosen {
             answer = Some((one.choice, one.margins));
+        } else if let Some(basin) = one.attempt.basin.filter(|basin| Some(*basin) != chosen_basin)
+            && others.iter().all(|other| other.basin != basin)
+        {
+            others.push(other_basin(context, one.choice, &one.attempt, basin));
         }
+        tally.attempts.push(one.attempt);
     }
     match answer {
-        Some((choice, margins)) => Ok(outcome(context, choice, &margins, tally, started_from)),
+        Some((choice, margins)) => {
+            let outcome = outcome(context, choice, &margins, tally, started_from);
+            Ok(SolveOutcome { other_basins: others, ..outcome })
+        }
         None => {
             Err(ModelError::OutOfRange { field: "guesses".to_owned(), value: 0.0, minimum: 1.0, maximum: 1e3 }.into())
         }

@@ -292,7 +292,11 @@ fn joint_angles() {
                 whole.replace("_rad", ""),
                 "angles.csv, line 2: no column is a joint's; there are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
             ),
-            ("degrees", whole.replace(",0.400000,", ",23,"), "angles.csv, line 3: knee_L is 23.0 rad: is the unit right?"),
+            (
+                "degrees",
+                whole.replace(",0.400000,", ",23,"),
+                "angles.csv, line 3: knee_L is 23.0 rad: is the unit right?",
+            ),
             (
                 "a gap",
                 whole

@@ -305,7 +305,8 @@ fn recordings_without_a_stride_are_refused_with_the_reason() {
     let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
     let early = Recording { right_force: Some(force), ..recording.clone() };
     let early = early.reference("x", &HeelStrikes::Force, Walker::default()).unwrap_err().to_string();
-    let expected = "0 right heel strikes (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s), two make a stride";
+    let expected =
+        "0 right heel strikes (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s), two make a stride";
     assert!(early.contains(expected), "{early}");
     let unforced = Recording::from_opensim("x", &opensim(2), None, None).unwrap();
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));

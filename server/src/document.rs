@@ -259,7 +259,10 @@ mod tests {
         ] {
             match read::<GaitSettings>(text.as_bytes()) {
                 Err(Error::Unreadable(found)) => {
-                    assert_eq!((found.field.as_str(), &found.value, found.allowed.as_deref()), (field, &Some(value), Some(allowed)));
+                    assert_eq!(
+                        (found.field.as_str(), &found.value, found.allowed.as_deref()),
+                        (field, &Some(value), Some(allowed))
+                    );
                 }
                 other => panic!("{text}: {other:?}"),
             }

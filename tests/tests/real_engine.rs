@@ -61,6 +61,23 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     insta::assert_json_snapshot!("solve_warm", redacted(&warm));
     assert!(warm["iterations"].as_u64() < cold["iterations"].as_u64());
 
+    // Every basin that the guesses reach is kept, and can be started from.
+    let many = ["solve", "--json", "--cold-guesses", "4", "--out", "many.json"];
+    let many = json_of(&gaitwright(folder, &[&many[..], &COARSE].concat()));
+    let attempts = many["attempts"].as_array().unwrap();
+    let answer = attempts.iter().find(|attempt| attempt["chosen"] == true).unwrap()["basin"].as_u64().unwrap();
+    let other = attempts.iter().find(|attempt| attempt["basin"].as_u64().is_some_and(|basin| basin != answer)).unwrap();
+    let number = other["basin"].to_string();
+    let again = ["solve", "--json", "--warm", "many.json", "--warm-basin", &number];
+    let again = json_of(&gaitwright(folder, &[&again[..], &COARSE].concat()));
+    assert_eq!(again["attempts"][0]["status"], "converged");
+    let away = again["attempts"][0]["gait_rmse_rad"].as_f64().unwrap() - other["gait_rmse_rad"].as_f64().unwrap();
+    assert!(away.abs() < 1e-3, "{away}");
+    let unknown =
+        cli::run(BINARY, folder, &[&["solve", "--warm", "many.json", "--warm-basin", "9"][..], &COARSE].concat());
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("--warm-basin 9 is not in many.json; there are: 1, 2"));
+
     let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0.013,0.5,50,40\n20,90,0.3,1.4,0,0.5,5,5\n";
     std::fs::write(folder.join("actions.csv"), actions).unwrap();
     let sweep = ["sweep", "--actions", "actions.csv", "--out", "out.csv", "--warm", "gait.json", "--max-iterations"];

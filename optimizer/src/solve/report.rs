@@ -8,7 +8,7 @@ use crate::gait_problem::GaitProgramme;
 use crate::gait_problem::margins::Margins;
 use crate::gait_problem::programme::RowViolation;
 use crate::metrics::gait_rmse;
-use crate::nlp::{NlpStatus, NonlinearProgram};
+use crate::nlp::{NlpResult, NlpStatus, NonlinearProgram};
 use serde::{Deserialize, Serialize};
 
 /// How a solve ended. Only `Converged` is a gait that satisfies every constraint.
@@ -155,6 +155,21 @@ pub struct Violation {
     pub unit: String,
 }
 
+/// A local optimum that the guesses of a solve reached beside the answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OtherBasin {
+    /// Its number among the attempts.
+    pub basin: usize,
+    /// Objective there.
+    pub objective: f64,
+    /// Gait RMSE there, rad.
+    pub gait_rmse_rad: f64,
+    /// The gait, which keeps its bounds at its mesh points; a solve from `warm_start` sees to it between them too.
+    pub gait: Gait,
+    /// For solving on in this basin.
+    pub warm_start: WarmStart,
+}
+
 /// What a solve gives back, converged or not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolveOutcome {
@@ -166,6 +181,9 @@ pub struct SolveOutcome {
     pub warm_start: WarmStart,
     /// The most violated rows, worst first; empty when converged.
     pub violations: Vec<Violation>,
+    /// The other local optima that were found, one gait each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_basins: Vec<OtherBasin>,
 }
 
 /// What all attempts of one solve cost together.
@@ -229,9 +247,24 @@ pub(super) fn outcome(
     } else {
         violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
     };
-    let warm_start =
-        WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point(), margins };
-    SolveOutcome { report, gait, warm_start, violations }
+    let warm_start = warm_start(context, &result, margins);
+    SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
+}
+
+/// A gait of a basin of its own, as it was found.
+pub(super) fn other_basin(context: &Context<'_>, choice: Choice, attempt: &Attempt, basin: usize) -> OtherBasin {
+    OtherBasin {
+        basin,
+        objective: attempt.objective,
+        gait_rmse_rad: attempt.gait_rmse_rad,
+        warm_start: warm_start(context, &choice.result, Margins::default()),
+        gait: choice.gait,
+    }
+}
+
+fn warm_start(context: &Context<'_>, result: &NlpResult, margins: Margins) -> WarmStart {
+    let problem = context.problem;
+    WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point(), margins }
 }
 
 fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {

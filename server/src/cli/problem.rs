@@ -110,10 +110,20 @@ impl ProblemFlags {
         Ok(options)
     }
 
-    pub(super) fn warm_start(&self) -> Result<Option<WarmStart>, Error> {
+    /// The start that was given; `basin` chooses another one than the answer of the solve that wrote the file.
+    pub(super) fn warm_start(&self, basin: Option<usize>) -> Result<Option<WarmStart>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
         let outcome: SolveOutcome = read_document(path, "a file of `gaitwright solve --out`", |_| Ok(()))?;
-        Ok(Some(outcome.warm_start))
+        let answers = outcome.report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin);
+        let Some(basin) = basin.filter(|basin| Some(*basin) != answers) else { return Ok(Some(outcome.warm_start)) };
+        let mut known: Vec<usize> = answers.into_iter().chain(outcome.other_basins.iter().map(|o| o.basin)).collect();
+        known.sort_unstable();
+        let other = outcome.other_basins.into_iter().find(|other| other.basin == basin);
+        let refused = || {
+            let known = known.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+            Error::Malformed(format!("--warm-basin {basin} is not in {}; there are: {known}", path.display()))
+        };
+        other.map(|other| Some(other.warm_start)).ok_or_else(refused)
     }
 }
 

@@ -1,18 +1,29 @@
 //! `gaitwright solve`: one gait.
 
 use super::Ended;
+use super::numbers::whole;
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal, read_document};
+use super::serve::cores_or;
 use crate::error::Error;
 use crate::studies::solve_input::SolveInput;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, BoundAtLimit, Explanation, Relaxation};
-use gait_optimizer::{SolveError, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve};
+use gait_optimizer::{
+    BasinChoice, ColdGuess, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve,
+};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+
+/// Threads that a solve can use.
+const MOST_THREADS: usize = 16;
+
+fn cold_guesses(text: &str) -> Result<usize, String> {
+    whole(text, 1, ColdGuess::CATALOGUE.len())
+}
 
 #[derive(Debug, Args)]
 pub(super) struct Solve {
@@ -33,11 +44,21 @@ pub(super) struct Solve {
         value_name = "FILE",
         conflicts_with_all = [
             "subject", "height_m", "mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
-            "max_iterations", "time_limit_s", "bounds"
+            "max_iterations", "time_limit_s", "bounds", "cold_guesses", "nearest_within"
         ]
     )]
     problem: Option<PathBuf>,
-    /// Write the whole outcome (figures, gait, multipliers) as JSON.
+    /// Which basin of the file of --warm to start from, of those that its attempts are numbered by; default: its answer's.
+    #[arg(long, value_name = "NUMBER", requires = "warm")]
+    warm_basin: Option<usize>,
+    /// So many cold guesses are tried whatever becomes of them; --out keeps a gait of every basin that they reach.
+    #[arg(long, value_name = "NUMBER", value_parser = cold_guesses, allow_negative_numbers = true)]
+    cold_guesses: Option<usize>,
+    /// Take the gait nearest to the reference among those whose objective is within so many per cent of the lowest; default:
+    /// the lowest.
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    nearest_within: Option<f64>,
+    /// Write the whole outcome (figures, gait, multipliers, gaits of other basins) as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the figures as one JSON object.
@@ -69,13 +90,25 @@ impl Solve {
         }
         Ok(SolveInput {
             problem: self.flags.problem(TunedBounds::parse(&self.bounds)?)?,
-            options: self.flags.options()?,
-            warm_start: self.flags.warm_start()?,
+            options: self.options()?,
+            warm_start: self.flags.warm_start(self.warm_basin)?,
         })
     }
 
+    fn options(&self) -> Result<SolveOptions, Error> {
+        let mut options = self.flags.options()?;
+        options.cold_guesses = self.cold_guesses.unwrap_or(options.cold_guesses);
+        if let Some(within_percent) = self.nearest_within {
+            options.basin_choice = BasinChoice::NearestToReference { within_percent };
+        }
+        options.validate()?;
+        Ok(options)
+    }
+
     pub(super) async fn run(self) -> Result<Ended, Error> {
-        let SolveInput { problem, options, warm_start: warm } = self.input()?;
+        let SolveInput { problem, mut options, warm_start: warm } = self.input()?;
+        // The result does not depend on it.
+        options.threads = cores_or(None).min(MOST_THREADS);
         let inputs: Vec<&Path> = self.flags.inputs().into_iter().chain(self.problem.as_deref()).collect();
         let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
         let cancel = cancelled_by_signal();
@@ -159,6 +192,7 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
             r.variables, r.equalities, r.inequalities
         ),
     ];
+    lines.extend(basins_in_words(r));
     for violation in outcome.violations.iter().take(10) {
         lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
@@ -166,6 +200,22 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
         lines.extend(in_words(explanation));
     }
     lines.join("\n")
+}
+
+/// The local optima that were found, where there are several, each as its first attempt left it: before any bound was
+/// tightened.
+fn basins_in_words(report: &SolveReport) -> Vec<String> {
+    let answer = report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin);
+    let mut lines: Vec<String> = Vec::new();
+    for attempt in &report.attempts {
+        let Some(basin) = attempt.basin.filter(|basin| *basin > lines.len()) else { continue };
+        let chosen = if attempt.basin == answer { ", the answer's" } else { "" };
+        lines.push(format!(
+            "  basin {basin:<13}objective {:.5}   Gait RMSE {:.4} rad{chosen}",
+            attempt.objective, attempt.gait_rmse_rad
+        ));
+    }
+    if lines.len() > 1 { lines } else { Vec::new() }
 }
 
 fn in_words(explanation: &Explanation) -> Vec<String> {

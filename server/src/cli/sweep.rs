@@ -44,7 +44,7 @@ impl Sweep {
     pub(super) async fn run(self) -> Result<Ended, Error> {
         let actions = actions(&self.actions)?;
         let problem = self.flags.problem(TunedBounds::default())?;
-        let (warm, options) = (self.flags.warm_start()?, self.flags.options()?);
+        let (warm, options) = (self.flags.warm_start(None)?, self.flags.options()?);
         let mut inputs = self.flags.inputs();
         inputs.push(&self.actions);
         let out = OutFile::open(&self.out, &inputs)?;

@@ -44,7 +44,8 @@ impl Evaluate for GaitSolver {
         observer: &mut dyn FnMut(&IterationRecord),
         cancel: &CancelToken,
     ) -> Result<SolveOutcome, String> {
-        solve(&assignment.problem, assignment.warm_start.as_ref(), &assignment.options, observer, cancel)
-            .map_err(|e| e.to_string())
+        let solved = solve(&assignment.problem, assignment.warm_start.as_ref(), &assignment.options, observer, cancel);
+        // The record keeps the answer; whoever wants the gaits of other basins solves the trial's problem again.
+        solved.map(|outcome| SolveOutcome { other_basins: Vec::new(), ..outcome }).map_err(|e| e.to_string())
     }
 }
