@@ -36,9 +36,10 @@ pub fn four_strides(per_second: u32) -> String {
     for k in 0..=(44 * per_second / 10) {
         let time = f64::from(k) / f64::from(per_second);
         let phase = TAU * time / 1.1;
-        let (hip, knee) = (0.2 + 0.4 * phase.cos(), 0.4 - 0.35 * phase.cos());
-        let (opposite, ankle) = (0.2 - 0.4 * phase.cos(), 0.05 + 0.02 * time);
-        writeln!(text, "{time},0.1,{opposite:.6},0.4,{ankle:.6},{hip:.6},{knee:.6}").unwrap();
+        let swing = phase.cos();
+        let (hip, knee) = (0.2 + 0.4 * swing, 0.4 - 0.35 * swing);
+        let (left_hip, left_knee, ankle) = (0.2 - 0.4 * swing, 0.4 + 0.35 * swing, 0.05 + 0.02 * time);
+        writeln!(text, "{time},0.1,{left_hip:.6},{left_knee:.6},{ankle:.6},{hip:.6},{knee:.6}").unwrap();
     }
     text
 }

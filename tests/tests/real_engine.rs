@@ -90,7 +90,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     // No posture meets these bounds: that is an answer, and one of the six words.
     let status = rows[2].strip_prefix("20,90,0.3,1.4,0,0.5,5,5,").unwrap().split(',').next().unwrap();
     assert!(["infeasible", "stalled", "iteration_limit"].contains(&status), "{}", rows[2]);
-    assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "out.csv"]);
+    assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "many.json", "out.csv"]);
 
     // A gait of the other variant is refused in words, once for the whole table.
     let output = cli::run(BINARY, folder, &[&sweep[..], &["60", "--muscles", "on"]].concat());

@@ -144,9 +144,9 @@ pub(super) fn read_document<T: DeserializeOwned>(
 /// A token that the first Ctrl-C cancels.
 pub(super) fn cancelled_by_signal() -> CancelToken {
     let token = CancelToken::new();
-    let on_signal = token.clone();
+    let (on_signal, interrupted) = (token.clone(), interrupted());
     tokio::spawn(async move {
-        interrupted().await;
+        interrupted.await;
         tell("stopping");
         on_signal.cancel();
     });

@@ -98,9 +98,9 @@ impl Serve {
         // Streams end when the director stops, so that the drain is not held up by them.
         let handle = Handle::<SocketAddr>::new();
         tokio::spawn({
-            let (director, handle) = (director.clone(), handle.clone());
+            let (director, handle, interrupted) = (director.clone(), handle.clone(), interrupted());
             async move {
-                interrupted().await;
+                interrupted.await;
                 director.stop();
                 handle.graceful_shutdown(Some(DRAIN));
             }
@@ -159,20 +159,27 @@ pub(super) fn cores_or(given: Option<usize>) -> usize {
     given.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
 }
 
-/// Ctrl-C or, where there is one, SIGTERM.
-pub(super) async fn interrupted() {
-    #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        if let Ok(mut terminate) = signal(SignalKind::terminate()) {
+/// Ctrl-C or, where there is one, SIGTERM. From this call on, not only once it is waited for, they do not end the process.
+#[cfg(unix)]
+pub(super) fn interrupted() -> impl Future<Output = ()> + use<> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let signals = [SignalKind::interrupt(), SignalKind::terminate()].map(signal);
+    async move {
+        if let [Ok(mut interrupt), Ok(mut terminate)] = signals {
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => {}
+                _ = interrupt.recv() => {}
                 _ = terminate.recv() => {}
             }
-            return;
+        } else {
+            // Without signals the process is ended from outside; the record stands that.
+            std::future::pending::<()>().await;
         }
     }
-    // Without signals the process is ended from outside; the record stands that.
+}
+
+/// Ctrl-C.
+#[cfg(not(unix))]
+pub(super) async fn interrupted() {
     if tokio::signal::ctrl_c().await.is_err() {
         std::future::pending::<()>().await;
     }

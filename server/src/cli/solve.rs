@@ -109,9 +109,10 @@ impl Solve {
         let SolveInput { problem, mut options, warm_start: warm } = self.input()?;
         // The result does not depend on it.
         options.threads = cores_or(None).min(MOST_THREADS);
+        // Before there is a file to leave behind.
+        let cancel = cancelled_by_signal();
         let inputs: Vec<&Path> = self.flags.inputs().into_iter().chain(self.problem.as_deref()).collect();
         let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
-        let cancel = cancelled_by_signal();
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
         let explain = self.explain;

@@ -47,9 +47,11 @@ impl Sweep {
         let (warm, options) = (self.flags.warm_start(None)?, self.flags.options()?);
         let mut inputs = self.flags.inputs();
         inputs.push(&self.actions);
+        // Before there is a file to leave behind.
+        let cancel = cancelled_by_signal();
         let out = OutFile::open(&self.out, &inputs)?;
         tell(&format!("rows so far: {}", out.part().display()));
-        let (cancel, workers) = (cancelled_by_signal(), cores_or(self.workers));
+        let workers = cores_or(self.workers);
         let stopped = cancel.clone();
         let table = tokio::task::spawn_blocking(move || {
             let mut table = Table::begin(out)?;

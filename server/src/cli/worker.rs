@@ -37,9 +37,9 @@ impl Worker {
         tracing::info!(workers = size, queue = self.nats_queue, "waiting for jobs");
         let stop = CancellationToken::new();
         let asked = tokio::spawn({
-            let stop = stop.clone();
+            let (stop, interrupted) = (stop.clone(), interrupted());
             async move {
-                interrupted().await;
+                interrupted.await;
                 stop.cancel();
             }
         });
