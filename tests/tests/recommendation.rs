@@ -3,13 +3,17 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_learner::SearchSpace;
 use gait_optimizer::{Gait, TunedBounds};
 use gaitwright::cli::study::prune;
 use gaitwright::store::audit::{self, Actor};
 use gaitwright::store::gaits;
 use gaitwright::store::studies::StudyState;
+use gaitwright::store::trials::TrialState;
 use gaitwright::store::{StudyId, TrialId, certificates, commit};
-use gaitwright::studies::choice::ranking;
+use gaitwright::studies::belief::Beliefs;
+use gaitwright::studies::choice::ranking_to_show;
+use gaitwright::studies::plan::NewStudy;
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::examined::{Verdicts, certificate};
@@ -27,6 +31,28 @@ async fn recommendation(service: &Service, study: StudyId) -> Value {
     let answer = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text);
     answer.json()
+}
+
+#[tokio::test]
+async fn a_study_without_a_gait_has_no_best_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let without_gait = TunedBounds::parse("a5=0.039,a6=0").unwrap();
+    let space = json!({"dimensions": [{"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0}]});
+    let space: SearchSpace = serde_json::from_value(space).unwrap();
+    let plan = |new: &mut NewStudy| {
+        (new.base_bounds, new.search_space, new.trial_budget) = (without_gait, Some(space.clone()), 2);
+    };
+    let study = service.study(plan).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    assert!(service.trials(study).await.iter().all(|trial| trial.state == TrialState::NotConverged));
+    assert_eq!(ranked(&service, study).await, []);
+    let api = format!("/api/v1/studies/{study}");
+    assert_eq!(service.fetch(&format!("{api}/history")).await.json(), json!([]));
+    assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(!page.contains("the best so far") && !page.contains(">best<"), "{page}");
+    service.stop().await;
 }
 
 #[tokio::test]
@@ -99,7 +125,8 @@ async fn settled(service: &Service, study: StudyId) -> Value {
 
 async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
     let study = service.get(study).await;
-    ranking(&Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap()).unwrap()
+    let standing = Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    ranking_to_show(&standing, &Beliefs::default()).unwrap()
 }
 
 /// The trials whose gaits the service examined by itself, in order.
