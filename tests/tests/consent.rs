@@ -134,6 +134,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     assert!(closed > 15, "{closed}");
     for (path, body) in [
         (format!("/api/v1/trials/{}/certificate", trials[0].id), json!({})),
+        (format!("/api/v1/trials/{}/explanation", trials[0].id), json!({})),
         (format!("/api/v1/studies/{human}/unblind"), json!({"rater": "not signed in", "reason": "r"})),
         (format!("/api/v1/preferences/{heard_id}/retract"), json!({"reason": "r"})),
     ] {
