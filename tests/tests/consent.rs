@@ -28,7 +28,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
-    let running = service.study(|new| new.trial_budget = 300).await;
+    // One is open at any instant.
+    let running = service.study(|new| (new.trial_budget, new.parallel_trials) = (300, 2)).await;
     while !service.trials(running).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }

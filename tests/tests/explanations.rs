@@ -4,7 +4,6 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gait_optimizer::explanation::Explanation;
 use gait_optimizer::{Mesh, TunedBounds};
 use gaitwright::store::audit::{self, Actor};
 use gaitwright::store::studies::{Evaluation, StudyState};
@@ -92,7 +91,7 @@ async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order
     assert!(!page.contains("/explain\""), "there is nothing to ask for any more");
 
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    let reason = format!("a5 (swing-foot clearance) alone, relaxed, gives a gait in {0} of {0}", trials.len());
+    let reason = format!("a5 (swing-foot clearance) alone, relaxed, gives one in {0} of {0} trials", trials.len());
     assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");
     service.stop().await;
 }
@@ -251,8 +250,8 @@ async fn the_real_explanation_is_that_of_the_command_line() {
         .study(|new| {
             (new.muscles, new.trial_budget) = (false, 1);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
-            new.solve_options.retry = false;
-            new.base_bounds = TunedBounds { a6: 0.0, a7: 5.0, ..TunedBounds::default() };
+            (new.solve_options.retry, new.solve_options.cold_guesses) = (false, 1);
+            new.base_bounds = TunedBounds { a2: 10.0, ..TunedBounds::default() };
             let first = json!({"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0});
             new.search_space = Some(serde_json::from_value(json!({"dimensions": [first]})).unwrap());
         })
@@ -261,26 +260,17 @@ async fn the_real_explanation_is_that_of_the_command_line() {
     let trial = without_gait(&service, study).await.remove(0);
     let problem = service.fetch(&format!("/api/v1/trials/{}/problem.json", trial.id)).await.text;
     std::fs::write(folder.path().join("problem.json"), problem).unwrap();
-    let command = |json: bool| {
-        let options = ["solve", "--problem", "problem.json", "--explain", "--json"];
-        let options = if json { &options[..] } else { &options[..4] };
-        let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), options);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap()
-    };
-    let figures: Value = serde_json::from_str(&command(true)).unwrap();
-    let there: Explanation = serde_json::from_value(figures["explanation"].clone()).unwrap();
-    let text = command(false);
+    let solve = ["solve", "--problem", "problem.json", "--explain"];
+    let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &solve);
+    let there = String::from_utf8(output.stdout).unwrap();
 
     while service.fetch(&address(trial.id)).await.status != StatusCode::OK {
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
     let here = explanations::find(&mut service.store.read().await.unwrap(), trial.id).await.unwrap().unwrap();
-    assert_eq!(here.explanation.sentences(), there.sentences());
-    assert_eq!(serde_json::to_value(&here.explanation).unwrap(), figures["explanation"]);
-    for sentence in there.sentences() {
-        assert!(text.contains(&sentence), "{sentence}: {text}");
+    for sentence in here.explanation.sentences() {
+        assert!(there.contains(&sentence), "{sentence}: {there}");
     }
-    assert!(there.relief().is_some(), "{text}");
+    assert!(here.explanation.relief().is_some(), "{there}");
     service.stop().await;
 }

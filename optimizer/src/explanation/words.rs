@@ -61,12 +61,16 @@ impl BoundAtLimit {
 
     /// Where it is reached.
     pub fn in_words(&self) -> String {
+        let quantity = quantity(&self.bound, &self.meaning, self.value);
+        if self.domains.len() == CYCLE.len() {
+            return format!("{quantity} is reached in every domain.");
+        }
         let domains: Vec<String> = self
             .domains
             .iter()
             .map(|name| if name == "stride" { "the whole stride" } else { name }.to_owned())
             .collect();
-        format!("{} is reached in {}.", quantity(&self.bound, &self.meaning, self.value), list(&domains))
+        format!("{quantity} is reached in {}.", list(&domains))
     }
 }
 
@@ -191,6 +195,13 @@ mod tests {
                 "a5 (swing-foot clearance) alone, down to 0 m, does not help.",
             ]
         );
+    }
+
+    #[test]
+    fn eight_domains_are_not_listed() {
+        let everywhere = CYCLE.map(crate::walking::Domain::name);
+        let bound = at_limit("a2", "coordinate acceleration, rad/s²", 20.0, &everywhere);
+        assert_eq!(bound.in_words(), "a2 = 20 rad/s² (coordinate acceleration) is reached in every domain.");
     }
 
     #[test]

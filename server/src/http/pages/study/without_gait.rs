@@ -18,27 +18,28 @@ pub(in crate::http::pages) struct WithoutGait {
 impl WithoutGait {
     /// None where every trial that the program solved has a gait.
     pub(super) fn of(trials: &[Trial], common: &Common) -> Option<Self> {
-        let of = common.explained;
+        let explained = common.explained;
         if let Some(Relief { bound, trials, instance }) = &common.relief {
             let limited = format::limited(bound);
-            let reason =
-                format!("{bound} ({limited}) alone, relaxed, gives a gait in {trials} of {of} that are explained");
+            let reason = format!(
+                "{bound} ({limited}) alone, relaxed, gives one in {trials} of {explained} trials that are explained"
+            );
             return Some(Self { reason, instance: *instance });
         }
-        let mut missed: BTreeMap<&str, Vec<&Trial>> = BTreeMap::new();
+        let (mut missed, mut all): (BTreeMap<&str, Vec<&Trial>>, usize) = (BTreeMap::new(), 0);
         for trial in trials.iter().filter(|trial| trial.state == TrialState::NotConverged) {
             if let Some(worst) = trial.violations.first() {
                 missed.entry(worst.constraint()).or_default().push(trial);
+                all += 1;
             }
         }
-        let (constraint, trials) = missed.into_iter().max_by_key(|(_, trials)| trials.len())?;
-        let newest = trials.last()?;
-        let alone = if of > 0 {
-            format!("; no bound alone gives a gait in the {of} that are explained")
-        } else {
-            String::new()
+        let (constraint, most) = missed.into_iter().max_by_key(|(_, trials)| trials.len())?;
+        let newest = most.last()?;
+        let alone = match explained {
+            0 => String::new(),
+            _ => format!("; no bound alone, relaxed, gives one in the {explained} that are explained"),
         };
-        let reason = format!("most often missed: {constraint}, in {}{alone}", trials.len());
+        let reason = format!("{constraint} was missed most, in {} of {all} trials{alone}", most.len());
         Some(Self { reason, instance: (newest.id, newest.number) })
     }
 }
