@@ -54,7 +54,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let outcome = run(&problem, None)?;
         let report = &outcome.report;
         eprintln!("{bounds:?}: {:?}, {} iterations, {:.0} s", report.status, report.iterations, report.seconds_total);
-        let Some(explanation) = explain(&problem, &outcome, &options, &mut |_| {}, &CancelToken::new())? else {
+        let Some(explanation) = explain(&problem, (&outcome).into(), &options, &mut |_| {}, &CancelToken::new())?
+        else {
             continue;
         };
         explained += 1;

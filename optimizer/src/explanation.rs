@@ -9,6 +9,10 @@ use crate::solve::{
 };
 use serde::{Deserialize, Serialize};
 
+mod words;
+
+pub use words::verdict;
+
 /// A variable or row nearer to a limit than this, in scaled units, is at it.
 const AT_LIMIT: f64 = 1e-4;
 /// Values tried between the given one and the loosest.
@@ -17,6 +21,23 @@ const BISECTIONS: usize = 7;
 const DIGITS: i32 = 3;
 /// Iterations of one of these solves: gaits that converge take fewer, and most that do not would go on for many more.
 const MAX_ITERATIONS: usize = 400;
+
+/// A solve that ended without a gait, as it left off.
+#[derive(Debug, Clone, Copy)]
+pub struct Unsolved<'a> {
+    /// How it ended.
+    pub status: SolveStatus,
+    /// What its last iterate violates, worst first.
+    pub violations: &'a [Violation],
+    /// Its last iterate.
+    pub last: &'a WarmStart,
+}
+
+impl<'a> From<&'a SolveOutcome> for Unsolved<'a> {
+    fn from(outcome: &'a SolveOutcome) -> Self {
+        Self { status: outcome.report.status, violations: &outcome.violations, last: &outcome.warm_start }
+    }
+}
 
 /// A tuned bound that the last iterate runs into.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -141,7 +162,7 @@ impl GaitProblem {
     }
 }
 
-/// Bisects one bound between its value, with which no gait was found, and its loosest.
+/// Bisects one bound between its value, with which no gait was found, and its loosest. `None`: cancelled.
 fn relax(
     problem: &GaitProblem,
     bound: usize,
@@ -166,6 +187,9 @@ fn relax(
                 break;
             }
             let outcome = try_value(value, Some(&last.warm_start))?;
+            if cancel.is_cancelled() {
+                return Ok(None);
+            }
             if outcome.report.status == SolveStatus::Converged {
                 (nearest, last) = (value, outcome);
             } else {
@@ -183,25 +207,26 @@ fn relax(
     Ok(Some(Relaxation { bound: name, meaning, from, to, not_with, undecided, solves, warm_start }))
 }
 
-/// Explains an outcome that did not converge, by relaxing each bound that it runs into alone and solving again.
+/// Explains a solve that did not converge, by relaxing each bound that it runs into alone and solving again.
 ///
-/// Takes up to eight solves a bound. `progress` is told the bound that is being relaxed. `None`: cancelled, or the outcome
-/// converged.
+/// Takes up to eight solves a bound. `progress` is told the bound that is being relaxed. `None`: cancelled, or the solve
+/// converged or was cancelled itself.
 ///
 /// # Errors
-/// [`SolveError`] when the problem is invalid or the outcome belongs to another one.
+/// [`SolveError`] when the problem is invalid or the last iterate belongs to another one.
 pub fn explain(
     problem: &GaitProblem,
-    outcome: &SolveOutcome,
+    unsolved: Unsolved<'_>,
     options: &SolveOptions,
     progress: &mut dyn FnMut(&str),
     cancel: &CancelToken,
 ) -> Result<Option<Explanation>, SolveError> {
-    if matches!(outcome.report.status, SolveStatus::Converged | SolveStatus::Cancelled) {
+    let Unsolved { status, violations, last } = unsolved;
+    if matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {
         return Ok(None);
     }
     let programme = problem.programme(problem.muscles)?;
-    let x = &outcome.warm_start.point.x;
+    let x = &last.point.x;
     if x.len() != programme.variables() {
         return Err(SolveError::WarmStartShape(format!("{} variables, expected {}", x.len(), programme.variables())));
     }
@@ -220,12 +245,7 @@ pub fn explain(
         at_limit.push(BoundAtLimit { bound: name, meaning, value, domains });
     }
     relaxations.sort_by(|a, b| size(a).total_cmp(&size(b)));
-    Ok(Some(Explanation {
-        status: outcome.report.status,
-        violations: outcome.violations.clone(),
-        at_limit,
-        relaxations,
-    }))
+    Ok(Some(Explanation { status, violations: violations.to_vec(), at_limit, relaxations }))
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ pub mod export;
 mod filter;
 pub mod gait;
 pub mod gait_problem;
+mod in_words;
 pub mod metrics;
 pub mod muscle;
 pub mod nlp;

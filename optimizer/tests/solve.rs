@@ -187,7 +187,8 @@ fn a_warm_start_that_is_not_of_its_mesh_is_refused_in_words() {
 
 #[test]
 fn a_converged_gait_needs_no_explanation() {
-    let explanation = explain(&problem(""), &COLD, &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
+    let explanation =
+        explain(&problem(""), (&*COLD).into(), &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
     assert_eq!(explanation.unwrap(), None);
 }
 
@@ -205,7 +206,8 @@ fn an_explanation_names_relaxations_that_were_solved() {
     assert_ne!(outcome.report.status, SolveStatus::Converged);
     let mut asked = Vec::new();
     let mut progress = |bound: &str| asked.push(bound.to_owned());
-    let explanation = explain(&conflict, &outcome, &options, &mut progress, &CancelToken::new()).unwrap().unwrap();
+    let explanation =
+        explain(&conflict, (&outcome).into(), &options, &mut progress, &CancelToken::new()).unwrap().unwrap();
     assert_eq!(explanation.relaxations.len(), explanation.at_limit.len());
     assert!(asked.iter().eq(explanation.at_limit.iter().map(|a| &a.bound)));
     assert!(explanation.at_limit.iter().any(|a| a.bound == "a5" && a.domains.iter().all(|d| d.starts_with("SS"))));

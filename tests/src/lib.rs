@@ -10,6 +10,7 @@ pub mod callers;
 pub mod cli;
 pub mod client;
 pub mod examined;
+pub mod explained;
 pub mod large;
 pub mod measured;
 pub mod service;

@@ -1,8 +1,11 @@
 //! A service on a temporary record.
 
+use crate::examined::Verdicts;
+use crate::explained::Clearance;
 use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderMap, Method, Request, StatusCode, header};
+use gait_optimizer::Gait;
 use gaitwright::http::{Access, AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
 use gaitwright::store::feedback::FeedbackRow;
@@ -14,7 +17,7 @@ use gaitwright::store::{
 use gaitwright::studies::catalogue;
 use gaitwright::studies::director::Director;
 use gaitwright::studies::plan::{self, NewStudy};
-use gaitwright::workers::{Dispatch, Evaluate, Examine, InProcess};
+use gaitwright::workers::{AfterSolves, Dispatch, Evaluate, Examine, Explain, InProcess};
 use http_body_util::BodyExt;
 use serde_json::Value;
 use std::path::Path;
@@ -68,10 +71,27 @@ impl Service {
         Self::over(with_catalogue(database).await, engine, None)
     }
 
-    /// Starts a service that examines gaits by itself.
+    /// Starts a service that examines gaits by itself, and explains at once why there are none.
     pub async fn start_examining(database: &Path, solver: impl Evaluate, examine: impl Examine) -> Self {
+        Self::start_looking_back(database, solver, examine, Clearance::default()).await
+    }
+
+    /// Starts a service that explains by itself why there are no gaits, and passes all others at once.
+    pub async fn start_explaining(database: &Path, solver: impl Evaluate, explain: impl Explain) -> Self {
+        let examine = Verdicts { pause: Duration::ZERO, passes: |_: &Gait| true };
+        Self::start_looking_back(database, solver, examine, explain).await
+    }
+
+    /// Starts a service that looks into what solves gave.
+    pub async fn start_looking_back(
+        database: &Path,
+        solver: impl Evaluate,
+        examine: impl Examine,
+        explain: impl Explain,
+    ) -> Self {
         let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
-        Self::over(with_catalogue(database).await, engine, Some(Arc::new(examine)))
+        let after_solves = AfterSolves { examine: Arc::new(examine), explain: Arc::new(explain) };
+        Self::over(with_catalogue(database).await, engine, Some(after_solves))
     }
 
     /// Starts a service on a record as it is, adding nothing to it.
@@ -79,8 +99,8 @@ impl Service {
         Self::over(Store::open(database).await.unwrap(), Arc::new(InProcess::new(workers, Arc::new(solver))), None)
     }
 
-    fn over(store: Store, engine: Arc<dyn Dispatch>, examine: Option<Arc<dyn Examine>>) -> Self {
-        let director = Director::new(store.clone(), engine, None, examine);
+    fn over(store: Store, engine: Arc<dyn Dispatch>, after_solves: Option<AfterSolves>) -> Self {
+        let director = Director::new(store.clone(), engine, None, after_solves);
         let work = tokio::spawn({
             let director = director.clone();
             async move { Box::pin(director.run()).await.unwrap() }

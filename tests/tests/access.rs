@@ -65,7 +65,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 60] = [
+const PAGES: [(&str, Option<Right>); 61] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -91,6 +91,7 @@ const PAGES: [(&str, Option<Right>); 60] = [
     ("get /trials/{id}", Some(Right::Read)),
     ("get /trials/{id}/running", Some(Right::Read)),
     ("post /trials/{id}/certify", Some(Right::Run)),
+    ("post /trials/{id}/explain", Some(Right::Run)),
     ("post /trials/{id}/safety-review", Some(Right::Answer)),
     ("get /references", Some(Right::Read)),
     ("post /references", Some(Right::Run)),

@@ -14,6 +14,7 @@ use gaitwright::store::trials::Trial;
 use gaitwright::store::{StudyId, feedback};
 use gaitwright::studies::search;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::explained::without_gaits;
 use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
@@ -188,6 +189,11 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.one(done, "post /lab-sessions/{id}/motions", &format!("{session}/motions"), motion).await;
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
     scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
+
+    let no_gait = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits()))).await;
+    service.wait_for(no_gait, &[StudyState::Finished]).await;
+    let explain = format!("{api}/trials/{}/explanation", service.trials(no_gait).await[0].id);
+    scene.one(done, "post /trials/{id}/explanation", &explain, json!({})).await;
 
     // Examines a real gait only; tests/certificates.rs counts its row.
     done.insert("post /trials/{id}/certificate".to_owned());

@@ -28,7 +28,8 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
-    let running = service.study(|new| new.trial_budget = 300).await;
+    // One is open at any instant.
+    let running = service.study(|new| (new.trial_budget, new.parallel_trials) = (300, 2)).await;
     while !service.trials(running).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
@@ -134,6 +135,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     assert!(closed > 15, "{closed}");
     for (path, body) in [
         (format!("/api/v1/trials/{}/certificate", trials[0].id), json!({})),
+        (format!("/api/v1/trials/{}/explanation", trials[0].id), json!({})),
         (format!("/api/v1/studies/{human}/unblind"), json!({"rater": "not signed in", "reason": "r"})),
         (format!("/api/v1/preferences/{heard_id}/retract"), json!({"reason": "r"})),
     ] {

@@ -80,6 +80,24 @@ fn examined(address: &str, study: &str) -> (Value, Value) {
     panic!("the gaits of the study are not examined");
 }
 
+/// What each trial without a gait is said to need, once the service is done.
+fn explained(address: &str, study: &str) -> Vec<String> {
+    let page = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().json();
+    let without_gait = page["trials"].as_array().unwrap().iter().filter(|trial| trial["state"] == "not_converged");
+    without_gait.map(|trial| sentences(address, trial["id"].as_str().unwrap())).collect()
+}
+
+fn sentences(address: &str, trial: &str) -> String {
+    for _ in 0..3000 {
+        let found = get(address, &format!("/api/v1/trials/{trial}/explanation")).unwrap();
+        if found.status == 200 {
+            return found.json()["sentences"].to_string();
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("the trial is not explained");
+}
+
 /// Everything but identifiers and times.
 fn essence(address: &str, study: &str) -> Vec<String> {
     let page = get(address, &format!("/api/v1/studies/{study}/trials")).unwrap().json();
@@ -123,6 +141,8 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     let expected_answers = labels(&quiet.address, &undisturbed);
     let certified = examined(&quiet.address, &undisturbed);
     assert!(["passed", "failed"].contains(&certified.0.as_str().unwrap()), "{certified:?}");
+    let whys = explained(&quiet.address, &undisturbed);
+    assert!(!whys.is_empty(), "trials without a gait");
     assert_eq!(expected.len(), TRIALS as usize);
     drop(quiet);
 
@@ -163,6 +183,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     assert_eq!(essence(&process.address, &study), expected);
     assert_eq!(labels(&process.address, &study), expected_answers, "no answer is given twice");
     assert_eq!(examined(&process.address, &study), certified);
+    assert_eq!(explained(&process.address, &study), whys);
     let present = pseudonyms(&process.address);
     let acknowledged = acknowledged.into_inner().unwrap();
     assert!(!acknowledged.is_empty());

@@ -4,12 +4,15 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
+use gait_optimizer::SolveStatus;
 use gaitwright::cli::study::{import, prune};
+use gaitwright::store::audit::Actor;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, archive, backup, certificates, commit, gaits, studies};
+use gaitwright::store::{Store, archive, backup, certificates, commit, explanations, gaits, studies};
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::examined::certificate;
+use gaitwright_tests::explained::explanation;
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
 use serde_json::{Value, json};
@@ -49,6 +52,10 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     let examined = (converged[0].id, certificate(false));
     let mut writer = service.store.write().await.unwrap();
     assert!(certificates::keep(&mut writer, examined.0, &examined.1).await.unwrap());
+    let explained = converged[1].id;
+    let why = explanation(&converged[1].action, SolveStatus::Infeasible, &[]);
+    assert!(explanations::request(&mut writer, explained, &Actor::program()).await.unwrap());
+    assert!(explanations::keep(&mut writer, explained, "{}", &why).await.unwrap());
     commit(writer).await.unwrap();
     let file = archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
 
@@ -80,6 +87,10 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     }
     let found = certificates::find(&mut again.store.read().await.unwrap(), examined.0).await.unwrap();
     assert_eq!(found, Some(examined.1));
+    let mut reader = again.store.read().await.unwrap();
+    assert_eq!(explanations::find(&mut reader, explained).await.unwrap().unwrap().explanation, why);
+    assert!(explanations::is_requested(&mut reader, explained).await.unwrap());
+    drop(reader);
     again.stop().await;
     service.stop().await;
 

@@ -40,6 +40,9 @@ async fn filled() -> (TempDir, PathBuf) {
     let mut writer = service.store.write().await.unwrap();
     for sql in [
         "insert into certificates select trial_id, 1, 1, '{}', created_at from gaits limit 1",
+        "insert into explanation_requests (trial_id, actor, created_at) select id, 'K', '' from trials limit 1",
+        "insert into explanations (trial_id, program, problem_sha256, document, created_at) \
+         select trial_id, 'P', gait_sha256, '{}', created_at from gaits limit 1",
         "insert into presentation_retractions select presentation_id, created_at from presentation_answers limit 1",
         "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, actor, created_at) \
          select 'L', study_id, 1, min(id), max(id), 1, 'K', '' from trials group by study_id",

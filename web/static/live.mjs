@@ -85,7 +85,7 @@ if (live) {
     filtered();
   });
 
-  for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined"]) {
+  for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined", "trial_explained"]) {
     source.addEventListener(kind, () => void refresh());
   }
 

@@ -1,6 +1,7 @@
 //! One question that a certificate answers: the worst value found of a quantity, where, and what is allowed.
 
 use crate::gait::DomainTrajectory;
+use crate::in_words::figure;
 use serde::{Deserialize, Serialize};
 
 /// The worst value of a quantity.
@@ -33,16 +34,6 @@ impl Check {
     pub fn limit_in_words(&self) -> String {
         self.limit.map_or_else(|| "reported only".to_owned(), |limit| format!("{} {}", figure(limit), self.unit))
     }
-}
-
-/// Three digits; as a power of ten where there would be many noughts.
-fn figure(value: f64) -> String {
-    let magnitude = value.abs();
-    if value != 0.0 && !(1e-3..1e4).contains(&magnitude) {
-        return format!("{value:.2e}");
-    }
-    let last = if value == 0.0 { 1.0 } else { 10_f64.powf(2.0 - magnitude.log10().floor()) };
-    format!("{}", (value * last).round() / last)
 }
 
 /// Where a value was measured.

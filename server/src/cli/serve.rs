@@ -9,7 +9,7 @@ use crate::store::{Store, commit};
 use crate::studies::catalogue;
 use crate::studies::director::Director;
 use crate::workers::nats::JetStream;
-use crate::workers::{Dispatch, GaitExaminer, GaitSolver, InProcess, LEASE};
+use crate::workers::{AfterSolves, Dispatch, GaitSolver, InProcess, LEASE};
 use axum_server::Handle;
 use axum_server::tls_rustls::RustlsConfig;
 use clap::Args;
@@ -83,7 +83,7 @@ impl Serve {
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
             None => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
         };
-        let director = Director::new(store.clone(), engine, None, Some(Arc::new(GaitExaminer)));
+        let director = Director::new(store.clone(), engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
         let app = router(AppState::new(director.clone(), Arc::new(access), hosts));
         let work = tokio::spawn({

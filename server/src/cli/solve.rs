@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::studies::solve_input::SolveInput;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
-use gait_optimizer::explanation::{self, BoundAtLimit, Explanation, Relaxation};
+use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::{
     BasinChoice, ColdGuess, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve,
 };
@@ -127,7 +127,7 @@ impl Solve {
             let outcome = solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?;
             let explanation = if explain {
                 let mut progress = |bound: &str| shown.set_message(format!("what if {bound} gave way?"));
-                explanation::explain(&problem, &outcome, &options, &mut progress, &cancel)?
+                explanation::explain(&problem, (&outcome).into(), &options, &mut progress, &cancel)?
             } else {
                 None
             };
@@ -198,7 +198,7 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
         lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
     }
     if let Some(explanation) = explanation {
-        lines.extend(in_words(explanation));
+        lines.extend(explanation.sentences().iter().map(|sentence| format!("  {sentence}")));
     }
     lines.join("\n")
 }
@@ -217,32 +217,4 @@ fn basins_in_words(report: &SolveReport) -> Vec<String> {
         ));
     }
     if lines.len() > 1 { lines } else { Vec::new() }
-}
-
-fn in_words(explanation: &Explanation) -> Vec<String> {
-    let mut lines = vec![match explanation.status {
-        SolveStatus::Infeasible => {
-            "no gait near the last iterate meets every constraint: no step makes the violation smaller".to_owned()
-        }
-        _ => "the solver gave up: nothing is proved about these bounds".to_owned(),
-    }];
-    for at_limit in &explanation.at_limit {
-        let BoundAtLimit { bound, meaning, value, domains } = at_limit;
-        lines.push(format!("  at its limit: {bound} = {value} ({meaning}) in {}", domains.join(", ")));
-    }
-    for Relaxation { bound, meaning, from, to, not_with, undecided, .. } in &explanation.relaxations {
-        lines.push(match to {
-            Some(to) => format!(
-                "  with {bound} = {to} instead of {from} alone, a gait converges ({meaning}; {} with {not_with})",
-                if *undecided { "none was found" } else { "not" }
-            ),
-            None if *undecided => {
-                format!(
-                    "  {bound} alone, up to {not_with}: no gait was found within the limits of the solves ({meaning})"
-                )
-            }
-            None => format!("  {bound} alone does not help, up to {not_with} ({meaning})"),
-        });
-    }
-    lines
 }

@@ -17,7 +17,7 @@ const READ: [&str; 2] = ["gaitwright study 1", FORMAT];
 const LARGEST_BYTES: u64 = 4 << 30;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study.
-const TABLES: [(&str, &str); 24] = [
+const TABLES: [(&str, &str); 26] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -25,6 +25,8 @@ const TABLES: [(&str, &str); 24] = [
     ("trials", "study_id = ? order by number"),
     ("gaits", "trial_id in (select id from trials where study_id = ?)"),
     ("certificates", "trial_id in (select id from trials where study_id = ?) order by trial_id, format_version"),
+    ("explanation_requests", "trial_id in (select id from trials where study_id = ?)"),
+    ("explanations", "trial_id in (select id from trials where study_id = ?)"),
     ("jobs", "trial_id in (select id from trials where study_id = ?)"),
     ("results", "trial_id in (select id from trials where study_id = ?)"),
     ("feedback", "study_id = ? order by seq"),

@@ -99,6 +99,14 @@ pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Gait> {
     json::from_text("gait", &json_of(db, trial).await?)
 }
 
+/// Whether a trial has a gait, or the last iterate of a solve without one.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_kept(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
+    Ok(sqlx::query("select 1 from gaits where trial_id = ?").bind(trial).fetch_optional(db).await?.is_some())
+}
+
 /// What another solve can start from.
 ///
 /// # Errors

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 18] = [
+const FILES: [(i64, &str, &str); 19] = [
     (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
     (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
     (3, "access", include_str!("../../../migrations/0003_access.sql")),
@@ -26,6 +26,7 @@ const FILES: [(i64, &str, &str); 18] = [
     (40, "remarks", include_str!("../../../migrations/0040_remarks.sql")),
     (41, "lab_answers", include_str!("../../../migrations/0041_lab_answers.sql")),
     (42, "safety_reviews", include_str!("../../../migrations/0042_safety_reviews.sql")),
+    (43, "explanations", include_str!("../../../migrations/0043_explanations.sql")),
 ];
 
 /// Length of the header of an SQLite file.

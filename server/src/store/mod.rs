@@ -12,6 +12,7 @@ pub mod consents;
 pub mod devices;
 mod error;
 pub mod events;
+pub mod explanations;
 pub mod feedback;
 mod file_kind;
 pub mod gaits;

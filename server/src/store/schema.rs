@@ -52,6 +52,38 @@ pub struct Violation {
     pub unit: String,
 }
 
+/// A tuned bound that the last iterate of a solve runs into.
+#[derive(Debug, ToSchema)]
+pub struct BoundAtLimit {
+    /// `a1` to `a8`.
+    pub bound: String,
+    /// What it limits, with its unit.
+    pub meaning: String,
+    /// Its value.
+    pub value: f64,
+    /// Where it is reached: domains, or `stride`.
+    pub domains: Vec<String>,
+}
+
+/// What relaxing one tuned bound alone achieves.
+#[derive(Debug, ToSchema)]
+pub struct Relaxation {
+    /// `a1` to `a8`.
+    pub bound: String,
+    /// What it limits, with its unit.
+    pub meaning: String,
+    /// Its value.
+    pub from: f64,
+    /// The value nearest to it, of those tried, with which a gait converged; null: not even with the loosest.
+    pub to: Option<f64>,
+    /// The loosest value tried with which none did.
+    pub not_with: f64,
+    /// A solve without a gait gave up: that there is no gait is not known then.
+    pub undecided: bool,
+    /// Solves that this took.
+    pub solves: u64,
+}
+
 /// One iteration of a solve.
 #[derive(Debug, ToSchema)]
 pub struct Iteration {

@@ -29,7 +29,7 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 27] = [
+pub const TABLES: [Sealed; 29] = [
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
@@ -40,6 +40,8 @@ pub const TABLES: [Sealed; 27] = [
     sealed("gaits", &["trial_id"]),
     sealed("results", &["trial_id", "attempt"]),
     sealed("certificates", &["trial_id", "format_version"]),
+    sealed("explanation_requests", &["trial_id"]),
+    sealed("explanations", &["trial_id"]),
     sealed("feedback", &["seq"]),
     sealed("retractions", &["feedback_seq"]),
     sealed("presentations", &["id"]),

@@ -42,6 +42,11 @@ impl StudyState {
             Self::Stopped => "stopped",
         }
     }
+
+    /// Finished or stopped.
+    pub fn has_ended(self) -> bool {
+        matches!(self, Self::Finished | Self::Stopped)
+    }
 }
 
 impl FromStr for StudyState {

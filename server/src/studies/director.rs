@@ -5,6 +5,8 @@
 
 use super::belief::Beliefs;
 use super::examiner::Examiner;
+use super::explainer::Explainer;
+use super::explanation::Effort;
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::record;
@@ -16,7 +18,7 @@ use crate::store::jobs::Lease;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
 use crate::store::{Store, StoreError, StudyId, TrialId, commit, events, feedback, gaits, jobs, now, studies, trials};
-use crate::workers::{Assignment, Attempt, Board, Dispatch, Examine, Finding, IN_PROCESS, News};
+use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
 use gait_optimizer::SolveStatus;
 use serde_json::json;
 use std::collections::HashMap;
@@ -47,8 +49,8 @@ struct Inner {
     rehearsals: Rehearsals,
     /// Where the studies stand that wait for an answer, as of the last plan: what may be rehearsed.
     waiting: watch::Sender<Arc<[Standing]>>,
-    /// What examines the best gaits of studies that ended.
-    examiner: Option<Examiner>,
+    /// What examines the best gaits of studies that ended, and what explains their trials without a gait.
+    after_solves: Option<(Examiner, Explainer)>,
     beliefs: Arc<Beliefs>,
     /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
     /// where no job of a trial is.
@@ -73,16 +75,20 @@ impl fmt::Debug for Inner {
 }
 
 impl Director {
-    /// A director over a record; [`Self::run`] sets it to work. Without `examine`, a gait is examined when somebody asks.
+    /// A director over a record; [`Self::run`] sets it to work. Without `after_solves`, a gait is examined when somebody asks,
+    /// and nothing is explained.
     pub fn new(
         store: Store,
         engine: Arc<dyn Dispatch>,
         only: Option<StudyId>,
-        examine: Option<Arc<dyn Examine>>,
+        after_solves: Option<AfterSolves>,
     ) -> Self {
         let beliefs = Arc::<Beliefs>::default();
+        let over_record = |AfterSolves { examine, explain }| {
+            (Examiner::new(store.clone(), examine, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
+        };
         Self(Arc::new(Inner {
-            examiner: examine.map(|examine| Examiner::new(store.clone(), examine, Arc::clone(&beliefs))),
+            after_solves: after_solves.map(over_record),
             store,
             beliefs,
             engine,
@@ -137,12 +143,17 @@ impl Director {
     /// Asks for the best gaits of a study to be examined, where the record has no certificate of `next`. `false`: that is done
     /// only when somebody asks for one gait.
     pub fn examine(&self, study: StudyId, next: TrialId) -> bool {
-        self.0.examiner.as_ref().is_some_and(|examiner| examiner.ask(study, next))
+        self.0.after_solves.as_ref().is_some_and(|(examiner, _)| examiner.ask(study, next))
     }
 
     /// Whether a gait of a study is being examined, or waits for that.
     pub fn is_examining(&self, study: StudyId, gait: TrialId) -> bool {
-        self.0.examiner.as_ref().is_some_and(|examiner| examiner.is_at(study, gait))
+        self.0.after_solves.as_ref().is_some_and(|(examiner, _)| examiner.is_at(study, gait))
+    }
+
+    /// What this process does about the explanation of a trial.
+    pub fn explaining(&self, trial: TrialId) -> Effort {
+        self.0.after_solves.as_ref().map_or(Effort::None, |(_, explainer)| explainer.effort(trial))
     }
 
     /// Asks the solve of a trial to stop within one iteration.
@@ -168,7 +179,7 @@ impl Director {
             () = self.keep_planning() => {}
             () = self.keep_listening() => {}
             () = self.keep_rehearsing() => {}
-            () = self.keep_examining() => {}
+            () = self.keep_looking_back() => {}
         }
         self.0.tasks.close();
         self.0.tasks.wait().await;
@@ -176,11 +187,12 @@ impl Director {
         self.take_back_leases().await
     }
 
-    async fn keep_examining(&self) {
-        match &self.0.examiner {
-            Some(examiner) => examiner.run(self.pulse(), || self.changed()).await,
-            None => std::future::pending().await,
-        }
+    /// Looks into what solves gave, for ever.
+    async fn keep_looking_back(&self) {
+        let Some((examiner, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        let changed = || self.changed();
+        let examining = examiner.run(self.pulse(), changed, |study| explainer.take_up(study));
+        tokio::join!(examining, explainer.run(self.pulse(), changed));
     }
 
     async fn keep_planning(&self) {

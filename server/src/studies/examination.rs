@@ -5,12 +5,11 @@ use crate::store::audit::{self, Actor};
 use crate::store::trials::TrialState;
 use crate::store::{Connection, Store, TrialId, Writer, certificates, commit, consents, events, gaits, trials};
 use crate::workers::Examine;
-use crate::workers::stand_back::{self, stand_back};
+use crate::workers::stand_back::behind_solves;
 use gait_optimizer::Gait;
 use gait_optimizer::certificate::{Certificate, certify};
 use serde_json::json;
 use std::sync::Arc;
-use tokio::sync::oneshot;
 
 /// What there is to begin with.
 #[derive(Debug)]
@@ -58,14 +57,9 @@ pub async fn certificate(examination: Examination) -> Result<Certificate, Error>
 /// As [`begin`] and [`certificate`].
 pub async fn aside(store: &Store, actor: &Actor, trial: TrialId, examiner: &Arc<dyn Examine>) -> Result<(), Error> {
     let Examination::Ahead(gait) = begin(&mut *store.read().await?, trial).await? else { return Ok(()) };
-    let (examiner, (tell, told)) = (Arc::clone(examiner), oneshot::channel());
-    let work = move || {
-        stand_back(stand_back::EXAMINER);
-        // Nobody listens any more when the process is shutting down.
-        let _ = tell.send(examiner.examine(&gait));
-    };
-    let thread = std::thread::Builder::new().name("examiner".to_owned()).spawn(work);
-    thread.map_err(|e| Error::Internal(format!("no thread for an examination: {e}")))?;
+    let examiner = Arc::clone(examiner);
+    let told = behind_solves("examiner", move || examiner.examine(&gait))
+        .map_err(|e| Error::Internal(format!("no thread for an examination: {e}")))?;
     let found = told.await.map_err(|_| Error::Internal("the examination panicked".to_owned()))?;
     let mut writer = store.write().await?;
     record(&mut writer, actor, trial, &found?).await?;

@@ -57,8 +57,9 @@ impl Examiner {
         state.waiting.contains(&study) && !state.refused.contains(&gait)
     }
 
-    /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was.
-    pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn()) {
+    /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was, `through` that a
+    /// study has no gait left to examine.
+    pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
         // Beginning with every study that ended before this process did.
         let mut heard = 0;
         loop {
@@ -70,13 +71,15 @@ impl Examiner {
                 _ = pulse.changed() => continue,
             };
             match self.examine_next(study).await {
-                Ok(true) => changed(),
-                Ok(false) => drop(self.state().waiting.remove(&study)),
-                Err(error) => {
-                    tracing::error!(%study, %error, "cannot examine the gaits of a study");
-                    self.state().waiting.remove(&study);
+                Ok(true) => {
+                    changed();
+                    continue;
                 }
+                Ok(false) => {}
+                Err(error) => tracing::error!(%study, %error, "cannot examine the gaits of a study"),
             }
+            self.state().waiting.remove(&study);
+            through(study);
         }
     }
 

@@ -18,6 +18,8 @@ pub mod device;
 pub mod director;
 pub mod examination;
 mod examiner;
+mod explainer;
+pub mod explanation;
 pub mod history;
 pub mod lab;
 pub mod lifecycle;

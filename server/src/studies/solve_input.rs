@@ -36,6 +36,14 @@ impl SolveInput {
         Ok(options.validate()?)
     }
 
+    /// As a file.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when it cannot be written as JSON.
+    pub fn to_json(&self) -> Result<String, Error> {
+        serde_json::to_string(self).map_err(|e| Error::Internal(e.to_string()))
+    }
+
     /// That of a trial, as its solve has it or had it.
     ///
     /// # Errors

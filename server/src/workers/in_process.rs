@@ -1,7 +1,7 @@
 //! The engine of one machine: one named thread per running solve.
 
 use super::dispatch::{Dispatch, DispatchError, Finding, News, Receipt};
-use super::stand_back::{self, stand_back};
+use super::stand_back::{self, STACK_BYTES, stand_back};
 use super::{Assignment, Evaluate};
 use crate::store::TrialId;
 use futures_util::future::BoxFuture;
@@ -16,8 +16,6 @@ use tokio::sync::mpsc::{self, UnboundedReceiver, UnboundedSender};
 
 /// Its name in the record.
 pub const IN_PROCESS: &str = "in-process";
-/// Stack of a solver thread: block factorisations recurse deeper than the default leaves room for.
-const STACK_BYTES: usize = 16 << 20;
 /// Longer than any iteration takes, on any machine that is worth waiting for.
 pub const LEASE: Duration = Duration::from_mins(1);
 

@@ -4,16 +4,20 @@
 //! engine ([`Dispatch`]): threads of this process ([`InProcess`]), or workers elsewhere behind a broker ([`nats`]).
 //! Solves are CPU work: each runs on a thread of its own and never on the async runtime.
 
+mod after_solves;
 mod board;
 mod dispatch;
 mod evaluate;
 mod examine;
+mod explain;
 mod in_process;
 pub mod nats;
 pub(crate) mod stand_back;
 
+pub use after_solves::AfterSolves;
 pub use board::{Board, Progress, Track};
 pub use dispatch::{Attempt, Dispatch, DispatchError, Finding, News, Receipt};
 pub use evaluate::{Assignment, Evaluate, GaitSolver};
 pub use examine::{Examine, GaitExaminer};
+pub use explain::{Explain, GaitExplainer, Unexplained};
 pub use in_process::{IN_PROCESS, InProcess, LEASE};

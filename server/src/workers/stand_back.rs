@@ -1,16 +1,40 @@
 //! Threads that give way to others.
 
+use std::io;
+use tokio::sync::oneshot;
+
 /// Of threads that solve: they give way to whoever waits for an answer.
 pub(super) const SOLVER: i32 = 10;
-/// Of threads that examine what was solved: they give way to every solve, too.
-pub(crate) const EXAMINER: i32 = 19;
+/// Of threads that look into what was solved: they give way to every solve, too.
+const AFTERWARDS: i32 = 19;
+/// Stack of threads that solve: block factorisations recurse deeper than the default leaves room for.
+pub(super) const STACK_BYTES: usize = 16 << 20;
 
 /// Lowers the priority of this thread alone; where that is not possible it stays as it is.
-pub(crate) fn stand_back(niceness: i32) {
+pub(super) fn stand_back(niceness: i32) {
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::setpriority_process(None, niceness) {
         tracing::debug!(%error, niceness, "a thread keeps its priority");
     }
     #[cfg(not(target_os = "linux"))]
     let _ = niceness;
+}
+
+/// Does some work on a thread of its own that gives way to every solve. Nothing is told when it panics; nobody waits for the
+/// thread when the receiver is dropped.
+///
+/// # Errors
+/// When there is no thread to be had.
+pub(crate) fn behind_solves<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<oneshot::Receiver<T>> {
+    let (tell, told) = oneshot::channel();
+    let work = move || {
+        stand_back(AFTERWARDS);
+        // Nobody listens any more when the process is shutting down.
+        let _ = tell.send(work());
+    };
+    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES).spawn(work)?;
+    Ok(told)
 }

@@ -7,6 +7,7 @@
 use gait_optimizer::Gait;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::examined::Verdicts;
+use gaitwright_tests::explained::Clearance;
 use gaitwright_tests::service::Service;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -20,7 +21,9 @@ async fn main() {
     // About half of the gaits pass.
     let examiner =
         Verdicts { pause: Duration::from_millis(20), passes: |gait: &Gait| gait.bounds.to_array()[5] < 0.25 };
-    let service = Service::start_examining(&database, Analytic::slow(Duration::from_millis(pause)), examiner).await;
+    let (solver, explainer) =
+        (Analytic::slow(Duration::from_millis(pause)), Clearance::slow(Duration::from_millis(20)));
+    let service = Service::start_looking_back(&database, solver, examiner, explainer).await;
     let listener = tokio::net::TcpListener::bind(address).await.unwrap();
     println!("http://{}", listener.local_addr().unwrap());
     axum::serve(listener, service.router()).await.unwrap();

@@ -3,9 +3,13 @@
 use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
+use axum::http::StatusCode;
+use gait_optimizer::SolveStatus;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
+use gaitwright::store::trials::{Trial, TrialState};
+use gaitwright::store::{TrialId, commit, explanations};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::explained::{explanation, without_gaits};
 use gaitwright_tests::measured::{electromyogram, motion};
 use serde_json::json;
 use std::path::PathBuf;
@@ -19,7 +23,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     site.service.wait_for(other, &[StudyState::Waiting]).await;
     let trials = site.service.trials(study).await;
     let of = |state| trials.iter().find(|trial| trial.state == state).map(|trial| trial.id);
-    let (gait, no_gait) = (of(TrialState::Converged).unwrap(), of(TrialState::NotConverged).unwrap());
+    let gait = of(TrialState::Converged).unwrap();
+    let [no_gait, being_explained, explained] = trials_without_gaits(site).await;
     let taken = site.service.post_text(&format!("/rate/{other}"), "application/x-www-form-urlencoded", "").await;
     let pair = taken.headers["location"].to_str().unwrap().to_owned();
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -86,6 +91,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("compare", format!("/studies/{other}/compare")),
         ("gait", format!("/trials/{gait}")),
         ("no-gait", format!("/trials/{no_gait}")),
+        ("being-explained", format!("/trials/{being_explained}")),
+        ("explained", format!("/trials/{explained}")),
         ("rate", "/rate".to_owned()),
         ("pair", pair),
         ("people", "/people".to_owned()),
@@ -96,6 +103,21 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("sign-in", "/sign-in".to_owned()),
         ("error", "/nothing".to_owned()),
     ]
+}
+
+/// Trials without a gait: one that nobody explained, one that is being explained, and one that was.
+async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
+    let study = site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits()))).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = site.service.trials(study).await;
+    let asked = site.service.post(&format!("/api/v1/trials/{}/explanation", trials[1].id), &json!({})).await;
+    assert_eq!(asked.status, StatusCode::ACCEPTED, "{}", asked.text);
+    let Trial { id, action, violations, .. } = &trials[2];
+    let found = explanation(action, SolveStatus::Infeasible, violations);
+    let mut writer = site.service.store.write().await.unwrap();
+    assert!(explanations::keep(&mut writer, *id, "{}", &found).await.unwrap());
+    commit(writer).await.unwrap();
+    [trials[0].id, trials[1].id, *id]
 }
 
 const WIDTHS: [i64; 3] = [1280, 768, 360];

@@ -6,6 +6,7 @@ use gaitwright::store::TrialId;
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::explained::{Clearance, without_gaits};
 use std::time::Duration;
 
 async fn with_a_gait() -> (Site, TrialId) {
@@ -81,6 +82,24 @@ async fn browser_says_why_there_is_no_gait() {
     let page = browser.open(&site.at(&format!("/trials/{}", without.id))).await;
     let text = page.text("#explanation").await;
     assert!(text.contains("swing foot clearance") && text.contains("--explain"), "{text}");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_an_explanation_as_soon_as_it_is_made() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let explainer = Clearance::slow(Duration::from_secs(2));
+    let site = Site::start_explaining(Analytic::default(), explainer).await;
+    let study = site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits()))).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let last = site.service.trials(study).await[2].id;
+    let page = browser.open(&site.at(&format!("/trials/{last}"))).await;
+    page.click("#explanation button").await;
+    page.wait_for("#explanation .pulse").await;
+    page.wait_for("#explanation li").await;
+    let text = page.text("#explanation").await;
+    assert!(text.contains("With a5 = 0.03 m (swing-foot clearance)") && !text.contains("Being explained"), "{text}");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

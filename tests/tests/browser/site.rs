@@ -1,10 +1,12 @@
 //! A service that a browser can reach.
 
+use gaitwright::workers::Explain;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
+use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 
@@ -15,14 +17,25 @@ pub(crate) struct Site {
     address: SocketAddr,
     answering: JoinHandle<()>,
     database: PathBuf,
-    _folder: tempfile::TempDir,
+    _folder: TempDir,
 }
 
 impl Site {
     pub(crate) async fn start(solver: Analytic) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let database = folder.path().join("a.db");
-        let service = Service::start(&database, solver, 1).await;
+        let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
+        Self::of(folder, service).await
+    }
+
+    /// Of a service that explains why there are no gaits.
+    pub(crate) async fn start_explaining(solver: Analytic, explain: impl Explain) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let service = Service::start_explaining(&folder.path().join("a.db"), solver, explain).await;
+        Self::of(folder, service).await
+    }
+
+    async fn of(folder: TempDir, service: Service) -> Self {
+        let database = service.store.path().to_owned();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         let answering = answer(&service, listener);

@@ -48,8 +48,7 @@ pub(super) async fn problem(
     let number = trials::get(&mut reader, id).await?.number;
     let input = SolveInput::of_trial(&mut reader, id).await?;
     drop(reader);
-    let text = serde_json::to_string(&input).map_err(|e| Error::Internal(e.to_string()))?;
-    Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
+    Ok(file("application/json", &format!("problem-trial-{number}.json"), input.to_json()?))
 }
 
 /// `GET /trials/{id}/gait.mot`: OpenSim motion file.

@@ -9,6 +9,7 @@ mod certificates;
 mod comparison;
 mod devices;
 mod events;
+mod explanations;
 mod exports;
 mod figures;
 mod gaits;
@@ -90,6 +91,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(exports::controller))
         .routes(routes!(motion::get))
         .routes(routes!(certificates::get, certificates::create))
+        .routes(routes!(explanations::get, explanations::create))
         // figures
         .routes(routes!(figures::of_study))
         .routes(routes!(figures::of_trial))

@@ -150,6 +150,12 @@ pub(super) fn meaning(name: &str) -> &'static str {
     TunedBounds::NAMES.iter().position(|known| *known == name).map_or("", |place| TunedBounds::MEANINGS[place])
 }
 
+/// The same without its unit.
+pub(super) fn limited(name: &str) -> &'static str {
+    let meaning = meaning(name);
+    meaning.rsplit_once(", ").map_or(meaning, |(limited, _)| limited)
+}
+
 /// One bound: name, value, what it limits.
 pub(super) struct Bound {
     pub(super) name: &'static str,

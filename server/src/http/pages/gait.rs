@@ -4,6 +4,7 @@ use super::bound_use::{self, BoundUse};
 use super::certificate;
 use super::drawn::Drawn;
 use super::error::{Page, page};
+use super::explanation::NoGait;
 use super::format::{self, words};
 use crate::access::{Answer, Permission, Read, Run};
 use crate::error::Error;
@@ -14,12 +15,13 @@ use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
-use crate::store::{Instant, StoreError, TrialId, certificates, gaits, reference_gaits, studies, trials};
+use crate::store::{Instant, StoreError, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+use crate::studies::explanation::{self, ExplanationState};
 use crate::studies::objections::{Closed, Objections};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
-use gait_optimizer::{Gait, IterationRecord, ReferenceGait, SolveStatus, TunedBounds, Violation};
+use gait_optimizer::{Gait, IterationRecord, ReferenceGait, TunedBounds};
 
 #[derive(Template)]
 #[template(path = "gait.html")]
@@ -44,7 +46,7 @@ struct GaitPage {
     /// How near the gait comes to each bound.
     bounds: Vec<BoundUse>,
     /// Why there is no gait.
-    explanation: Option<&'static str>,
+    no_gait: Option<NoGait>,
     phases: [(&'static str, &'static str); 4],
     /// Who called it unsafe.
     unsafe_by: Vec<Closed>,
@@ -59,10 +61,6 @@ impl GaitPage {
     /// When the newest of the objections was made.
     fn said_until(&self) -> Option<Instant> {
         self.unsafe_by.iter().map(|closed| closed.at).max()
-    }
-
-    fn missed_by(violation: &Violation) -> String {
-        format::number(violation.amount)
     }
 }
 
@@ -87,6 +85,8 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         said.retain(|closed| closed.trial == id);
     }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
+    let last_event = events::last(&mut reader, study.id).await?;
+    let explained = explanation::state(&mut reader, &trial, app.director.explaining(id)).await?;
     let may_run = may.caller.may(Run::NEEDED);
     let reviews = may.caller.may(Answer::NEEDED);
     // Who did not sign in has no name yet.
@@ -106,7 +106,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): 
         violation: format::optional_number(trial.max_violation),
         figures: figures(&trial),
         bounds: drawn.bounds,
-        explanation: trial.status.and_then(explanation),
+        no_gait: NoGait::new(&trial, explained, last_event),
         from,
         reference: reference_name,
         has_gait,
@@ -163,20 +163,6 @@ fn draw(
         tiles: tiles.as_ref().map(drawn),
         bounds: bound_use::of(action, gait)?,
     })
-}
-
-/// Why a solve ended without a gait.
-fn explanation(status: SolveStatus) -> Option<&'static str> {
-    match status {
-        SolveStatus::Converged => None,
-        SolveStatus::Infeasible => Some(
-            "No motion near the last one keeps every constraint: the bounds contradict each other, or another one of them.",
-        ),
-        SolveStatus::Cancelled => Some("Somebody ended the solve before it was done."),
-        _ => Some(
-            "The optimiser ended before every constraint was met. That is no proof that these bounds have no gait.",
-        ),
-    }
 }
 
 fn figures(trial: &Trial) -> Vec<(&'static str, String)> {

@@ -8,6 +8,7 @@ mod compare;
 mod devices;
 mod drawn;
 pub mod error;
+mod explanation;
 pub(super) mod figures;
 mod format;
 mod gait;
@@ -59,6 +60,7 @@ pub fn routes() -> Router<AppState> {
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))
+        .route("/trials/{id}/explain", post(explanation::post))
         .route("/trials/{id}/safety-review", post(safety_review::post))
         .route("/references", get(reference_gaits::list).post(reference_gaits::import).layer(recordings()))
         .route("/references/{id}", get(reference_gaits::get))

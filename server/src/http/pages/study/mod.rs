@@ -1,8 +1,10 @@
 //! A study: where it stands, live.
 
 mod trials_table;
+mod without_gait;
 
 use self::trials_table::{Choice, TrialRow, TrialsTable};
+use self::without_gait::WithoutGait;
 use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
@@ -20,7 +22,8 @@ use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{
-    Instant, StudyId, TrialId, commit, consents, devices, events, presentations, reference_gaits, studies, trials,
+    Instant, StudyId, TrialId, commit, consents, devices, events, explanations, presentations, reference_gaits,
+    studies, trials,
 };
 use crate::studies::belief::Beliefs;
 use crate::studies::choice::{MANY, last_believed, ranking_to_show};
@@ -72,6 +75,8 @@ struct Live {
     state: String,
     acts: Vec<ActButton>,
     counts: TrialCounts,
+    /// Why trials have no gait.
+    without_gait: Option<WithoutGait>,
     /// How long it will go on; empty: it does not.
     pace: String,
     running: Vec<RunningRow>,
@@ -266,6 +271,8 @@ pub(super) struct Figures {
     /// The gaits, the best one first, and what their certificates say.
     ranking: Vec<TrialId>,
     judged: Judged,
+    /// Why trials have no gait.
+    without_gait: Option<WithoutGait>,
     pub(super) history: Vec<Milestone>,
     question: bool,
 }
@@ -299,7 +306,10 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
     let mut figures = figures.map_err(Error::Learner)?;
-    figures.judged = recommended::judged(&mut *app.read().await?, &figures.ranking).await?;
+    let mut reader = app.read().await?;
+    figures.judged = recommended::judged(&mut reader, &figures.ranking).await?;
+    figures.without_gait = WithoutGait::of(&standing.trials, &explanations::in_common(&mut reader, id).await?);
+    drop(reader);
     if let Some(next) = figures.judged.unexamined {
         figures.judged.examined_by_service(app.director.is_examining(id, next));
     }
@@ -389,6 +399,7 @@ fn view(
         state: words(standing.study.state.as_str()),
         acts: acts.into_iter().filter_map(button).collect(),
         pace: pace(&standing, counts),
+        without_gait: figures.without_gait.clone(),
         counts,
         running,
         best,

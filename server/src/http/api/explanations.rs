@@ -1,0 +1,139 @@
+//! Explanations: which bound must give way where a trial has no gait.
+
+use crate::access::{Read, Run};
+use crate::error::Error;
+use crate::http::AppState;
+use crate::http::extract::Id;
+use crate::http::may::May;
+use crate::http::once::Once;
+use crate::http::shown::Shown;
+use crate::store::explanations::Explained;
+use crate::store::{Instant, TrialId, schema, trials};
+use crate::studies::explanation::{self, ExplanationState};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use gait_optimizer::explanation::{BoundAtLimit, Relaxation};
+use gait_optimizer::{SolveStatus, Violation};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// Why a trial has no gait.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct TrialExplanation {
+    trial_id: TrialId,
+    /// All of it in sentences, as pages and command line say them.
+    sentences: Vec<String>,
+    /// How its solve ended.
+    #[schema(value_type = String)]
+    status: SolveStatus,
+    /// What the last iterate violates, worst first.
+    #[schema(value_type = Vec<schema::Violation>)]
+    violations: Vec<Violation>,
+    /// The tuned bounds that it runs into.
+    #[schema(value_type = Vec<schema::BoundAtLimit>)]
+    at_limit: Vec<BoundAtLimit>,
+    /// What relaxing each of them alone achieves: the smallest relaxation first, those that do not help last.
+    #[schema(value_type = Vec<schema::Relaxation>)]
+    relaxations: Vec<Relaxation>,
+    /// Which version of the program found it out.
+    program: String,
+    /// SHA-256 of what it was made from: the trial's `problem.json`.
+    problem_sha256: String,
+    created_at: Instant,
+}
+
+impl TrialExplanation {
+    fn new(trial_id: TrialId, made: Explained) -> Self {
+        let Explained { program, problem_sha256, explanation, created_at } = made;
+        Self {
+            trial_id,
+            sentences: explanation.sentences(),
+            status: explanation.status,
+            violations: explanation.violations,
+            at_limit: explanation.at_limit,
+            relaxations: explanation.relaxations,
+            program,
+            problem_sha256,
+            created_at,
+        }
+    }
+}
+
+/// An explanation that is not there yet.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct ComingExplanation {
+    trial_id: TrialId,
+    state: Coming,
+}
+
+/// When it comes.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum Coming {
+    /// Now, or after those that were asked for before.
+    BeingMade,
+    /// After those of other trials of the study; asked for, before them.
+    Waiting,
+}
+
+/// `GET /trials/{id}/explanation`.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/explanation",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses(
+        (status = 200, description = "The explanation, as it was made", body = TrialExplanation),
+        (status = 202, description = "It is being made, or will be: ask again", body = ComingExplanation),
+    ),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id): Shown<TrialId>,
+) -> Result<Response, Error> {
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, id).await?;
+    let coming = |state| (StatusCode::ACCEPTED, Json(ComingExplanation { trial_id: id, state })).into_response();
+    match explanation::state(&mut reader, &trial, app.director.explaining(id)).await? {
+        ExplanationState::Made(made) => Ok(Json(TrialExplanation::new(id, *made)).into_response()),
+        ExplanationState::BeingMade => Ok(coming(Coming::BeingMade)),
+        ExplanationState::Waiting => Ok(coming(Coming::Waiting)),
+        ExplanationState::Refused(reason) => Err(explanation::refusal(&trial, &reason)),
+        ExplanationState::NotAsked => {
+            Err(Error::NotFound { what: "explanation of trial".to_owned(), id: id.to_string() })
+        }
+    }
+}
+
+/// `POST /trials/{id}/explanation`: has it made, where it is not made yet.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/explanation",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial; the program solved it, and it did not converge")),
+    responses(
+        (status = 200, description = "The explanation, as it was made", body = TrialExplanation),
+        (status = 202, description = "It is being made, behind all solves, in some minutes: get it", body = ComingExplanation),
+    ),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id): Id<TrialId>,
+    once: Once<Run>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let asked = explanation::ask(&mut writer, &once.actor, id, app.director.explaining(id)).await?;
+    if let Some(made) = asked {
+        return once.finish(&app, writer, StatusCode::OK, None, &TrialExplanation::new(id, made)).await;
+    }
+    let coming = ComingExplanation { trial_id: id, state: Coming::BeingMade };
+    once.finish(&app, writer, StatusCode::ACCEPTED, None, &coming).await
+}

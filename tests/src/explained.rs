@@ -1,0 +1,94 @@
+//! What an explanation finds out, without solving, and what there is to explain.
+
+use gait_learner::SearchSpace;
+use gait_optimizer::explanation::{BoundAtLimit, Explanation, Relaxation};
+use gait_optimizer::{CancelToken, SolveError, SolveStatus, TunedBounds, Violation};
+use gaitwright::workers::{Explain, Unexplained};
+use serde_json::json;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// Place of a5, the swing-foot clearance, among the bounds: what the analytic solver finds too high.
+const CLEARANCE: usize = 4;
+/// Place of a6, the torso lean.
+const TORSO: usize = 5;
+
+/// An explainer that takes its time, blames the clearance, and hears within a millisecond that it is cancelled.
+#[derive(Debug, Clone, Default)]
+pub struct Clearance {
+    /// How long an explanation takes.
+    pub pause: Duration,
+    /// It panics instead.
+    pub panics: bool,
+    /// How many explanations were begun, and how many of them were cancelled.
+    pub counts: Arc<Counts>,
+}
+
+/// How many explanations were begun and cancelled.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Begun.
+    pub begun: AtomicU32,
+    /// Cancelled.
+    pub cancelled: AtomicU32,
+}
+
+impl Clearance {
+    /// That takes so long.
+    pub fn slow(pause: Duration) -> Self {
+        Self { pause, ..Self::default() }
+    }
+}
+
+impl Explain for Clearance {
+    fn explain(&self, solve: &Unexplained, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError> {
+        self.counts.begun.fetch_add(1, Ordering::SeqCst);
+        assert!(!self.panics, "the explanation panics");
+        let begun = Instant::now();
+        while begun.elapsed() < self.pause {
+            if cancel.is_cancelled() {
+                self.counts.cancelled.fetch_add(1, Ordering::SeqCst);
+                return Ok(None);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(Some(explanation(&solve.problem.bounds, solve.status, &solve.violations)))
+    }
+}
+
+/// The explanation of these bounds.
+pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Violation]) -> Explanation {
+    let bounds = bounds.to_array();
+    let named = |place: usize| (TunedBounds::NAMES[place].to_owned(), TunedBounds::MEANINGS[place].to_owned());
+    let at_limit = |place: usize, domain: &str| {
+        let (bound, meaning) = named(place);
+        BoundAtLimit { bound, meaning, value: bounds[place], domains: vec![domain.to_owned()] }
+    };
+    let relaxed = |place: usize, to: Option<f64>, not_with: f64| {
+        let ((bound, meaning), from) = (named(place), bounds[place]);
+        Relaxation { bound, meaning, from, to, not_with, undecided: to.is_none(), solves: 8, warm_start: None }
+    };
+    Explanation {
+        status,
+        violations: violations.to_vec(),
+        at_limit: vec![at_limit(CLEARANCE, "SS2_R"), at_limit(TORSO, "stride")],
+        relaxations: vec![relaxed(CLEARANCE, Some(0.03), bounds[CLEARANCE]), relaxed(TORSO, None, 1.0)],
+    }
+}
+
+/// Actions of which the analytic solver finds no gait.
+pub fn without_gaits() -> SearchSpace {
+    space([0.032, 0.035, 0.039])
+}
+
+/// Actions of a third of which it does.
+pub fn with_few_gaits() -> SearchSpace {
+    space([0.02, 0.035, 0.039])
+}
+
+fn space(clearances_m: [f64; 3]) -> SearchSpace {
+    let clearance = json!({"name": TunedBounds::NAMES[CLEARANCE], "values": clearances_m, "lengthscale": 0.02});
+    let lean = json!({"name": TunedBounds::NAMES[TORSO], "values": [0.0, 0.05, 0.1], "lengthscale": 0.1});
+    serde_json::from_value(json!({"dimensions": [clearance, lean]})).unwrap()
+}

@@ -1,0 +1,276 @@
+//! Why trials have no gait: found out when somebody asks or their study has ended, kept, and said in words.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+use gait_optimizer::{Mesh, TunedBounds};
+use gaitwright::store::audit::{self, Actor};
+use gaitwright::store::studies::{Evaluation, StudyState};
+use gaitwright::store::trials::{Trial, TrialState};
+use gaitwright::store::{StudyId, TrialId, events, explanations};
+use gaitwright::workers::GaitSolver;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::cli;
+use gaitwright_tests::explained::{Clearance, with_few_gaits, without_gaits};
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// Longer than any test waits.
+const FOR_EVER: Duration = Duration::from_mins(10);
+
+fn address(trial: TrialId) -> String {
+    format!("/api/v1/trials/{trial}/explanation")
+}
+
+async fn ask(service: &Service, trial: TrialId) -> Answer {
+    service.post(&address(trial), &json!({})).await
+}
+
+async fn without_gait(service: &Service, study: StudyId) -> Vec<Trial> {
+    let mut trials = service.trials(study).await;
+    trials.retain(|trial| trial.state == TrialState::NotConverged);
+    trials
+}
+
+/// Looks again until something holds.
+async fn until(what: &str, mut holds: impl AsyncFnMut() -> bool) {
+    for _ in 0..2000 {
+        if holds().await {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("{what}");
+}
+
+/// The explanation of a trial, once it is there.
+async fn explained(service: &Service, trial: TrialId) -> Value {
+    until("the trial is explained", async || service.fetch(&address(trial)).await.status == StatusCode::OK).await;
+    service.fetch(&address(trial)).await.json()
+}
+
+/// The trials that the service explained, in order.
+async fn explained_in_order(service: &Service) -> Vec<String> {
+    let mut trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    trail.retain(|row| row.action == "trial.explain" && row.actor == Actor::program().as_str());
+    trail.iter().rev().map(|row| row.object.clone()).collect()
+}
+
+#[tokio::test]
+async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let explainer = Clearance::slow(Duration::from_millis(100));
+    let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (8, Some(with_few_gaits()))).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = without_gait(&service, study).await;
+    assert!(trials.len() > 2);
+    let last = trials.last().unwrap();
+    let coming = service.fetch(&address(last.id)).await;
+    assert_eq!((coming.status, &coming.json()["state"]), (StatusCode::ACCEPTED, &json!("waiting")));
+    let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
+    assert!(page.contains("is found out after other trials of this study") && page.contains("/explain\""), "{page}");
+
+    let found = explained(&service, last.id).await;
+    let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();
+    assert_eq!(explained_in_order(&service).await, expected);
+    assert_eq!(found["violations"][0]["row"], "SS2_R point 3, C3 swing foot clearance");
+    assert_eq!((&found["relaxations"][0]["bound"], &found["relaxations"][0]["to"]), (&json!("a5"), &json!(0.03)));
+    assert_eq!(found["program"], Actor::program().as_str());
+    assert_eq!(found["problem_sha256"].as_str().unwrap().len(), 64);
+    let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
+    let kept = explanations::find(&mut service.store.read().await.unwrap(), last.id).await.unwrap().unwrap();
+    let sentences = kept.explanation.sentences();
+    assert_eq!(found["sentences"], json!(sentences));
+    for sentence in &sentences {
+        assert!(page.contains(sentence.as_str()), "{sentence}: {page}");
+    }
+    assert!(!page.contains("/explain\""), "there is nothing to ask for any more");
+
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    let reason = format!("a5 (swing-foot clearance) alone, relaxed, gives one in {0} of {0} trials", trials.len());
+    assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn an_explanation_is_made_once_for_whoever_asks() {
+    let folder = tempfile::tempdir().unwrap();
+    let (explainer, solver) = (Clearance::default(), Analytic::slow(Duration::from_millis(20)));
+    let counts = explainer.counts.clone();
+    let service = Service::start_explaining(&folder.path().join("a.db"), solver, explainer).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(with_few_gaits()))).await;
+    until("a trial has no gait", async || !without_gait(&service, study).await.is_empty()).await;
+    let trial = without_gait(&service, study).await[0].id;
+    assert_eq!(service.fetch(&address(trial)).await.status, StatusCode::NOT_FOUND, "nobody asked");
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    assert!(page.contains("Find out which bound must give way"), "{page}");
+
+    let keyed = || {
+        let request = Request::post(address(trial)).header("idempotency-key", "one").body(Body::from("{}")).unwrap();
+        service.send(request)
+    };
+    let asked = keyed().await;
+    assert_eq!((asked.status, &asked.json()["state"]), (StatusCode::ACCEPTED, &json!("being_made")));
+    let found = explained(&service, trial).await;
+    assert_eq!(service.get(study).await.state, StudyState::Running, "beside its solves");
+    let again = ask(&service, trial).await;
+    assert_eq!((again.status, again.json()), (StatusCode::OK, found));
+    assert_eq!(keyed().await.status, StatusCode::ACCEPTED, "the same request has the same answer");
+    assert_eq!(counts.begun.load(Ordering::SeqCst), 1);
+    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    assert_eq!(trail.iter().filter(|row| row.action == "trial.ask_explanation").count(), 1);
+    let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
+    let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();
+    assert_eq!((told.len(), &told[0].payload["relieved_by"]), (1, &json!("a5")));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_has_no_solve_without_a_gait_is_not_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
+    let study = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 1)).await;
+    let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
+    let told: TrialId = asked["id"].as_str().unwrap().parse().unwrap();
+    let outcome = json!({"outcome": "not_converged", "reason": "the foot scuffed"});
+    assert_eq!(service.post(&format!("/api/v1/trials/{told}/tell"), &outcome).await.status, StatusCode::OK);
+    service.wait_for(script, &[StudyState::Finished]).await;
+    for (trial, reason) in [
+        (service.trials(study).await[0].id, "only a trial that did not converge is explained"),
+        (told, "a script evaluated trial 1"),
+    ] {
+        let refused = ask(&service, trial).await;
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
+        assert!(refused.text.contains(reason), "{}", refused.text);
+        assert_eq!(service.fetch(&address(trial)).await.status, StatusCode::NOT_FOUND);
+    }
+    let page = service.fetch(&format!("/trials/{told}")).await.text;
+    assert!(page.contains("the foot scuffed") && !page.contains("id=\"explanation\""), "{page}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_was_asked_for_is_taken_up_by_the_next_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let explainer = Clearance::slow(FOR_EVER);
+    let counts = explainer.counts.clone();
+    let solver = Analytic::slow(Duration::from_millis(5));
+    let service = Service::start_explaining(&database, solver, explainer).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(without_gaits()))).await;
+    service.wait_for_trials(study, 2).await;
+    service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
+    let trials = without_gait(&service, study).await;
+    for trial in [&trials[1], &trials[0]] {
+        assert_eq!(ask(&service, trial.id).await.status, StatusCode::ACCEPTED);
+    }
+    until("one is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
+    let page = service.fetch(&format!("/trials/{}", trials[1].id)).await.text;
+    assert!(page.contains("Being explained") && page.contains("explanation.mjs"), "{page}");
+    service.stop().await;
+    until("it is cancelled", async || counts.cancelled.load(Ordering::SeqCst) == 1).await;
+
+    let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
+    for trial in &trials[..2] {
+        explained(&service, trial.id).await;
+    }
+    let expected = [&trials[1], &trials[0]].map(|trial| format!("trial {}", trial.id));
+    assert_eq!(explained_in_order(&service).await, expected, "first what was asked for first, and nothing else");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn who_withdraws_is_not_explained_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let explainer = Clearance::slow(FOR_EVER);
+    let counts = explainer.counts.clone();
+    let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits()))).await;
+    until("one is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
+    let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
+    assert_eq!(service.post(&withdraw, &json!({"reason": "moved away"})).await.status, StatusCode::OK);
+    until("it is cancelled", async || counts.cancelled.load(Ordering::SeqCst) == 1).await;
+    for trial in service.trials(study).await {
+        assert_eq!(ask(&service, trial.id).await.status, StatusCode::CONFLICT);
+        let kept = explanations::find(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
+        assert_eq!(kept, None);
+    }
+    assert_eq!(counts.begun.load(Ordering::SeqCst), 1);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_cannot_be_explained_is_said_and_not_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let explainer = Clearance { panics: true, ..Clearance::default() };
+    let counts = explainer.counts.clone();
+    let service = Service::start_explaining(&database, Analytic::default(), explainer).await;
+    let study = service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits()))).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await[1].id;
+    until("it is refused", async || service.fetch(&address(trial)).await.status == StatusCode::CONFLICT).await;
+    let refused = ask(&service, trial).await;
+    assert_eq!(refused.status, StatusCode::CONFLICT);
+    assert!(
+        refused.text.contains("trial 2 cannot be explained") && refused.text.contains("panicked"),
+        "{}",
+        refused.text
+    );
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    assert!(page.contains("cannot be found out") && page.contains("panicked"), "{page}");
+    assert_eq!(counts.begun.load(Ordering::SeqCst), 2, "each once");
+    let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
+    assert_eq!(told.iter().filter(|event| event.kind == "trial_not_explained").count(), 2);
+    service.stop().await;
+
+    let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
+    explained(&service, trial).await;
+    service.stop().await;
+}
+
+/// The service and the command line find the same, and say it in the same words.
+#[tokio::test]
+async fn the_real_explanation_is_that_of_the_command_line() {
+    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
+        println!("skipped: set GAITWRIGHT_LONG_TESTS=1");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let service =
+        Service::start_explaining(&folder.path().join("a.db"), GaitSolver, gaitwright::workers::GaitExplainer).await;
+    let study = service
+        .study(|new| {
+            (new.muscles, new.trial_budget) = (false, 1);
+            new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
+            (new.solve_options.retry, new.solve_options.cold_guesses) = (false, 1);
+            new.base_bounds = TunedBounds { a2: 10.0, ..TunedBounds::default() };
+            let first = json!({"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0});
+            new.search_space = Some(serde_json::from_value(json!({"dimensions": [first]})).unwrap());
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = without_gait(&service, study).await.remove(0);
+    let problem = service.fetch(&format!("/api/v1/trials/{}/problem.json", trial.id)).await.text;
+    std::fs::write(folder.path().join("problem.json"), problem).unwrap();
+    let solve = ["solve", "--problem", "problem.json", "--explain"];
+    let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &solve);
+    let there = String::from_utf8(output.stdout).unwrap();
+
+    while service.fetch(&address(trial.id)).await.status != StatusCode::OK {
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    let here = explanations::find(&mut service.store.read().await.unwrap(), trial.id).await.unwrap().unwrap();
+    for sentence in here.explanation.sentences() {
+        assert!(there.contains(&sentence), "{sentence}: {there}");
+    }
+    assert!(here.explanation.relief().is_some(), "{there}");
+    service.stop().await;
+}
