@@ -47,7 +47,7 @@ use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 
 /// Version of [`Certificate`]'s layout and of what it examines.
-pub const FORMAT_VERSION: u32 = 4;
+pub const FORMAT_VERSION: u32 = 5;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

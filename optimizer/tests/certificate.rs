@@ -84,6 +84,28 @@ fn a_tighter_bound_than_the_gait_keeps_is_found() {
     assert!(objects_to(&certificate(&gait), "C4 joint angles"));
 }
 
+/// Limits that the gait problem imposes and the gait does not keep, one at a time.
+#[test]
+fn every_limit_is_examined() {
+    type Change = fn(&mut Gait);
+    let changes: [(&str, Change); 6] = [
+        ("C3 friction cone of heel strikes", |gait| gait.settings.limits.impact_friction = 0.1),
+        ("C3 impulses beyond their limit", |gait| gait.settings.limits.impulse_max_n_s = 10.0),
+        ("C4 forward hip velocity in SS1", |gait| gait.settings.limits.phase_rate_min_m_s = 1.0),
+        ("C5-C8 activations, fibre lengths", |gait| gait.settings.limits.fibre_length_min = 0.7),
+        ("C3 load of contacts before they lift off", |gait| gait.settings.naturalness.trailing_load_share = 0.5),
+        ("C3 load of contacts before they lift off", |gait| gait.settings.limits.liftoff_force_n = 400.0),
+    ];
+    let (_, whole) = golden_gait(1, true);
+    assert!(certificate(&whole).passed);
+    for (name, change) in changes {
+        let mut gait = whole.clone();
+        change(&mut gait);
+        let found = certificate(&gait);
+        assert!(objects_to(&found, name), "{name}: {:?}", found.objections);
+    }
+}
+
 #[test]
 fn a_muscle_that_cannot_pull_like_that_is_found() {
     let (_, mut gait) = golden_gait(1, true);

@@ -5,6 +5,7 @@ use super::residuals::{Findings, GridPoint, Measured};
 use crate::gait::MuscleTrajectory;
 use crate::gait::motion::MuscleInstant;
 use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
+use crate::settings::GaitLimits;
 
 const FORCE: Measured = Measured::new("C5-C7 fibre and tendon in equilibrium", "F_max", 1e-6, None);
 const VELOCITY: Measured = Measured::new("C8 fibre velocity", "l_opt/s", 1e-4, Some(0.5));
@@ -17,6 +18,7 @@ pub(super) fn note(
     point: &GridPoint<'_>,
     table: &[Muscle; MUSCLE_COUNT],
     muscles: &MuscleInstant,
+    limits: &GaitLimits,
     worst: &mut Findings,
 ) {
     let (mut force_error, mut velocity_error, mut excess) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
@@ -31,6 +33,7 @@ pub(super) fn note(
         velocity_error = velocity_error.max((muscles.fibre_length_rate[m] - velocity).abs());
         let activation = muscles.activation[m];
         excess = excess.max((-activation).max(activation - 1.0)).max(velocity.abs() / muscle.max_speed - 1.0);
+        excess = excess.max(limits.fibre_length_min - length).max(length - limits.fibre_length_max);
         for attachment in muscle.attachments.iter().flatten() {
             let arm = attachment.at(point.instant.q[attachment.coordinate]).arm;
             torque[attachment.coordinate - 3] += arm * muscle.max_force_n * pulled;

@@ -5,10 +5,10 @@ use super::contact::Contact;
 use super::limits::{FRICTION_THRESHOLD_N, Limits, depth_below_ground};
 use super::muscle_residuals;
 use super::virtual_constraints::VirtualConstraints;
-use crate::body::{InverseDynamics, PointState, WalkerModel};
+use crate::body::{GRAVITY, InverseDynamics, PointState, WalkerModel};
 use crate::gait::motion::{Instant, instant};
 use crate::gait::{Axis, FootPoint, Gait, Side};
-use crate::walking::{CYCLE, Domain, DomainKind};
+use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
 /// Grid points per gap between mesh points.
 pub(super) const REFINEMENT: usize = 10;
@@ -42,6 +42,8 @@ const HIP_POSITION: Measured = Measured::new("C2 hip position", "m", 1e-6, Some(
 const HIP_VELOCITY: Measured = Measured::new("C2 hip velocity", "m/s", 1e-6, Some(0.02));
 const NORMAL_FORCE: Measured = Measured::new("C3 unilateral contact", "N", 1e-3, Some(5.0));
 const FRICTION: Measured = Measured::new("C3 friction cone", "N", 1e-3, Some(FRICTION_THRESHOLD_N));
+const KEPT_LOAD: Measured = Measured::new("C3 load of contacts before they lift off", "N", 1e-3, None);
+const PROGRESS: Measured = Measured::new("C4 forward hip velocity in SS1", "m/s", 1e-6, Some(0.02));
 const DEPTH: Measured = Measured::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
 const CLEARANCE: Measured = Measured::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
 const ANGLE: Measured = Measured::new("C4 joint angles beyond a6, a7, a8", "rad", 1e-6, Some(0.01));
@@ -50,6 +52,8 @@ const ACCELERATION: Measured = Measured::new("C4 accelerations beyond a2", "rad/
 const TORQUE: Measured = Measured::new("C4 torques beyond their limits", "N m", 1e-4, Some(2.0));
 const IMPACT: Quantity = Quantity::judged("C2 velocities after impacts", "rad/s", 1e-5);
 const IMPULSE: Quantity = Quantity::judged("C2 impulses of the impacts", "N s", 1e-4);
+const IMPULSE_SIZE: Quantity = Quantity::judged("C3 impulses beyond their limit", "N s", 1e-4);
+const IMPACT_FRICTION: Quantity = Quantity::judged("C3 friction cone of heel strikes", "N s", 1e-4);
 const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3e-6);
 const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
 const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "m, s", 1e-6);
@@ -119,7 +123,7 @@ pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
             domain.outputs(&point, share, &mut worst);
             domain.limits(&point, share, &mut worst);
             if let Some(muscles) = &point.instant.muscles {
-                muscle_residuals::note(&point, &table, muscles, &mut worst);
+                muscle_residuals::note(&point, &table, muscles, &gait.settings.limits, &mut worst);
             }
         }
         domain.reset(&mut worst);
@@ -203,6 +207,15 @@ impl DomainResiduals<'_> {
         let state = PointState::new(q, qd, qdd);
         worst.note(point, &NORMAL_FORCE, self.limits.normal_force(&rows, forces));
         worst.note(point, &FRICTION, self.limits.friction(&rows, forces));
+        for (c, (row, force)) in rows.iter().zip(forces).enumerate() {
+            if let Some(kept) = self.kept_load(c, *row, share) {
+                worst.note(point, &KEPT_LOAD, kept - force);
+            }
+        }
+        if self.domain.kind == DomainKind::Ss1 {
+            let velocity = self.constraints.hip(q, qd, qdd)[1];
+            worst.note(point, &PROGRESS, self.gait.settings.limits.phase_rate_min_m_s - velocity);
+        }
         worst.note(point, &DEPTH, depth_below_ground(self.model, self.domain, &state));
         if let Some(wanted) = self.wanted_clearance(share) {
             let swing = self.domain.stance.other();
@@ -217,6 +230,32 @@ impl DomainResiduals<'_> {
         worst.note(point, &SPEED, excess.speed);
         worst.note(point, &ACCELERATION, excess.acceleration);
         worst.note(point, &TORQUE, self.limits.torque(u));
+    }
+
+    /// Least force of contact row `c`: what the wish for gradual weight transfer leaves on the trailing foot, and what a
+    /// contact has until it lifts off, N.
+    fn kept_load(&self, c: usize, row: ContactRow, share: f64) -> Option<f64> {
+        let settings = &self.gait.settings;
+        let at_heel_strike = settings.naturalness.trailing_load_share * self.model.total_mass * GRAVITY;
+        let trails = row.axis == Axis::Z && row.side != self.domain.stance;
+        // Linear from heel strike to toe-off, half of it in each domain of double support.
+        let transferred = match self.domain.kind {
+            DomainKind::Ds2 if trails => Some(at_heel_strike * (1.0 - share / 2.0)),
+            DomainKind::Ds3 if trails => Some(at_heel_strike * (1.0 - share) / 2.0),
+            _ => None,
+        };
+        let unloads = self.domain.unloading_row() == Some(c);
+        let until_lift_off = unloads.then_some(settings.limits.liftoff_force_n * (1.0 - share));
+        transferred.into_iter().chain(until_lift_off).reduce(f64::max)
+    }
+
+    /// The impulses of the impact that opens a domain, N s: none too large, and at heel strike within the friction cone.
+    fn impulses(&self, kind: DomainKind, impulse: &[f64], place: Place<'_>, worst: &mut Worst) {
+        let limits = &self.gait.settings.limits;
+        worst.note(IMPULSE_SIZE, largest(impulse.iter().copied()) - limits.impulse_max_n_s, place);
+        if let (DomainKind::Ds2, [tangential, normal, ..]) = (kind, impulse) {
+            worst.note(IMPACT_FRICTION, tangential.abs() - limits.impact_friction * normal, place);
+        }
     }
 
     /// Height `c (4 w (1 - w))^2` that the swing foot keeps, w the share of the swing, m.
@@ -248,6 +287,7 @@ impl DomainResiduals<'_> {
             let by_physics = impact.as_ref().map_or(&[][..], |impact| &impact.impulse);
             let missed = to.impulse.iter().flatten().zip(by_physics).map(|(told, found)| told - found);
             worst.other.note(IMPULSE, if by_physics.is_empty() { f64::NAN } else { largest(missed) }, place);
+            self.impulses(CYCLE[next].kind, by_physics, place, &mut worst.other);
             impact.map(|impact| impact.velocity_after)
         } else {
             Some(*qd)
