@@ -71,8 +71,8 @@ fn highest(
     Ok(best.map(|(id, _)| id))
 }
 
-/// The recommended trial: of the visited ones, that with the highest posterior mean; a gait that somebody called unsafe is
-/// never recommended.
+/// The recommended trial: of the visited ones, that with the highest posterior mean. What has no gait, and a gait that
+/// somebody called unsafe, is never recommended.
 ///
 /// # Errors
 /// When the learner refuses the log.
@@ -80,11 +80,9 @@ pub fn best_trial(standing: &Standing) -> Result<Option<TrialId>, LearnerError> 
     let plan = &standing.study.plan;
     let belief = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
     let best = belief.best().and_then(|action| standing.trial_of(action)).map(|trial| trial.id);
-    match best {
-        Some(best) if standing.objections.closes(best) => {
-            highest(standing, &belief, |trial| !standing.objections.closes(trial.id))
-        }
-        best => Ok(best),
+    match best.filter(|best| standing.may_be_recommended(*best)) {
+        Some(best) => Ok(Some(best)),
+        None => highest(standing, &belief, |trial| standing.may_be_recommended(trial.id)),
     }
 }
 
@@ -101,8 +99,7 @@ pub fn ranking(standing: &Standing) -> Result<Vec<TrialId>, LearnerError> {
     let plan = &standing.study.plan;
     let belief = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
     let mut ranked = Vec::new();
-    let open = |trial: &&Trial| trial.state == TrialState::Converged && !standing.objections.closes(trial.id);
-    for trial in standing.trials.iter().filter(open) {
+    for trial in standing.trials.iter().filter(|trial| standing.may_be_recommended(trial.id)) {
         ranked.push((belief.mean(trial.action_index)?, trial.id));
     }
     ranked.sort_by(|(mean_a, a), (mean_b, b)| {
@@ -126,10 +123,11 @@ pub fn best_to_show(standing: &Standing) -> Result<Option<TrialId>, LearnerError
     best_trial(standing)
 }
 
-/// What the learner last believed to be best, unless somebody called it unsafe; it does not take every trial to tell.
+/// What the learner last believed to be best, unless it has no gait or somebody called it unsafe; it does not take every
+/// trial to tell.
 pub fn last_believed(standing: &Standing) -> Option<TrialId> {
     let best = standing.trials.last().and_then(|newest| newest.best_before);
-    best.filter(|best| !standing.objections.closes(*best))
+    best.filter(|best| standing.may_be_recommended(*best))
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

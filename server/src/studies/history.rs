@@ -22,7 +22,7 @@ pub struct Milestone {
     pub trial_id: TrialId,
     /// Its number.
     pub number: u32,
-    /// Its Gait RMSE, rad; none when it did not converge.
+    /// Its Gait RMSE, rad; none when a script told none.
     pub gait_rmse_rad: Option<f64>,
     /// Its cost of transport.
     pub cost_of_transport: Option<f64>,
@@ -55,7 +55,7 @@ fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
 
 /// The best trial after each iteration at which it was asked for. What the learner believed when it proposed a trial is
 /// the best after the results that were there then; after the last one, what it believes now. The first gait there is
-/// is the best one until more is known.
+/// is the best one until more is known; what has no gait is never the best.
 ///
 /// # Errors
 /// When the learner refuses the log.
@@ -63,7 +63,7 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
     let labelled = labelled(standing);
     let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
     let milestone = |results: usize, id: TrialId| {
-        let best = by_id.get(&id)?;
+        let best = by_id.get(&id).filter(|best| best.state == TrialState::Converged)?;
         Some(Milestone {
             iteration: u32::try_from(results).ok()?,
             trial_id: id,
@@ -95,7 +95,7 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
 pub fn known(standing: &Standing) -> Vec<Milestone> {
     let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
     let best_before = |trial: &Trial| {
-        let best = by_id.get(&trial.best_before?)?;
+        let best = by_id.get(&trial.best_before?).filter(|best| best.state == TrialState::Converged)?;
         Some(Milestone {
             iteration: trial.number - 1,
             trial_id: best.id,
