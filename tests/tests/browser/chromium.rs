@@ -10,7 +10,7 @@ use chromiumoxide::cdp::browser_protocol::input::{
     DispatchTouchEventParams, DispatchTouchEventReturns, DispatchTouchEventType, InsertTextParams, TouchPoint,
 };
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
-use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent, OverrideNetworkStateParams};
+use chromiumoxide::cdp::browser_protocol::network::{self, EmulateNetworkConditionsParams, EventRequestWillBeSent};
 use chromiumoxide::cdp::js_protocol::runtime::EventExceptionThrown;
 use chromiumoxide::page::ScreenshotParams;
 use chromiumoxide::types::MethodId;
@@ -201,9 +201,14 @@ impl Tab {
         .await
     }
 
-    /// Tells the page that the connection is cut, or back.
+    /// Cuts the connection, or brings it back.
     pub(crate) async fn disconnect(&self, gone: bool) {
-        self.page.execute(OverrideNetworkStateParams::new(gone, 0.0, -1.0, -1.0)).await.unwrap();
+        self.page.execute(EmulateNetworkConditionsParams::new(gone, 0.0, -1.0, -1.0)).await.unwrap();
+    }
+
+    /// Forgets every session.
+    pub(crate) async fn forget_cookies(&self) {
+        self.page.execute(network::ClearBrowserCookiesParams::default()).await.unwrap();
     }
 
     /// A picture of the whole page.
