@@ -50,7 +50,7 @@ async fn errors_in_the_browser_are_pages_and_problem_documents_for_programs() {
         (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
         ("/nothing".to_owned(), StatusCode::NOT_FOUND),
     ] {
-        is_page(&service.fetch(&path).await, status, "Back to the studies");
+        is_page(&service.fetch(&path).await, status, "Back to the first page");
     }
     let wrong_method = service.post("/api/v1/health", &json!({})).await;
     assert_eq!(wrong_method.status, StatusCode::METHOD_NOT_ALLOWED);
@@ -212,6 +212,47 @@ async fn a_form_that_is_sent_again_with_another_answer_says_which_one_counts() {
     assert!(other.text.contains("Recorded") && other.text.contains(" over "), "the stored answer is shown");
     assert!(other.text.contains("value=\"b\" checked") && other.text.contains("firm</textarea>"), "{}", other.text);
     assert_eq!(service.feedback(study).await.len(), before + 1);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_second_answer_from_a_page_shown_before_the_first_is_refused() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let path = format!("/studies/{study}/compare");
+    let key = |number: u32| format!("01890000-0000-7000-8000-{number:012}");
+    let shown = async || {
+        let page = service.fetch(&format!("{path}?a={a}&b={b}")).await.text;
+        page.split("name=\"shown\" value=\"").nth(1).unwrap().split('"').next().unwrap().to_owned()
+    };
+    let send = async |pair: &str, answer: &str, shown: &str, number: u32| {
+        let body = format!("{pair}&answer={answer}&source=clinician&author=K&note=&key={}&shown={shown}", key(number));
+        service.post_text(&path, FORM, &body).await
+    };
+    let (ahead, turned) = (format!("a={a}&b={b}"), format!("a={b}&b={a}"));
+    let (one, other) = (shown().await, shown().await);
+    let before = service.feedback(study).await.len();
+    let first = send(&ahead, "a", &one, 1).await;
+    assert_eq!(first.status, StatusCode::SEE_OTHER);
+    // The other tab, also with the gaits the other way round, and also when it is pressed again.
+    for (pair, answer, number) in [(&ahead, "b", 2), (&turned, "a", 3), (&ahead, "unsafe_a", 4), (&ahead, "b", 2)] {
+        let second = send(pair, answer, &other, number).await;
+        is_page(&second, StatusCode::CONFLICT, "in another tab or window");
+        assert!(second.text.contains("Recorded") && second.text.contains(" over "), "{}", second.text);
+        assert!(second.text.contains(&format!("name=\"shown\" value=\"{other}\"")), "it stays the same page");
+    }
+    assert_eq!(service.feedback(study).await.len(), before + 1);
+    // Taken back, it does not stand in the way.
+    let saved = first.headers["location"].to_str().unwrap().split("saved=").nth(1).unwrap().to_owned();
+    let back = format!("saved={saved}&author=K&reason=slip");
+    assert_eq!(
+        service.post_text(&format!("/studies/{study}/retract"), FORM, &back).await.status,
+        StatusCode::SEE_OTHER
+    );
+    assert_eq!(send(&ahead, "cannot_tell", &other, 5).await.status, StatusCode::SEE_OTHER);
+    is_page(&send(&ahead, "b", &other, 6).await, StatusCode::CONFLICT, "cannot tell trial");
+    // A page shown later knows of it.
+    assert_eq!(send(&ahead, "b", &shown().await, 7).await.status, StatusCode::SEE_OTHER);
     service.stop().await;
 }
 
