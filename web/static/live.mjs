@@ -19,9 +19,13 @@ function update(shown, fresh) {
     if (!next || next.innerHTML === part.innerHTML) continue;
     const held = part.contains(document.activeElement) ? document.activeElement : null;
     const name = held?.getAttribute("value") ?? held?.textContent;
+    const opened = [...part.querySelectorAll("details[open] > summary")].map((summary) => summary.textContent);
     const across = part.querySelector(".scroll")?.scrollLeft ?? 0;
     part.replaceChildren(...next.childNodes);
     part.querySelector(".scroll")?.scrollTo({ left: across });
+    for (const summary of part.querySelectorAll("details > summary")) {
+      if (opened.includes(summary.textContent)) summary.parentElement?.setAttribute("open", "");
+    }
     if (held) {
       const alike = [...part.querySelectorAll(held.tagName)].find((e) => (e.getAttribute("value") ?? e.textContent) === name);
       /** @type {HTMLElement | undefined} */ (alike)?.focus();
@@ -32,8 +36,27 @@ function update(shown, fresh) {
 if (live) {
   const study = live.dataset.study;
   const source = new EventSource(`/api/v1/studies/${study}/events?after=${live.dataset.after}`);
+  const connection = /** @type {HTMLElement} */ (document.querySelector("[data-connection]"));
+  const announced = /** @type {HTMLElement} */ (document.querySelector("[data-announced]"));
+  const state = () => live.querySelector("[data-part=state] .state")?.textContent ?? "";
+  let last = state();
   let pending = false;
   let again = false;
+
+  // What is shown was true when the service was last heard of.
+  source.addEventListener("error", () => {
+    if (!connection.hidden && source.readyState !== EventSource.CLOSED) return;
+    const since = new Date().toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+    const next = source.readyState === EventSource.CLOSED ? "load the page again" : "trying again";
+    connection.textContent = `No connection to the service since ${since}: ${next}.`;
+    connection.hidden = false;
+    live.classList.add("stale");
+  });
+  source.addEventListener("open", () => {
+    connection.hidden = true;
+    live.classList.remove("stale");
+    void refresh();
+  });
 
   /** Brings what changed; asked for meanwhile, once more afterwards. */
   const refresh = async () => {
@@ -45,6 +68,10 @@ if (live) {
     try {
       const answer = await fetch(`/studies/${study}/live${location.search}`);
       if (answer.ok) update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+      if (state() !== last) {
+        last = state();
+        announced.textContent = `The study is now: ${last}.`;
+      }
       // The subject withdrew: what is on this page is not shown any more.
       if (answer.status === 409) location.reload();
     } catch {

@@ -15,10 +15,10 @@ use crate::plots::Figure;
 use crate::printable;
 use crate::store::feedback::{FeedbackRow, Source, Whose};
 use crate::store::idempotency::{self, Kept, fingerprint};
-use crate::store::studies::Study;
+use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialState;
 use crate::store::{
-    Connection, FeedbackId, Instant, RemarkId, StoreError, StudyId, TrialId, commit, feedback, gaits, now,
+    Connection, FeedbackId, Instant, RemarkId, StoreError, StudyId, TrialId, commit, events, feedback, gaits, now,
     presentations, reference_gaits, remarks, studies, trials,
 };
 use crate::studies::answer::{self, Answer, Verdict};
@@ -85,6 +85,9 @@ struct ComparePage {
     saved: Option<Saved>,
     /// The learner asks for a comparison.
     waits: bool,
+    /// The study goes on by itself: another gait is being computed, or will be at once.
+    is_going_on: bool,
+    last_event: i64,
     typed: Submitted,
     refused: Option<String>,
 }
@@ -137,7 +140,9 @@ pub(super) async fn get(
 
 async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
+    let last_event = events::last(&mut reader, id).await?;
     let study = studies::get(&mut reader, id).await?;
+    let is_going_on = matches!(study.state, StudyState::Running | StudyState::Waiting);
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
     let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
     let standing = if large {
@@ -198,6 +203,8 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         key: FeedbackId::fresh(),
         saved,
         waits,
+        is_going_on,
+        last_event,
         typed,
         refused,
     })
