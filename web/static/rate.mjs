@@ -16,6 +16,12 @@ if (box) {
   /** @type {HTMLElement} */ (document.querySelector("[data-controls]")).hidden = false;
   save.disabled = true;
   let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const strips = document.querySelector("[data-strips]");
+  if (!playing && strips) {
+    // Who wants no motion sees both strides as pictures, like those without scripts.
+    const pictures = new DOMParser().parseFromString(strips.textContent ?? "", "text/html").body;
+    strips.replaceWith(...pictures.childNodes);
+  }
   let phase = 0;
   let last = 0;
 

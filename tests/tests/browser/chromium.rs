@@ -10,7 +10,7 @@ use chromiumoxide::cdp::browser_protocol::input::{
     DispatchTouchEventParams, DispatchTouchEventReturns, DispatchTouchEventType, InsertTextParams, TouchPoint,
 };
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
-use chromiumoxide::cdp::browser_protocol::network::{self, EmulateNetworkConditionsParams, EventRequestWillBeSent};
+use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent};
 use chromiumoxide::cdp::js_protocol::runtime::EventExceptionThrown;
 use chromiumoxide::page::ScreenshotParams;
 use chromiumoxide::types::MethodId;
@@ -201,11 +201,6 @@ impl Tab {
         .await
     }
 
-    /// Cuts the connection, or brings it back.
-    pub(crate) async fn disconnect(&self, gone: bool) {
-        self.page.execute(EmulateNetworkConditionsParams::new(gone, 0.0, -1.0, -1.0)).await.unwrap();
-    }
-
     /// Forgets every session.
     pub(crate) async fn forget_cookies(&self) {
         self.page.execute(network::ClearBrowserCookiesParams::default()).await.unwrap();
@@ -232,6 +227,12 @@ impl Tab {
         self.wait_for(selector).await;
         let point = self.page.find_element(selector).await.unwrap().clickable_point().await.unwrap();
         self.page.click(point).await.unwrap();
+    }
+
+    /// Moves the mouse over an element.
+    pub(crate) async fn point_at(&self, selector: &str) {
+        self.wait_for(selector).await;
+        self.page.find_element(selector).await.unwrap().hover().await.unwrap();
     }
 
     /// From now on the screen is one to touch.
