@@ -1,7 +1,8 @@
 //! What each optional wish for a natural gait does: Gait RMSE, cost, solve time, and what a clinician looks at.
 //!
-//! `cargo run --release -p gait-optimizer --example naturalness -- [--subject 1] [--muscles off]`: one CSV row per set
-//! of settings, each solved cold with the default bounds.
+//! `cargo run --release -p gait-optimizer --example naturalness -- [--subject 1] [--muscles off] [--folder FOLDER]`: one CSV
+//! row per set of settings, each solved cold with the default bounds; with a folder every gait as a file, for
+//! `gaitwright convert --to tiles`.
 
 mod arguments;
 
@@ -9,6 +10,7 @@ use arguments::argument;
 use gait_optimizer::gait::{Axis, DomainTrajectory, Side};
 use gait_optimizer::{CancelToken, Gait, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
 use std::error::Error;
+use std::path::Path;
 
 /// Settings by name.
 fn wishes() -> Vec<(&'static str, GaitSettings)> {
@@ -75,6 +77,7 @@ fn impulse(domain: &DomainTrajectory, counts: impl Fn(Side) -> bool) -> f64 {
 fn main() -> Result<(), Box<dyn Error>> {
     let subject = Subject::builtin(argument("--subject", "1").parse()?)?;
     let muscles = argument("--muscles", "off") == "on";
+    let folder = argument("--folder", "");
     println!(
         "wish,status,gait_rmse_rad,cost_of_transport,iterations,seconds,speed_m_s,double_support_percent,\
          trailing_share_percent,left_knee_peak_deg,right_knee_peak_deg"
@@ -84,6 +87,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let options = SolveOptions { threads: 2, ..SolveOptions::default() };
         let outcome = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new())?;
         let (gait, report) = (&outcome.gait, &outcome.report);
+        if !folder.is_empty() {
+            let file = Path::new(&folder).join(format!("{}.json", name.replace(' ', "_").replace('/', "_per_")));
+            std::fs::write(file, serde_json::to_string(gait)?)?;
+        }
         let double: f64 = gait.domains.iter().filter(|d| d.name.starts_with("DS")).map(|d| d.duration_s).sum();
         println!(
             "\"{name}\",{:?},{:.4},{:.5},{},{:.1},{:.3},{:.1},{:.1},{:.1},{:.1}",

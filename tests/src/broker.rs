@@ -1,5 +1,6 @@
 //! A NATS broker as a process, with a folder of its own.
 
+use crate::skipped::skipped;
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -17,7 +18,7 @@ impl Broker {
     pub fn start() -> Option<Self> {
         if Command::new("nats-server").arg("--version").output().is_err() {
             assert!(std::env::var_os("GAITWRIGHT_REQUIRE_NATS").is_none(), "nats-server is required and not there");
-            eprintln!("skipped: there is no nats-server on this machine");
+            skipped("there is no nats-server on this machine");
             return None;
         }
         let folder = tempfile::tempdir().unwrap();

@@ -13,3 +13,4 @@ pub mod examined;
 pub mod large;
 pub mod measured;
 pub mod service;
+pub mod skipped;

@@ -68,6 +68,8 @@ fn a_gait_is_solved_certified_and_converted() {
 
     let controller = done(folder, &["convert", "gait.json", "--to", "controller"]);
     assert_eq!(ControllerFile::from_json(&controller).unwrap().domains.len(), 8);
+    let tiles = done(folder, &["convert", "gait.json", "--to", "tiles"]);
+    assert!(tiles.starts_with("<svg") && tiles.contains(">100 %</text>"), "{tiles}");
     refused(folder, &["convert", "gait.json", "--to", "mot", "--rate-hz", "0", "--out", "x.mot"], "rate_hz = 0");
     let mut broken = outcome["gait"].clone();
     broken["domains"].as_array_mut().unwrap().pop();

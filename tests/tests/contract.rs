@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright::store::studies::StudyState;
+use gaitwright::studies::belief::Beliefs;
+use gaitwright::studies::choice::ranking_to_show;
 use gaitwright::studies::recommended::Judged;
 use gaitwright::studies::standing::Standing;
 use gaitwright::studies::summary;
@@ -33,7 +35,8 @@ async fn documents_keep_their_shape() {
     let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
 
     // tune --json; the last trial comes first, because it has everything.
-    let mut tune = serde_json::to_value(summary::of(&standing, Judged::default()).unwrap()).unwrap();
+    let best = ranking_to_show(&standing, &Beliefs::default()).unwrap().first().copied();
+    let mut tune = serde_json::to_value(summary::of(&standing, best, Judged::default())).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();
     insta::assert_json_snapshot!("tune", shape(&tune));
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_tests::cli;
+use gaitwright_tests::skipped::skipped;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -126,7 +127,7 @@ fn systemd_finds_no_fault_in_the_unit() {
     let unit = folder.path().join("gaitwright.service");
     std::fs::write(&unit, UNIT.replace("/usr/local/bin/gaitwright", BINARY)).unwrap();
     let Ok(output) = Command::new("systemd-analyze").args(["verify", "--man=no"]).arg(&unit).output() else {
-        eprintln!("skipped: there is no systemd-analyze on this machine");
+        skipped("there is no systemd-analyze on this machine");
         return;
     };
     let text = String::from_utf8_lossy(&output.stderr);

@@ -6,6 +6,7 @@
 use gaitwright::http::openapi;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
+use gaitwright_tests::skipped::skipped;
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
@@ -14,7 +15,7 @@ fn python(arguments: &[&str]) -> Option<String> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../server/clients/python");
     let output = Command::new("python3").arg("-B").args(arguments).current_dir(folder).output();
     let Ok(output) = output else {
-        println!("skipped: there is no python3");
+        skipped("there is no python3");
         return None;
     };
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

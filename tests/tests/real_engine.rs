@@ -16,6 +16,7 @@ use gaitwright::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
+use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Output, Stdio};
@@ -328,7 +329,7 @@ fn a_result_with_muscles_fits_through_a_broker() {
 #[test]
 fn long_a_gait_with_muscles() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        eprintln!("skipped: GAITWRIGHT_LONG_TESTS is not set");
+        skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::{Dimension, SearchSpace};
+use gait_learner::SearchSpace;
 use gait_optimizer::{Gait, TunedBounds};
 use gaitwright::cli::study::prune;
 use gaitwright::store::audit::{self, Actor};
@@ -11,10 +11,10 @@ use gaitwright::store::gaits;
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::TrialState;
 use gaitwright::store::{StudyId, TrialId, certificates, commit};
-use gaitwright::studies::choice::ranking;
-use gaitwright::studies::recommended::Judged;
+use gaitwright::studies::belief::Beliefs;
+use gaitwright::studies::choice::ranking_to_show;
+use gaitwright::studies::plan::NewStudy;
 use gaitwright::studies::standing::Standing;
-use gaitwright::studies::summary;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::examined::{Verdicts, certificate};
 use gaitwright_tests::service::Service;
@@ -31,6 +31,39 @@ async fn recommendation(service: &Service, study: StudyId) -> Value {
     let answer = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text);
     answer.json()
+}
+
+#[tokio::test]
+async fn a_study_without_a_gait_has_no_best_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let without_gait = TunedBounds::parse("a5=0.039,a6=0").unwrap();
+    let space = json!({"dimensions": [{"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0}]});
+    let space: SearchSpace = serde_json::from_value(space).unwrap();
+    let plan = |new: &mut NewStudy| {
+        (new.base_bounds, new.search_space, new.trial_budget) = (without_gait, Some(space.clone()), 2);
+    };
+    let study = service.study(plan).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    assert!(trials.iter().all(|trial| trial.state == TrialState::NotConverged));
+    assert_eq!(ranked(&service, study).await, []);
+    let api = format!("/api/v1/studies/{study}");
+    assert_eq!(service.fetch(&format!("{api}/history")).await.json(), json!([]));
+    assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(!page.contains("the best so far") && !page.contains(">best<"), "{page}");
+    // Figures of a last iterate are no figures of a gait.
+    assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
+    let table = service.fetch(&format!("{api}/trials.csv")).await.text;
+    let column = table.lines().next().unwrap().split(',').position(|name| name == "gait_rmse_rad").unwrap();
+    assert!(table.lines().skip(1).all(|line| line.split(',').nth(column) == Some("")), "{table}");
+    let rmse = format!("{:.4}", trials[0].report.as_ref().unwrap().gait_rmse_rad);
+    for page in [format!("/studies/{study}?sort=gait_rmse_rad"), format!("/trials/{}", trials[0].id), "/".to_owned()] {
+        let shown = service.fetch(&page).await.text;
+        assert!(!shown.contains(&rmse), "{page}: {shown}");
+    }
+    service.stop().await;
 }
 
 #[tokio::test]
@@ -101,13 +134,10 @@ async fn settled(service: &Service, study: StudyId) -> Value {
     panic!("the gaits are not examined");
 }
 
-async fn standing(service: &Service, study: StudyId) -> Standing {
-    let study = service.get(study).await;
-    Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap()
-}
-
 async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
-    ranking(&standing(service, study).await).unwrap()
+    let study = service.get(study).await;
+    let standing = Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    ranking_to_show(&standing, &Beliefs::default()).unwrap()
 }
 
 /// The trials whose gaits the service examined by itself, in order.
@@ -185,42 +215,5 @@ async fn a_recommendation_that_is_asked_for_while_the_study_runs_is_examined_bes
     assert_eq!(service.get(study).await.state, StudyState::Running);
     service.post(&format!("/api/v1/studies/{study}/stop"), &json!({"reason": "enough"})).await;
     assert_eq!(settled(&service, study).await["certificate"], "passed");
-    service.stop().await;
-}
-
-#[tokio::test]
-async fn a_study_without_a_gait_recommends_nothing_and_shows_no_rmse() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service
-        .study(|new| {
-            // Under these bounds the analytic solver finds no gait, and reports the figures of its last iterate.
-            (new.base_bounds.a5, new.base_bounds.a6) = (0.039, 0.0);
-            let speed = Dimension { name: "a1".to_owned(), values: vec![15.0, 20.0], lengthscale: 5.0 };
-            (new.search_space, new.trial_budget) = (Some(SearchSpace::new(vec![speed]).unwrap()), 2);
-        })
-        .await;
-    service.wait_for(study, &[StudyState::Finished]).await;
-    let trials = service.trials(study).await;
-    assert!(trials.iter().all(|trial| trial.state == TrialState::NotConverged), "{trials:?}");
-    assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
-
-    let api = format!("/api/v1/studies/{study}");
-    assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
-    assert_eq!(service.fetch(&format!("{api}/history")).await.json(), json!([]));
-    let table = service.fetch(&format!("{api}/trials.csv")).await.text;
-    let column = table.lines().next().unwrap().split(',').position(|name| name == "gait_rmse_rad").unwrap();
-    for line in table.lines().skip(1) {
-        assert_eq!(line.split(',').nth(column), Some(""), "{table}");
-    }
-    let summary = summary::of(&standing(&service, study).await, Judged::default()).unwrap();
-    assert_eq!((summary.best_trial, summary.best_gait_rmse_rad), (None, None));
-
-    let rmse = format!("{:.4}", trials[0].report.as_ref().unwrap().gait_rmse_rad);
-    let pages = [format!("/studies/{study}?sort=gait_rmse_rad"), format!("/trials/{}", trials[0].id), "/".to_owned()];
-    for page in pages {
-        let shown = service.fetch(&page).await.text;
-        assert!(!shown.contains(&rmse) && !shown.contains("the best so far"), "{page}: {shown}");
-    }
     service.stop().await;
 }

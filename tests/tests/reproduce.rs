@@ -8,6 +8,7 @@ use gaitwright::store::{commit, reference_gaits};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
+use gaitwright_tests::skipped::skipped;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
@@ -96,7 +97,7 @@ async fn the_report_draws_the_band_of_a_reference_that_has_one_and_says_where_th
 #[test]
 fn a_short_comparison_ends_in_a_report_that_stands_alone() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        eprintln!("skipped: set GAITWRIGHT_LONG_TESTS=1");
+        skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_tests::client::{get, send};
+use gaitwright_tests::skipped::skipped;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -117,7 +118,7 @@ fn it_speaks_https_with_a_certificate_from_files() {
         .output();
     let curl = Command::new("curl").arg("--version").output();
     let (Ok(made), Ok(_)) = (made, curl) else {
-        println!("skipped: openssl and curl are needed");
+        skipped("openssl and curl are needed");
         return;
     };
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));

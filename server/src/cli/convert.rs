@@ -5,8 +5,10 @@ use super::out_file::OutFile;
 use super::output::data;
 use crate::error::Error;
 use crate::gait_table::gait_csv;
+use crate::plots::Figure;
 use clap::{Args, ValueEnum};
 use gait_optimizer::export::{ControllerFile, motion_file};
+use gait_optimizer::walking::stick_figure::stick_figures;
 use std::path::PathBuf;
 
 /// What a gait is converted to.
@@ -18,6 +20,8 @@ enum Form {
     Mot,
     /// Controller file for the device: curves, phase, set points of the prosthetic joints; explains its fields.
     Controller,
+    /// The stride as a row of stick figures (SVG).
+    Tiles,
 }
 
 #[derive(Debug, Args)]
@@ -45,6 +49,7 @@ impl Convert {
             Form::Mot => motion_file(&gait, self.rate_hz)?,
             Form::Controller => serde_json::to_string_pretty(&ControllerFile::new(&gait, self.rate_hz)?)
                 .map_err(|e| Error::Internal(e.to_string()))?,
+            Form::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
         };
         match out {
             Some(out) => out.write(&text),

@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
 use crate::store::{Store, StoreError, StudyId, archive, backup, commit, events, gaits, studies};
-use crate::studies::choice::ranking;
+use crate::studies::belief::Beliefs;
+use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended;
 use crate::studies::standing::Standing;
 use clap::Args;
@@ -120,7 +121,7 @@ pub async fn prune(store: &Store, days: u32) -> Result<u64, Error> {
     for study in studies::ended_before(&mut *store.read().await?, before).await? {
         let id = study.id;
         let standing = Standing::read(&mut *store.read().await?, study).await?;
-        let ranking = tokio::task::spawn_blocking(move || ranking(&standing))
+        let ranking = tokio::task::spawn_blocking(move || ranking_to_show(&standing, &Beliefs::default()))
             .await
             .map_err(|e| Error::Internal(e.to_string()))?
             .map_err(Error::Learner)?;

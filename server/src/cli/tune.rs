@@ -10,6 +10,7 @@ use super::unattended::{self, Lines, action_line};
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Store, commit};
+use crate::studies::choice::best_trial;
 use crate::studies::plan::NewStudy;
 use crate::studies::recommended::CertificateState;
 use crate::studies::summary::{self, Summary};
@@ -71,7 +72,9 @@ impl Tune {
         let ran = Box::pin(unattended::run_and_examine(&store, &study, workers, lines)).await;
         store.close().await;
         let (ran, judged) = ran?;
-        self.print(&summary::of(&ran.standing, judged).map_err(Error::Learner)?)?;
+        let belief = ran.beliefs.posterior(&ran.standing).map_err(Error::Learner)?;
+        let best = best_trial(&ran.standing, &belief).map_err(Error::Learner)?;
+        self.print(&summary::of(&ran.standing, best, judged))?;
         if ran.interrupted {
             let done = ran.standing.trials.len() - ran.standing.open();
             tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));

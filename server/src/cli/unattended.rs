@@ -7,6 +7,7 @@ use crate::store::audit::Actor;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Store, commit, studies, trials as trial_rows};
+use crate::studies::belief::Beliefs;
 use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
 use crate::studies::recommended::{self, Judged};
@@ -34,6 +35,8 @@ pub(super) struct Run {
     pub(super) standing: Standing,
     /// Somebody stopped it before its end.
     pub(super) interrupted: bool,
+    /// What the learner believes.
+    pub(super) beliefs: Arc<Beliefs>,
 }
 
 /// What went wrong in a study for reasons of the program or the machine. That an action has no gait is a result.
@@ -86,7 +89,7 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
     if let Some(ended) = ended {
         ended?;
     }
-    Ok(Run { standing, interrupted })
+    Ok(Run { standing, interrupted, beliefs: Arc::clone(director.beliefs()) })
 }
 
 /// Runs a study and examines its best gaits, if nobody stopped it.
@@ -97,14 +100,14 @@ pub(super) async fn run_and_examine(
     lines: Lines,
 ) -> Result<(Run, Judged), Error> {
     let ran = run(store, study, workers, lines).await?;
-    let judged = if ran.interrupted { Judged::default() } else { examined(store, &ran.standing).await? };
+    let judged = if ran.interrupted { Judged::default() } else { examined(store, &ran.standing, &ran.beliefs).await? };
     Ok((ran, judged))
 }
 
 /// Examines the best gaits of a study.
-pub(super) async fn examined(store: &Store, standing: &Standing) -> Result<Judged, Error> {
+pub(super) async fn examined(store: &Store, standing: &Standing, beliefs: &Beliefs) -> Result<Judged, Error> {
     tell("examining the best gait");
-    recommended::examine(store, &Actor::terminal(), standing).await
+    recommended::examine(store, &Actor::terminal(), standing, beliefs).await
 }
 
 /// Shows progress until the study ends.

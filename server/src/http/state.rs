@@ -51,7 +51,8 @@ impl Access {
 impl AppState {
     /// A service over a director.
     pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
-        Self { director, access, requests: Arc::default(), beliefs: Arc::default(), hosts }
+        let beliefs = Arc::clone(director.beliefs());
+        Self { director, access, requests: Arc::default(), beliefs, hosts }
     }
 
     /// The record.

@@ -19,7 +19,7 @@ const KEPT: usize = 16;
 #[derive(Debug)]
 pub struct Belief {
     /// The belief itself, for what else is asked.
-    pub posterior: Posterior,
+    pub posterior: Arc<Posterior>,
     /// For each dimension the utility of its levels, averaged over all others.
     pub marginals: Vec<Vec<Marginal>>,
     /// The actions tried, the one that is most likely the best first.
@@ -40,13 +40,9 @@ pub struct Comparison {
 }
 
 impl Belief {
-    /// The belief of a study: CPU work.
-    ///
-    /// # Errors
-    /// When the learner refuses the log.
-    pub fn of(standing: &Standing) -> Result<Self, LearnerError> {
+    /// What follows from the posterior of a study: CPU work.
+    fn of(standing: &Standing, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
         let plan = &standing.study.plan;
-        let posterior = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
         let dimensions = 0..plan.search_space.dimensions().len();
         let marginals = dimensions.map(|d| posterior.marginal(d)).collect::<Result<_, _>>()?;
         let mut comparisons = Vec::new();
@@ -80,28 +76,58 @@ fn preferred(standing: &Standing, row: &FeedbackRow) -> Option<(ActionIndex, Act
 /// The beliefs that were computed last.
 #[derive(Debug, Default)]
 pub struct Beliefs {
-    kept: Mutex<VecDeque<(StudyId, LogVersion, Arc<Belief>)>>,
+    posteriors: Kept<Posterior>,
+    beliefs: Kept<Belief>,
 }
 
 impl Beliefs {
+    /// The posterior of a study, computed where the log has changed since: CPU work.
+    ///
+    /// # Errors
+    /// When the learner refuses the log.
+    pub fn posterior(&self, standing: &Standing) -> Result<Arc<Posterior>, LearnerError> {
+        let plan = &standing.study.plan;
+        self.posteriors.get_or(standing, || posterior(&plan.search_space, &standing.log(), &plan.learner))
+    }
+
     /// The belief of a study, computed where the log has changed since: CPU work.
     ///
     /// # Errors
     /// When the learner refuses the log.
     pub fn of(&self, standing: &Standing) -> Result<Arc<Belief>, LearnerError> {
+        self.beliefs.get_or(standing, || Belief::of(standing, self.posterior(standing)?))
+    }
+}
+
+/// What follows from the log of a study, of those that were asked for last.
+#[derive(Debug)]
+struct Kept<T>(Mutex<VecDeque<(StudyId, LogVersion, Arc<T>)>>);
+
+impl<T> Default for Kept<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Kept<T> {
+    fn get_or(
+        &self,
+        standing: &Standing,
+        compute: impl FnOnce() -> Result<T, LearnerError>,
+    ) -> Result<Arc<T>, LearnerError> {
         let (study, version) = (standing.study.id, standing.version);
         // The list is whole between any two statements that hold the lock.
-        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, _, belief)) = kept().iter().find(|(id, at, _)| (*id, *at) == (study, version)) {
-            return Ok(Arc::clone(belief));
+        let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, found)) = kept().iter().find(|(id, at, _)| (*id, *at) == (study, version)) {
+            return Ok(Arc::clone(found));
         }
-        let belief = Arc::new(Belief::of(standing)?);
+        let computed = Arc::new(compute()?);
         let mut kept = kept();
         kept.retain(|(id, ..)| *id != study);
-        kept.push_back((study, version, Arc::clone(&belief)));
+        kept.push_back((study, version, Arc::clone(&computed)));
         if kept.len() > KEPT {
             kept.pop_front();
         }
-        Ok(belief)
+        Ok(computed)
     }
 }

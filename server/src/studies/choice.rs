@@ -1,11 +1,12 @@
 //! What to try next, as a pure function of where the study stands.
 
+use super::belief::Beliefs;
 use super::search;
 use super::seed::{Purpose, derive};
 use super::standing::Standing;
 use crate::store::TrialId;
 use crate::store::trials::{NewTrial, Trial, TrialState};
-use gait_learner::{LearnerError, Posterior, ProposalReason, posterior, propose};
+use gait_learner::{LearnerError, Posterior, ProposalReason, propose};
 use gait_optimizer::ModelError;
 use thiserror::Error;
 
@@ -27,24 +28,24 @@ impl ChoiceError {
     }
 }
 
-/// The next trial of a study. Depends on the standing alone: the same log gives the same trial, bit for bit.
+/// The next trial of a study, after what the learner believes now. Depends on the standing alone: the same log gives the same
+/// trial, bit for bit.
 ///
 /// # Errors
 /// [`ChoiceError`], among them that every action was tried.
-pub fn next_trial(standing: &Standing) -> Result<NewTrial, ChoiceError> {
+pub fn next_trial(standing: &Standing, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
     let plan = &standing.study.plan;
     let number = standing.trials.last().map_or(1, |trial| trial.number + 1);
     let log = standing.log();
     let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
     let proposal = propose(&plan.search_space, &log, &standing.taken_without_result(), &plan.learner, seed)?;
-    let belief = posterior(&plan.search_space, &log, &plan.learner)?;
     Ok(NewTrial {
         number,
         action_index: proposal.action,
         action: search::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
         reason: reason_in_words(proposal.reason),
         best_before: proposal.best.and_then(|action| standing.trial_of(action)).map(|trial| trial.id),
-        warm_started_from: best_converged(standing, &belief)?,
+        warm_started_from: best_converged(standing, belief)?,
     })
 }
 
@@ -53,81 +54,59 @@ pub fn next_trial(standing: &Standing) -> Result<NewTrial, ChoiceError> {
 /// # Errors
 /// When a trial's action is not in the search space.
 pub fn best_converged(standing: &Standing, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
-    highest(standing, belief, |_| true)
+    Ok(by_mean(standing, belief, |_| true)?.first().copied())
 }
 
-fn highest(
+/// The recommended trial: of those with a gait, that with the highest posterior mean; a gait that somebody called unsafe is
+/// never recommended.
+///
+/// # Errors
+/// As [`best_converged`].
+pub fn best_trial(standing: &Standing, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(ranking(standing, belief)?.first().copied())
+}
+
+/// The gaits of a study that nobody called unsafe, the recommended one first, by posterior mean.
+///
+/// # Errors
+/// As [`best_converged`].
+pub fn ranking(standing: &Standing, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
+    by_mean(standing, belief, |trial| !standing.objections.closes(trial.id))
+}
+
+/// Converged trials by posterior mean, the earliest of equals first.
+fn by_mean(
     standing: &Standing,
     belief: &Posterior,
     counts: impl Fn(&Trial) -> bool,
-) -> Result<Option<TrialId>, LearnerError> {
-    let mut best: Option<(TrialId, f64)> = None;
-    for trial in standing.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
-        let mean = belief.mean(trial.action_index)?;
-        if best.is_none_or(|(_, highest)| mean > highest) {
-            best = Some((trial.id, mean));
-        }
-    }
-    Ok(best.map(|(id, _)| id))
-}
-
-/// The recommended trial: of the visited ones, that with the highest posterior mean. What has no gait, and a gait that
-/// somebody called unsafe, is never recommended.
-///
-/// # Errors
-/// When the learner refuses the log.
-pub fn best_trial(standing: &Standing) -> Result<Option<TrialId>, LearnerError> {
-    let plan = &standing.study.plan;
-    let belief = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
-    let best = belief.best().and_then(|action| standing.trial_of(action)).map(|trial| trial.id);
-    match best.filter(|best| standing.may_be_recommended(*best)) {
-        Some(best) => Ok(Some(best)),
-        None => highest(standing, &belief, |trial| standing.may_be_recommended(trial.id)),
-    }
-}
-
-/// The gaits of a study that nobody called unsafe, the recommended one first, then by posterior mean; of a large study, the
-/// best one alone.
-///
-/// # Errors
-/// When the learner refuses the log.
-pub fn ranking(standing: &Standing) -> Result<Vec<TrialId>, LearnerError> {
-    let best = best_to_show(standing)?;
-    if standing.trials.len() >= MANY {
-        return Ok(best.into_iter().collect());
-    }
-    let plan = &standing.study.plan;
-    let belief = posterior(&plan.search_space, &standing.log(), &plan.learner)?;
+) -> Result<Vec<TrialId>, LearnerError> {
     let mut ranked = Vec::new();
-    for trial in standing.trials.iter().filter(|trial| standing.may_be_recommended(trial.id)) {
+    for trial in standing.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
         ranked.push((belief.mean(trial.action_index)?, trial.id));
     }
-    ranked.sort_by(|(mean_a, a), (mean_b, b)| {
-        let first = |id: &TrialId| best != Some(*id);
-        first(a).cmp(&first(b)).then(mean_b.total_cmp(mean_a))
-    });
+    ranked.sort_by(|(mean_a, _), (mean_b, _)| mean_b.total_cmp(mean_a));
     Ok(ranked.into_iter().map(|(_, id)| id).collect())
 }
 
-/// From so many trials on, pages show what the learner last believed instead of asking it anew.
+/// From so many trials on, what the learner last believed is shown instead of asking it anew.
 pub const MANY: usize = 400;
 
-/// The best trial for showing: of a large study, what was the best when the newest trial was proposed.
+/// The ranking for showing: of a large study only the trial that was the best when the newest one was proposed.
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn best_to_show(standing: &Standing) -> Result<Option<TrialId>, LearnerError> {
+pub fn ranking_to_show(standing: &Standing, beliefs: &Beliefs) -> Result<Vec<TrialId>, LearnerError> {
     if standing.trials.len() >= MANY {
-        return Ok(last_believed(standing));
+        return Ok(last_believed(standing).into_iter().collect());
     }
-    best_trial(standing)
+    ranking(standing, &*beliefs.posterior(standing)?)
 }
 
-/// What the learner last believed to be best, unless it has no gait or somebody called it unsafe; it does not take every
-/// trial to tell.
+/// What the learner last believed to be best, if that has a gait that nobody called unsafe; it does not take every trial to
+/// tell.
 pub fn last_believed(standing: &Standing) -> Option<TrialId> {
-    let best = standing.trials.last().and_then(|newest| newest.best_before);
-    best.filter(|best| standing.may_be_recommended(*best))
+    let best = standing.trials.last().and_then(|newest| newest.best_before).and_then(|best| standing.trial(best))?;
+    (best.state == TrialState::Converged && !standing.objections.closes(best.id)).then_some(best.id)
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

@@ -3,6 +3,7 @@
 //! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
 //! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
 
+use super::belief::Beliefs;
 use super::examiner::Examiner;
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
@@ -48,6 +49,7 @@ struct Inner {
     waiting: watch::Sender<Arc<[Standing]>>,
     /// What examines the best gaits of studies that ended.
     examiner: Option<Examiner>,
+    beliefs: Arc<Beliefs>,
     /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
     /// where no job of a trial is.
     hand_over: Mutex<()>,
@@ -78,9 +80,11 @@ impl Director {
         only: Option<StudyId>,
         examine: Option<Arc<dyn Examine>>,
     ) -> Self {
+        let beliefs = Arc::<Beliefs>::default();
         Self(Arc::new(Inner {
-            examiner: examine.map(|examine| Examiner::new(store.clone(), examine)),
+            examiner: examine.map(|examine| Examiner::new(store.clone(), examine, Arc::clone(&beliefs))),
             store,
+            beliefs,
             engine,
             board: Arc::default(),
             rehearsals: Rehearsals::default(),
@@ -102,6 +106,11 @@ impl Director {
     /// How far the running solves are.
     pub fn board(&self) -> &Arc<Board> {
         &self.0.board
+    }
+
+    /// What the learner believes of the studies that were asked about last.
+    pub fn beliefs(&self) -> &Arc<Beliefs> {
+        &self.0.beliefs
     }
 
     /// How many solves can run at the same time.
@@ -249,8 +258,9 @@ impl Director {
             let mut reader = self.0.store.read().await?;
             let standing = Standing::read(&mut reader, study.clone()).await?;
             drop(reader);
+            let beliefs = Arc::clone(&self.0.beliefs);
             let (standing, step) = tokio::task::spawn_blocking(move || {
-                let step = next_step(&standing);
+                let step = next_step(&standing, &beliefs);
                 (standing, step)
             })
             .await

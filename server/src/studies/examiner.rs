@@ -3,7 +3,8 @@
 //!
 //! Which gait comes next follows from the record alone, so a process that is killed goes on where it was.
 
-use super::choice::ranking;
+use super::belief::Beliefs;
+use super::choice::ranking_to_show;
 use super::standing::Standing;
 use super::{examination, recommended};
 use crate::error::Error;
@@ -19,6 +20,7 @@ use tokio::sync::{Notify, watch};
 pub(super) struct Examiner {
     store: Store,
     examine: Arc<dyn Examine>,
+    beliefs: Arc<Beliefs>,
     state: Mutex<State>,
     asked: Notify,
 }
@@ -33,8 +35,8 @@ struct State {
 
 impl Examiner {
     /// Over a record; [`Self::run`] sets it to work.
-    pub(super) fn new(store: Store, examine: Arc<dyn Examine>) -> Self {
-        Self { store, examine, state: Mutex::default(), asked: Notify::new() }
+    pub(super) fn new(store: Store, examine: Arc<dyn Examine>, beliefs: Arc<Beliefs>) -> Self {
+        Self { store, examine, beliefs, state: Mutex::default(), asked: Notify::new() }
     }
 
     /// Asks for the best gaits of a study; `next` is the one that the record has no certificate of. `false`: that one cannot
@@ -109,7 +111,8 @@ impl Examiner {
             // Nothing is recommended yet.
             return Ok(false);
         }
-        let ranking = tokio::task::spawn_blocking(move || ranking(&standing));
+        let beliefs = Arc::clone(&self.beliefs);
+        let ranking = tokio::task::spawn_blocking(move || ranking_to_show(&standing, &beliefs));
         let ranking = ranking.await.map_err(|e| Error::Internal(e.to_string()))?.map_err(Error::Learner)?;
         let refused = self.state().refused.clone();
         let next = recommended::next_to_examine(&mut *self.store.read().await?, &ranking, &refused).await?;

@@ -3,12 +3,10 @@
 //! An iteration is a result. Results count in the order in which they came, which is the order of the trials' numbers
 //! unless several trials run at the same time.
 
-use super::choice::best_to_show;
 use super::standing::Standing;
 use crate::store::feedback::{FeedbackRow, Said};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Instant, TrialId};
-use gait_learner::LearnerError;
 use serde::Serialize;
 use std::collections::HashMap;
 use utoipa::ToSchema;
@@ -22,7 +20,7 @@ pub struct Milestone {
     pub trial_id: TrialId,
     /// Its number.
     pub number: u32,
-    /// Its Gait RMSE, rad; none when a script told none.
+    /// Its Gait RMSE, rad; none when it did not converge.
     pub gait_rmse_rad: Option<f64>,
     /// Its cost of transport.
     pub cost_of_transport: Option<f64>,
@@ -55,11 +53,8 @@ fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
 
 /// The best trial after each iteration at which it was asked for. What the learner believed when it proposed a trial is
 /// the best after the results that were there then; after the last one, what it believes now. The first gait there is
-/// is the best one until more is known; what has no gait is never the best.
-///
-/// # Errors
-/// When the learner refuses the log.
-pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
+/// is the best one until more is known. `best`: the best trial now.
+pub fn of(standing: &Standing, best: Option<TrialId>) -> Vec<Milestone> {
     let labelled = labelled(standing);
     let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
     let milestone = |results: usize, id: TrialId| {
@@ -78,7 +73,7 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
     let proposed = standing.trials.iter();
     milestones.extend(proposed.filter_map(|trial| milestone(results_before(&labelled, trial), trial.best_before?)));
     if !labelled.is_empty()
-        && let Some(best) = best_to_show(standing)?
+        && let Some(best) = best
     {
         milestones.extend(milestone(labelled.len(), best));
     }
@@ -87,7 +82,7 @@ pub fn of(standing: &Standing) -> Result<Vec<Milestone>, LearnerError> {
     milestones.reverse();
     milestones.dedup_by_key(|milestone| milestone.iteration);
     milestones.reverse();
-    Ok(milestones)
+    milestones
 }
 
 /// What is known of some trials without asking the learner: the best when each was proposed. Iterations are those of

@@ -1,5 +1,6 @@
 //! What a study needs next, as a pure function of where it stands.
 
+use super::belief::Beliefs;
 use super::choice;
 use super::comparison;
 use super::lifecycle::Act;
@@ -20,8 +21,8 @@ pub(super) enum Step {
     Try(NewTrial),
 }
 
-/// Decides it, from the standing alone.
-pub(super) fn next_step(standing: &Standing) -> Result<Step, Error> {
+/// Decides it, from the standing alone: `beliefs` spares computing what is known.
+pub(super) fn next_step(standing: &Standing, beliefs: &Beliefs) -> Result<Step, Error> {
     let study = &standing.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
         let open = comparison::open_question(standing).map_err(Error::Learner)?.is_some();
@@ -53,7 +54,8 @@ pub(super) fn next_step(standing: &Standing) -> Result<Step, Error> {
     if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
         return Ok(Step::Nothing);
     }
-    match choice::next_trial(standing) {
+    let belief = beliefs.posterior(standing).map_err(Error::Learner)?;
+    match choice::next_trial(standing, &belief) {
         Ok(new) => Ok(Step::Try(new)),
         Err(e) if e.is_exhausted() && open == 0 => {
             Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
@@ -84,7 +86,8 @@ pub(super) fn likely_next(standing: &Standing) -> Result<Vec<NewTrial>, Error> {
             created_at: now(),
             retraction: None,
         });
-        if let Step::Try(new) = next_step(&then)?
+        // What is believed of answers that nobody gave is not kept.
+        if let Step::Try(new) = next_step(&then, &Beliefs::default())?
             && !likely
                 .iter()
                 .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))

@@ -1,5 +1,6 @@
 //! What the certificate of a recommended gait says: nothing is recommended silently whose certificate failed.
 
+use super::belief::Beliefs;
 use super::choice;
 use super::examination;
 use super::standing::Standing;
@@ -143,8 +144,8 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
 ///
 /// # Errors
 /// What learner and database report.
-pub async fn examine(store: &Store, actor: &Actor, standing: &Standing) -> Result<Judged, Error> {
-    let ranking = choice::ranking(standing).map_err(Error::Learner)?;
+pub async fn examine(store: &Store, actor: &Actor, standing: &Standing, beliefs: &Beliefs) -> Result<Judged, Error> {
+    let ranking = choice::ranking_to_show(standing, beliefs).map_err(Error::Learner)?;
     let mut refused = BTreeSet::new();
     while let Some(trial) = next_to_examine(&mut *store.read().await?, &ranking, &refused).await? {
         let begun = examination::begin(&mut *store.read().await?, trial).await?;

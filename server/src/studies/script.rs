@@ -3,7 +3,8 @@
 //! A suggestion is sticky: who asks again before telling gets the same trial. What is computed is computed before the
 //! transaction, and written only if the study is still where it was.
 
-use super::choice;
+use super::belief::Beliefs;
+use super::choice::{self, ChoiceError};
 use super::comparison::{by_gait_rmse, partners};
 use super::standing::Standing;
 use crate::access::Caller;
@@ -16,6 +17,7 @@ use crate::store::trials::{NewTrial, Told, Trial, TrialState};
 use crate::store::{Connection, StudyId, TrialId, Writer, events, feedback, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// Asking for a trial.
@@ -41,7 +43,13 @@ pub enum Suggestion {
 ///
 /// # Errors
 /// [`Error::Conflict`] when the study gives out no trial now, [`Error::Invalid`] for the worker's name.
-pub async fn suggest(db: &mut Connection, study: StudyId, worker: &str) -> Result<Suggestion, Error> {
+pub async fn suggest(
+    db: &mut Connection,
+    study: StudyId,
+    worker: &str,
+    beliefs: &Arc<Beliefs>,
+) -> Result<Suggestion, Error> {
+    let beliefs = Arc::clone(beliefs);
     let worker = printable::name("worker", worker, 80)?;
     let study = studies::get(db, study).await?;
     if study.plan.evaluation != Evaluation::Script {
@@ -65,7 +73,8 @@ pub async fn suggest(db: &mut Connection, study: StudyId, worker: &str) -> Resul
         return Err(Error::conflict(format!("{} trials are open already: tell what they gave first", standing.open())));
     }
     let (standing, chosen) = tokio::task::spawn_blocking(move || {
-        let chosen = choice::next_trial(&standing);
+        let believed = beliefs.posterior(&standing).map_err(ChoiceError::Learner);
+        let chosen = believed.and_then(|belief| choice::next_trial(&standing, &belief));
         (standing, chosen)
     })
     .await
@@ -73,8 +82,8 @@ pub async fn suggest(db: &mut Connection, study: StudyId, worker: &str) -> Resul
     match chosen {
         Ok(new) => Ok(Suggestion::New(Box::new(standing), Box::new(new))),
         Err(e) if e.is_exhausted() => Err(Error::conflict("every action of the search space was tried")),
-        Err(choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
-        Err(choice::ChoiceError::Bounds(e)) => Err(e.into()),
+        Err(ChoiceError::Learner(e)) => Err(Error::Learner(e)),
+        Err(ChoiceError::Bounds(e)) => Err(e.into()),
     }
 }
 

@@ -63,11 +63,6 @@ impl Standing {
         self.trials.iter().find(|trial| trial.state.is_result() && trial.action_index == action)
     }
 
-    /// Whether a trial converged and nobody called its gait unsafe.
-    pub fn may_be_recommended(&self, id: TrialId) -> bool {
-        self.trial(id).is_some_and(|trial| trial.state == TrialState::Converged) && !self.objections.closes(id)
-    }
-
     /// Whether people are to answer the comparisons and no answer of theirs stands.
     pub fn waits_for_first_answer(&self) -> bool {
         let answered = |row: &FeedbackRow| {

@@ -1,12 +1,10 @@
 //! A study in one document: what `tune --json` prints, a contract for scripts.
 
-use super::choice::best_trial;
 use super::recommended::{CertificateState, Judged};
 use super::standing::Standing;
 use crate::store::studies::StudyState;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{StudyId, TrialId};
-use gait_learner::LearnerError;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use serde::Serialize;
 
@@ -62,13 +60,10 @@ pub struct TrialSummary {
     pub warm_started_from: Option<u32>,
 }
 
-/// The summary of a study, with what is known of its certificates.
-///
-/// # Errors
-/// When the learner refuses the log.
-pub fn of(standing: &Standing, judged: Judged) -> Result<Summary, LearnerError> {
-    let best = best_trial(standing)?.and_then(|id| standing.trial(id));
-    Ok(Summary {
+/// The summary of a study and its best trial, with what is known of its certificates.
+pub fn of(standing: &Standing, best: Option<TrialId>, judged: Judged) -> Summary {
+    let best = best.and_then(|id| standing.trial(id));
+    Summary {
         study_id: standing.study.id,
         state: standing.study.state,
         best_trial: best.map(|trial| trial.number),
@@ -79,7 +74,7 @@ pub fn of(standing: &Standing, judged: Judged) -> Result<Summary, LearnerError> 
         best_objections: judged.objections,
         passing: judged.passing.and_then(|id| standing.trial(id)).map(|trial| line(trial, &standing.trials)),
         trials: standing.trials.iter().map(|trial| line(trial, &standing.trials)).collect(),
-    })
+    }
 }
 
 /// The number of a trial.

@@ -1,6 +1,7 @@
 //! axe-core: accessibility rules that are not ours.
 
 use crate::chromium::Tab;
+use gaitwright_tests::skipped::skipped;
 use std::path::{Path, PathBuf};
 
 /// The rules as a script. It is not ours to give on: `.ci/run` brings it.
@@ -15,7 +16,7 @@ impl Axe {
             return Some(Self(script));
         }
         assert!(std::env::var_os("GAITWRIGHT_REQUIRE_AXE").is_none(), "no axe-core at {}", file.display());
-        eprintln!("skipped: no axe-core at {}", file.display());
+        skipped(&format!("no axe-core at {}", file.display()));
         None
     }
 

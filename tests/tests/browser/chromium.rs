@@ -16,6 +16,7 @@ use chromiumoxide::page::ScreenshotParams;
 use chromiumoxide::types::MethodId;
 use chromiumoxide::{Command, Method};
 use futures_util::StreamExt;
+use gaitwright_tests::skipped::skipped;
 use serde::Serialize;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -57,7 +58,7 @@ impl Chromium {
     pub(crate) async fn launch() -> Option<Self> {
         let Some(executable) = PLACES.into_iter().find(|place| Path::new(place).exists()) else {
             assert!(std::env::var_os("GAITWRIGHT_REQUIRE_BROWSER").is_none(), "no Chromium is installed");
-            eprintln!("skipped: no Chromium is installed");
+            skipped("no Chromium is installed");
             return None;
         };
         let profile = tempfile::tempdir().unwrap();

@@ -13,6 +13,7 @@ use super::unattended::{self, Lines};
 use crate::error::Error;
 use crate::store::studies::{self, Study, StudyState};
 use crate::store::{Store, commit, gaits, reference_gaits};
+use crate::studies::belief::Beliefs;
 use crate::studies::catalogue;
 use crate::studies::choice::best_trial;
 use crate::studies::history;
@@ -23,6 +24,7 @@ use clap::{Args, ValueEnum};
 use comparison::Outcome;
 use gait_optimizer::{ReferenceGait, Subject};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Subjects of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -124,8 +126,8 @@ impl Reproduce {
                     let title = format!("subject {subject}, {words} muscles, seed {seed}");
                     tell(&title);
                     let (study, finished) = Box::pin(self.study(store, subject, muscles, seed, reference)).await?;
-                    let standing = if finished {
-                        Standing::read(&mut *store.read().await?, study).await?
+                    let (standing, beliefs) = if finished {
+                        (Standing::read(&mut *store.read().await?, study).await?, Arc::default())
                     } else {
                         let ran = unattended::run(store, &study, 1, Lines::Progress).await?;
                         if ran.interrupted {
@@ -135,11 +137,12 @@ impl Reproduce {
                             let why = unattended::failure(&ran.standing).unwrap_or_default();
                             return Err(Error::Internal(format!("{title}: {why}; nothing is compared")));
                         }
-                        ran.standing
+                        (ran.standing, ran.beliefs)
                     };
                     failures.extend(unattended::failure(&standing).map(|failure| format!("{title}: {failure}")));
-                    let judged = unattended::examined(store, &standing).await?;
-                    outcomes.push(outcome(store, subject, muscles, seed, &standing, judged, reference).await?);
+                    let judged = unattended::examined(store, &standing, &beliefs).await?;
+                    outcomes
+                        .push(outcome(store, subject, muscles, seed, &standing, &beliefs, judged, reference).await?);
                 }
             }
         }
@@ -182,17 +185,21 @@ impl Reproduce {
 }
 
 /// What a study came to.
+#[allow(clippy::too_many_arguments)] // what is compared, and where from
 async fn outcome(
     store: &Store,
     subject: u32,
     muscles: bool,
     seed: u64,
     standing: &Standing,
+    beliefs: &Beliefs,
     judged: Judged,
     reference: &ReferenceGait,
 ) -> Result<Outcome, Error> {
-    let milestones = history::of(standing).map_err(Error::Learner)?;
-    let best = best_trial(standing).map_err(Error::Learner)?.and_then(|id| standing.trial(id));
+    let belief = beliefs.posterior(standing).map_err(Error::Learner)?;
+    let best = best_trial(standing, &belief).map_err(Error::Learner)?;
+    let milestones = history::of(standing, best);
+    let best = best.and_then(|id| standing.trial(id));
     let gait = match best {
         Some(trial) => Some(gaits::get(&mut *store.read().await?, trial.id).await?),
         None => None,

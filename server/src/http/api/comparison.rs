@@ -8,12 +8,14 @@ use crate::http::may::May;
 use crate::store::studies::{self, StudyState};
 use crate::store::trials::{self, TrialCounts};
 use crate::store::{Connection, StudyId, consents, schema};
-use crate::studies::choice::best_to_show;
+use crate::studies::belief::Beliefs;
+use crate::studies::choice::ranking_to_show;
 use crate::studies::standing::Standing;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// Most studies that are compared at once.
@@ -70,23 +72,23 @@ pub(super) async fn get(
     let mut rows = Vec::with_capacity(named.len());
     for id in named {
         let id = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
-        rows.push(row(&mut reader, id).await?);
+        rows.push(row(&mut reader, id, Arc::clone(&app.beliefs)).await?);
     }
     Ok(Json(rows))
 }
 
-async fn row(db: &mut Connection, id: StudyId) -> Result<Compared, Error> {
+async fn row(db: &mut Connection, id: StudyId, beliefs: Arc<Beliefs>) -> Result<Compared, Error> {
     let study = studies::get(db, id).await?;
     consents::may_be_shown(db, id).await?;
     let counts = trials::counts(db, id).await?;
     let standing = Standing::read(db, study).await?;
     let (standing, best) = tokio::task::spawn_blocking(move || {
-        let best = best_to_show(&standing);
+        let best = ranking_to_show(&standing, &beliefs);
         (standing, best)
     })
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
-    let best = best.map_err(Error::Learner)?.and_then(|id| standing.trial(id));
+    let best = best.map_err(Error::Learner)?.first().and_then(|id| standing.trial(*id));
     Ok(Compared {
         id,
         name: standing.study.plan.name.clone(),

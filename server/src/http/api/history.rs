@@ -7,12 +7,14 @@ use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::shown::Shown;
 use crate::store::{StudyId, studies};
+use crate::studies::choice::ranking_to_show;
 use crate::studies::history::{self, Milestone};
 use crate::studies::standing::Standing;
 use axum::Json;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Response};
+use std::sync::Arc;
 
 /// `GET /studies/{id}/history`.
 #[utoipa::path(
@@ -55,10 +57,12 @@ async fn read(app: &AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
-    tokio::task::spawn_blocking(move || history::of(&standing))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))?
-        .map_err(Error::Learner)
+    let beliefs = Arc::clone(&app.beliefs);
+    let compute = move || {
+        let best = ranking_to_show(&standing, &beliefs)?.first().copied();
+        Ok(history::of(&standing, best))
+    };
+    tokio::task::spawn_blocking(compute).await.map_err(|e| Error::Internal(e.to_string()))?.map_err(Error::Learner)
 }
 
 fn table(study: StudyId, history: &[Milestone]) -> Result<Response, Error> {

@@ -8,7 +8,7 @@ use crate::http::negotiate::csv_answer;
 use crate::http::shown::Shown;
 use crate::store::trials::Trial;
 use crate::store::{StudyId, TrialId, schema, studies};
-use crate::studies::choice::ranking;
+use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended::{self, CertificateState};
 use crate::studies::standing::Standing;
 use axum::Json;
@@ -16,6 +16,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::TunedBounds;
 use serde::Serialize;
+use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// The best action of a study so far.
@@ -123,8 +124,10 @@ async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
+    let beliefs = Arc::clone(&app.beliefs);
     let (standing, ranking) = tokio::task::spawn_blocking(move || {
-        let ranking = if standing.waits_for_first_answer() { Ok(Vec::new()) } else { ranking(&standing) };
+        let unanswered = standing.waits_for_first_answer();
+        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(&standing, &beliefs) };
         (standing, ranking)
     })
     .await

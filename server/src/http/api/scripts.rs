@@ -32,7 +32,7 @@ pub(super) async fn ask(
 ) -> Result<Response, Error> {
     let worker = ask.worker.as_deref().unwrap_or(&once.caller.name).trim();
     for _ in 0..TRIES {
-        let suggestion = script::suggest(&mut *app.read().await?, id, worker).await;
+        let suggestion = script::suggest(&mut *app.read().await?, id, worker, &app.beliefs).await;
         let mut writer = match once.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),

@@ -17,12 +17,14 @@ use crate::store::{
     Connection, LabSessionId, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials,
 };
 use crate::studies::answer;
+use crate::studies::belief::Beliefs;
 use crate::studies::lab::{self, LimitCycles, SessionView};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// So many of the newest studies are offered for the second place.
 const OFFERED: u32 = 200;
@@ -65,10 +67,11 @@ struct Best {
 }
 
 impl Best {
-    async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
+    async fn read(db: &mut Connection, id: StudyId, beliefs: &Arc<Beliefs>) -> Result<Self, Error> {
+        let beliefs = Arc::clone(beliefs);
         let side = Side::read(db, id).await?;
         let (side, figures) = tokio::task::spawn_blocking(move || {
-            let figures = side.figures();
+            let figures = side.figures(&beliefs);
             (side, figures)
         })
         .await
@@ -105,9 +108,9 @@ async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Option<Gait>, Error
 /// A conflict when the subject of one of them withdrew, [`Error::NotFound`], or what the database reports.
 pub(crate) async fn of_study(app: &AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
     let mut reader = app.read().await?;
-    let mut shown = vec![Best::read(&mut reader, id).await?];
+    let mut shown = vec![Best::read(&mut reader, id, &app.beliefs).await?];
     if let Some(other) = other.filter(|other| *other != id) {
-        shown.push(Best::read(&mut reader, other).await?);
+        shown.push(Best::read(&mut reader, other, &app.beliefs).await?);
     }
     let reference = shown[0].side.standing.study.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;

@@ -13,12 +13,14 @@ use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
+use crate::studies::belief::Beliefs;
 use crate::studies::choice::MANY;
 use crate::studies::standing::Standing;
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// So many of the newest studies are offered, and of the newest trials of a large one drawn.
 const OFFERED: u32 = 200;
@@ -66,8 +68,9 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(choice
         (Some(a), Some(b)) => {
             let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);
             drop(reader);
+            let beliefs = Arc::clone(&app.beliefs);
             Some(
-                tokio::task::spawn_blocking(move || compare(a, b))
+                tokio::task::spawn_blocking(move || compare(a, b, &beliefs))
                     .await
                     .map_err(|e| Error::Internal(e.to_string()))??,
             )
@@ -98,8 +101,8 @@ impl Side {
         Ok(Self { standing, subject, counts })
     }
 
-    pub(super) fn figures(&self) -> Result<Figures, Error> {
-        figures(&self.standing, self.counts.total as usize >= MANY).map_err(Error::Learner)
+    pub(super) fn figures(&self, beliefs: &Beliefs) -> Result<Figures, Error> {
+        figures(&self.standing, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
     }
 
     /// What the study is, and what it found.
@@ -130,8 +133,8 @@ impl Side {
     }
 }
 
-fn compare(a: Side, b: Side) -> Result<Compared, Error> {
-    let (of_a, of_b) = (a.figures()?, b.figures()?);
+fn compare(a: Side, b: Side, beliefs: &Beliefs) -> Result<Compared, Error> {
+    let (of_a, of_b) = (a.figures(beliefs)?, b.figures(beliefs)?);
     let chart = course(&[(&a.standing, &of_a), (&b.standing, &of_b)]).map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.standing.study.id);
         Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.standing.study.id))

@@ -23,8 +23,9 @@ use crate::store::{
     Instant, StudyId, TrialId, commit, consents, devices, events, gaits, presentations, reference_gaits, studies,
     trials,
 };
+use crate::studies::belief::Beliefs;
 use crate::studies::change::{self, Extend};
-use crate::studies::choice::{MANY, best_to_show, last_believed, ranking};
+use crate::studies::choice::{MANY, last_believed, ranking_to_show};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
@@ -40,6 +41,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
 use std::cmp::Reverse;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 #[derive(Template)]
 #[template(path = "study.html")]
@@ -316,8 +318,9 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
     let remarks = remarks::of_study(&mut reader, id).await?;
     drop(reader);
+    let beliefs = Arc::clone(&app.beliefs);
     let (standing, figures) = tokio::task::spawn_blocking(move || {
-        let figures = figures(&standing, large);
+        let figures = figures(&standing, large, &beliefs);
         (standing, figures)
     })
     .await
@@ -342,7 +345,11 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     Ok(view(standing, counts, &figures, running, table, answers, caller.may(Run::NEEDED)))
 }
 
-pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_learner::LearnerError> {
+pub(super) fn figures(
+    standing: &Standing,
+    large: bool,
+    beliefs: &Beliefs,
+) -> Result<Figures, gait_learner::LearnerError> {
     if large {
         // Of many trials not all were read: what the learner last believed stands for the posterior.
         let best = last_believed(standing);
@@ -354,7 +361,9 @@ pub(super) fn figures(standing: &Standing, large: bool) -> Result<Figures, gait_
     if standing.waits_for_first_answer() {
         return Ok(Figures { unanswered: true, question, ..Figures::default() });
     }
-    let (best, ranking, history) = (best_to_show(standing)?, ranking(standing)?, history::of(standing)?);
+    let ranking = ranking_to_show(standing, beliefs)?;
+    let best = ranking.first().copied();
+    let history = history::of(standing, best);
     Ok(Figures { best, ranking, history, question, ..Figures::default() })
 }
 
