@@ -7,6 +7,10 @@ const live = /** @type {HTMLElement | null} */ (document.getElementById("live"))
 
 /** Shortest time between two looks at a running solve, ms. */
 const PAUSE = 500;
+/** Time before listening anew to a service that could not answer, ms. */
+const AGAIN = 3000;
+/** What is recorded of a study and changes its page. */
+const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined"];
 
 /**
  * Replaces what changed and leaves the rest, its focus and its scroll position alone.
@@ -35,28 +39,13 @@ function update(shown, fresh) {
 
 if (live) {
   const study = live.dataset.study;
-  const source = new EventSource(`/api/v1/studies/${study}/events?after=${live.dataset.after}`);
+  let after = live.dataset.after;
   const connection = /** @type {HTMLElement} */ (document.querySelector("[data-connection]"));
   const announced = /** @type {HTMLElement} */ (document.querySelector("[data-announced]"));
   const state = () => live.querySelector("[data-part=state] .state")?.textContent ?? "";
   let last = state();
   let pending = false;
   let again = false;
-
-  // What is shown was true when the service was last heard of.
-  source.addEventListener("error", () => {
-    if (!connection.hidden && source.readyState !== EventSource.CLOSED) return;
-    const since = new Date().toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-    const next = source.readyState === EventSource.CLOSED ? "load the page again" : "trying again";
-    connection.textContent = `No connection to the service since ${since}: ${next}.`;
-    connection.hidden = false;
-    live.classList.add("stale");
-  });
-  source.addEventListener("open", () => {
-    connection.hidden = true;
-    live.classList.remove("stale");
-    void refresh();
-  });
 
   /** Brings what changed; asked for meanwhile, once more afterwards. */
   const refresh = async () => {
@@ -112,13 +101,10 @@ if (live) {
     filtered();
   });
 
-  for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined"]) {
-    source.addEventListener(kind, () => void refresh());
-  }
-
   /** @type {Map<string, number>} When each running solve was last looked at. */
   const looked = new Map();
-  source.addEventListener("progress", async (event) => {
+  /** @param {MessageEvent} event */
+  const follow = async (event) => {
     const { trial_id: trial } = JSON.parse(event.data);
     const now = performance.now();
     if (now - (looked.get(trial) ?? -Infinity) < PAUSE) return;
@@ -130,5 +116,33 @@ if (live) {
       const next = fresh.querySelector(part);
       if (next) live.querySelector(`[data-trial="${trial}"] ${part}`)?.replaceWith(next);
     }
-  });
+  };
+
+  /** Listens, and says when there is nothing to be heard: what is shown was true when the service was last heard of. */
+  const listen = () => {
+    const source = new EventSource(`/api/v1/studies/${study}/events?after=${after}`);
+    for (const kind of RECORDED) {
+      source.addEventListener(kind, (event) => {
+        after = event.lastEventId || after;
+        void refresh();
+      });
+    }
+    source.addEventListener("progress", follow);
+    source.addEventListener("open", () => {
+      if (connection.hidden) return;
+      connection.hidden = true;
+      live.classList.remove("stale");
+      void refresh();
+    });
+    source.addEventListener("error", () => {
+      // A browser tries again by itself, but not when the service answered that it cannot.
+      if (source.readyState === EventSource.CLOSED) setTimeout(listen, AGAIN);
+      if (!connection.hidden) return;
+      const since = new Date().toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+      connection.textContent = `No connection to the service since ${since}: trying again.`;
+      connection.hidden = false;
+      live.classList.add("stale");
+    });
+  };
+  listen();
 }
