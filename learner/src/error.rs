@@ -17,6 +17,18 @@ pub enum LearnerError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A lengthscale at which an action would tell nothing of another, or all actions would be the same.
+    #[error("dimension `{dimension}`: lengthscale {lengthscale} is not between {shortest} and {longest}")]
+    InvalidLengthscale {
+        /// Name of the dimension.
+        dimension: String,
+        /// The lengthscale given.
+        lengthscale: f64,
+        /// The shortest that is accepted, to three digits.
+        shortest: f64,
+        /// The longest.
+        longest: f64,
+    },
     /// The grid has more actions than an [`ActionIndex`] may count.
     #[error("the search space has more than {limit} actions")]
     TooManyActions {

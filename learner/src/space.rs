@@ -35,6 +35,11 @@ pub struct Dimension {
     pub lengthscale: f64,
 }
 
+/// For people: the last digits of a product of decimal fractions are noise.
+fn to_three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
 impl Dimension {
     fn validate(&self) -> Result<()> {
         let refuse = |reason: String| Err(LearnerError::InvalidDimension { dimension: self.name.clone(), reason });
@@ -60,7 +65,12 @@ impl Dimension {
             _ => (SHORTEST_LENGTHSCALE * nearest, LONGEST_LENGTHSCALE * self.range()),
         };
         if !(self.lengthscale >= shortest && self.lengthscale <= longest) {
-            return refuse(format!("lengthscale {} is not between {shortest:e} and {longest:e}", self.lengthscale));
+            return Err(LearnerError::InvalidLengthscale {
+                dimension: self.name.clone(),
+                lengthscale: self.lengthscale,
+                shortest: to_three_digits(shortest),
+                longest: to_three_digits(longest),
+            });
         }
         Ok(())
     }

@@ -207,7 +207,7 @@ fn muscles(cycle: &Cycle<'_>) -> Group {
         for (part, muscles) in MUSCLE_GROUPS {
             let mut chart = Chart::new(&format!("{what}, {part}"), CYCLE, unit);
             for (place, &muscle) in muscles.iter().enumerate() {
-                let stroke = if place % 2 == 1 { Stroke::Dashed } else { Stroke::Solid };
+                let stroke = Stroke::APART[place % Stroke::APART.len()];
                 let state = |p: &Point<'_>| if what == "Activation" { p.activation } else { p.fibre_length }.copied();
                 let line = cycle.over(|p| state(p).map_or(f64::NAN, |values| values[muscle]));
                 chart = chart.with(MUSCLES[muscle], place, stroke, line);

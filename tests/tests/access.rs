@@ -9,6 +9,7 @@ use gaitwright::access::{Right, Role, people, secret};
 use gaitwright::http::{Access, openapi};
 use gaitwright::store::audit::{self, Actor};
 use gaitwright::store::commit;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::callers::{As, FORM, send, service, session_of, signed_in, token, user};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
@@ -148,8 +149,12 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
             for (who, rights) in &callers {
                 let answer = send(&service, who, &method, &address, FORM, "").await;
                 let what = format!("{entry} as {who:?}: {}", answer.status);
-                if rights.contains(needed) {
+                if entry == "get /" && rights.contains(&Right::Rate) && !rights.contains(needed) {
+                    assert_eq!(answer.headers["location"], "/rate", "{what}");
+                } else if rights.contains(needed) {
                     assert!(!matches!(answer.status, StatusCode::SEE_OTHER | StatusCode::FORBIDDEN), "{what}");
+                } else if matches!(who, As::Nobody) && method == Method::POST {
+                    assert_eq!(answer.status, StatusCode::UNAUTHORIZED, "{what}");
                 } else if matches!(who, As::Nobody) {
                     assert_eq!(answer.headers["location"], "/sign-in", "{what}");
                 } else {
@@ -157,6 +162,69 @@ async fn every_page_is_shown_to_those_who_may_see_it() {
                 }
             }
         }
+    }
+    service.stop().await;
+}
+
+/// The fields of the first form of a page, as a browser would send them.
+fn hidden_fields(page: &str) -> Vec<(String, String)> {
+    let unescaped = |text: &str| text.replace("&#38;", "&").replace("&#34;", "\"").replace("&#39;", "'");
+    let value = |tag: &str, name: &str| Some(tag.split(&format!("{name}=\"")).nth(1)?.split('"').next()?.to_owned());
+    let hidden = page.split("<input type=\"hidden\" ").skip(1);
+    hidden.map(|tag| (value(tag, "name").unwrap(), unescaped(&value(tag, "value").unwrap()))).collect()
+}
+
+/// As a form sends them.
+fn form_of(fields: &[(String, String)]) -> String {
+    let coded = |text: &str| text.bytes().map(|byte| format!("%{byte:02X}")).collect::<Vec<_>>().concat();
+    fields.iter().map(|(name, value)| format!("{}={}", coded(name), coded(value))).collect::<Vec<_>>().join("&")
+}
+
+#[tokio::test]
+async fn what_is_sent_after_the_session_has_ended_is_not_stored_and_not_lost() {
+    let (_folder, mut service) = service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 3)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let (rater, _) = user(&service, "R1", Role::Rater).await;
+    let mut writer = service.store.write().await.unwrap();
+    let hashed = secret::hash_password("correct horse battery").unwrap();
+    people::set_password(&mut writer, &Actor::program(), rater, &hashed).await.unwrap();
+    commit(writer).await.unwrap();
+    let credentials = "name=R1&password=correct+horse+battery";
+    let session = session_of(&send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, credentials).await);
+    let taken = send(&service, &session, &Method::POST, &format!("/rate/{study}"), FORM, "").await;
+    let pair = taken.headers["location"].to_str().unwrap().to_owned();
+
+    service.access = Arc::new(Access::by_sign_in(0.0));
+    let answer = "response_ms=900&answer=first&note=%22steady%22+%26+calm";
+    let refused = send(&service, &session, &Method::POST, &pair, FORM, answer).await;
+    assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
+    assert!(refused.text.contains("nothing of what you sent was stored"), "{}", refused.text);
+    service.access = Arc::new(Access::by_sign_in(3600.0));
+    let heard = service.feedback(study).await.len();
+
+    // A wrong password does not lose it either.
+    let carried = form_of(&hidden_fields(&refused.text));
+    let wrong =
+        send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &format!("name=R1&password=x&{carried}")).await;
+    assert_eq!((wrong.status, hidden_fields(&wrong.text)), (StatusCode::UNAUTHORIZED, hidden_fields(&refused.text)));
+    let signed_in =
+        send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &format!("{credentials}&{carried}")).await;
+    assert!(signed_in.text.contains(&format!("action=\"{pair}\"")), "{}", signed_in.text);
+    assert_eq!(service.feedback(study).await.len(), heard, "signing in stores no answer");
+    let body = form_of(&hidden_fields(&signed_in.text));
+    let saved = send(&service, &session_of(&signed_in), &Method::POST, &pair, FORM, &body).await;
+    assert_eq!(saved.status, StatusCode::SEE_OTHER, "{}", saved.text);
+    let row = service.feedback(study).await.pop().unwrap();
+    assert_eq!((row.author.as_str(), row.note.as_str()), ("R1", "\"steady\" & calm"));
+
+    // A new password is not carried about, nor is anything to another site.
+    let account = send(&service, &As::Nobody, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    assert!(account.status == StatusCode::UNAUTHORIZED && !account.text.contains("correct"), "{}", account.text);
+    for elsewhere in ["https://example.org/", "//example.org/", "/\\example.org/"] {
+        let body = format!("{credentials}&to={elsewhere}&fields=a%3Db");
+        let there = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, &body).await;
+        assert_eq!(there.headers["location"], "/rate");
     }
     service.stop().await;
 }

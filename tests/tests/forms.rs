@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
 use gaitwright::store::{StudyId, TrialId};
 use gaitwright_tests::analytic::Analytic;
@@ -50,7 +50,7 @@ async fn errors_in_the_browser_are_pages_and_problem_documents_for_programs() {
         (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
         ("/nothing".to_owned(), StatusCode::NOT_FOUND),
     ] {
-        is_page(&service.fetch(&path).await, status, "Back to the studies");
+        is_page(&service.fetch(&path).await, status, "Back to the first page");
     }
     let wrong_method = service.post("/api/v1/health", &json!({})).await;
     assert_eq!(wrong_method.status, StatusCode::METHOD_NOT_ALLOWED);
@@ -148,7 +148,7 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
         ("trial_budget", "-1", "allowed: 1 to 10000"),
         ("parallel_trials", "1.5", "allowed: 1 to 64"),
         ("seed", "-1", "allowed: 0 to 9007199254740991"),
-        ("basin_within_percent", "101", "basin_within_percent: \"101\" is not accepted; allowed: 0 to 100, or nothing"),
+        ("basin_within_percent", "101", "within, %: \"101\" is not accepted; allowed: 0 to 100, or nothing"),
         ("basin_within_percent", "all", "allowed: 0 to 100, or nothing"),
         ("subject", "paper-1", "a subject of the list"),
         ("pseudonym", "S09", "A new subject"),
@@ -212,6 +212,47 @@ async fn a_form_that_is_sent_again_with_another_answer_says_which_one_counts() {
     assert!(other.text.contains("Recorded") && other.text.contains(" over "), "the stored answer is shown");
     assert!(other.text.contains("value=\"b\" checked") && other.text.contains("firm</textarea>"), "{}", other.text);
     assert_eq!(service.feedback(study).await.len(), before + 1);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_second_answer_from_a_page_shown_before_the_first_is_refused() {
+    let (_folder, service) = service().await;
+    let (study, a, b) = finished(&service).await;
+    let path = format!("/studies/{study}/compare");
+    let key = |number: u32| format!("01890000-0000-7000-8000-{number:012}");
+    let shown = async || {
+        let page = service.fetch(&format!("{path}?a={a}&b={b}")).await.text;
+        page.split("name=\"shown\" value=\"").nth(1).unwrap().split('"').next().unwrap().to_owned()
+    };
+    let send = async |pair: &str, answer: &str, shown: &str, number: u32| {
+        let body = format!("{pair}&answer={answer}&source=clinician&author=K&note=&key={}&shown={shown}", key(number));
+        service.post_text(&path, FORM, &body).await
+    };
+    let (ahead, turned) = (format!("a={a}&b={b}"), format!("a={b}&b={a}"));
+    let (one, other) = (shown().await, shown().await);
+    let before = service.feedback(study).await.len();
+    let first = send(&ahead, "a", &one, 1).await;
+    assert_eq!(first.status, StatusCode::SEE_OTHER);
+    // The other tab, also with the gaits the other way round, and also when it is pressed again.
+    for (pair, answer, number) in [(&ahead, "b", 2), (&turned, "a", 3), (&ahead, "unsafe_a", 4), (&ahead, "b", 2)] {
+        let second = send(pair, answer, &other, number).await;
+        is_page(&second, StatusCode::CONFLICT, "in another tab or window");
+        assert!(second.text.contains("Recorded") && second.text.contains(" over "), "{}", second.text);
+        assert!(second.text.contains(&format!("name=\"shown\" value=\"{other}\"")), "it stays the same page");
+    }
+    assert_eq!(service.feedback(study).await.len(), before + 1);
+    // Taken back, it does not stand in the way.
+    let saved = first.headers["location"].to_str().unwrap().split("saved=").nth(1).unwrap().to_owned();
+    let back = format!("saved={saved}&author=K&reason=slip");
+    assert_eq!(
+        service.post_text(&format!("/studies/{study}/retract"), FORM, &back).await.status,
+        StatusCode::SEE_OTHER
+    );
+    assert_eq!(send(&ahead, "cannot_tell", &other, 5).await.status, StatusCode::SEE_OTHER);
+    is_page(&send(&ahead, "b", &other, 6).await, StatusCode::CONFLICT, "cannot tell trial");
+    // A page shown later knows of it.
+    assert_eq!(send(&ahead, "b", &shown().await, 7).await.status, StatusCode::SEE_OTHER);
     service.stop().await;
 }
 
@@ -363,5 +404,84 @@ async fn the_list_of_studies_goes_on_beyond_its_first_page() {
     let second = service.fetch(&format!("/?before={next}")).await.text;
     assert!(second.contains("number 2.") && second.contains("number 0.") && !second.contains("number 3."));
     assert!(second.contains("Newest studies") && !second.contains("Older studies"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_refused_new_study_says_which_field_in_its_own_words_and_opens_it() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let form = |changed: &str| {
+        let given = format!("{changed}&");
+        let rest = ["trial_budget=3", "seed=1", "tuned_a1=on", "values_a1=15,20", "tuned_a3=on"];
+        let rest: Vec<&str> =
+            rest.into_iter().filter(|field| !given.starts_with(field.split_once('=').unwrap().0)).collect();
+        format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
+    };
+    for (changed, field, said) in [
+        ("lengthscale_a1=-5", "lengthscale_a1", "Lengthscale of a1: -5.0 is not accepted; allowed: 0.05 to 50000"),
+        ("lengthscale_a3=0", "lengthscale_a3", "Lengthscale of a3: 0.0 is not accepted; allowed: 0.001 to 2000"),
+        ("values_a1=15,x", "values_a1", "Values of a1: "),
+        ("trial_budget=many", "trial_budget", "Trials: "),
+        ("seed=x", "seed", "Seed: "),
+        ("height_m=1.7", "height_m", "Height, m: "),
+    ] {
+        let refused = service.post_text("/studies/new", FORM, &form(changed)).await;
+        is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, said);
+        let before =
+            refused.text.split(" aria-invalid=\"true\" aria-describedby=\"refused\" autofocus").next().unwrap();
+        assert_ne!(before.len(), refused.text.len(), "{field} is marked");
+        assert!(before.rsplit("name=\"").next().unwrap().starts_with(&format!("{field}\"")), "{changed}: {field}");
+        // Where it was folded away, it is open.
+        let folded = before.matches("<details").count() > before.matches("</details>").count();
+        assert!(!folded || before.rsplit("<details").next().unwrap().split('>').next().unwrap().contains(" open"));
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn what_a_script_told_without_a_gait_offers_no_gait() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 1)).await;
+    let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
+    let trial = trial["id"].as_str().unwrap();
+    let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
+    assert_eq!(service.post(&format!("/api/v1/trials/{trial}/tell"), &told).await.status, StatusCode::OK);
+    service.wait_for(study, &[StudyState::Finished]).await;
+    for page in [format!("/studies/{study}"), format!("/trials/{trial}")] {
+        let shown = service.fetch(&page).await.text;
+        assert!(shown.contains("the gait itself is not here"), "{shown}");
+        for offered in ["See this gait walk", "/gait.csv", "/controller.json", "/certify", "Nobody examined this gait"]
+        {
+            assert!(!shown.contains(offered), "{page}: {offered}");
+        }
+        // Whatever is offered to load is there.
+        let links =
+            shown.split("href=\"").skip(1).map(|rest| rest.split(['"', '#']).next().unwrap().replace("&#38;", "&"));
+        let is_text = |link: &String| ![".png", "/archive"].iter().any(|other| link.contains(other));
+        for link in links.filter(|link| link.starts_with('/') && is_text(link)) {
+            assert!(!service.fetch(&link).await.status.is_client_error(), "{page}: {link}");
+        }
+    }
+    assert_eq!(
+        service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json()["examining"],
+        json!(false)
+    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_study_that_has_ended_gets_more_trials_from_its_page() {
+    let (_folder, service) = service().await;
+    let (study, _, _) = finished(&service).await;
+    let page = service.fetch(&format!("/studies/{study}")).await.text;
+    assert!(page.contains("min=\"6\"") && !page.contains("value=\"stop\""), "{page}");
+    let path = format!("/studies/{study}/do");
+    let same = service.post_text(&path, FORM, "act=extend&trial_budget=5").await;
+    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "trial_budget");
+    is_page(&service.post_text(&path, FORM, "act=extend").await, StatusCode::UNPROCESSABLE_ENTITY, "how many trials");
+    assert_eq!(service.post_text(&path, FORM, "act=extend&trial_budget=7").await.status, StatusCode::SEE_OTHER);
+    service.wait_for_trials(study, 7).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
 }

@@ -45,13 +45,24 @@ async fn a_study_without_a_gait_has_no_best_trial() {
     };
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    assert!(service.trials(study).await.iter().all(|trial| trial.state == TrialState::NotConverged));
+    let trials = service.trials(study).await;
+    assert!(trials.iter().all(|trial| trial.state == TrialState::NotConverged));
     assert_eq!(ranked(&service, study).await, []);
     let api = format!("/api/v1/studies/{study}");
     assert_eq!(service.fetch(&format!("{api}/history")).await.json(), json!([]));
     assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(!page.contains("the best so far") && !page.contains(">best<"), "{page}");
+    // Figures of a last iterate are no figures of a gait.
+    assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
+    let table = service.fetch(&format!("{api}/trials.csv")).await.text;
+    let column = table.lines().next().unwrap().split(',').position(|name| name == "gait_rmse_rad").unwrap();
+    assert!(table.lines().skip(1).all(|line| line.split(',').nth(column) == Some("")), "{table}");
+    let rmse = format!("{:.4}", trials[0].report.as_ref().unwrap().gait_rmse_rad);
+    for page in [format!("/studies/{study}?sort=gait_rmse_rad"), format!("/trials/{}", trials[0].id), "/".to_owned()] {
+        let shown = service.fetch(&page).await.text;
+        assert!(!shown.contains(&rmse), "{page}: {shown}");
+    }
     service.stop().await;
 }
 

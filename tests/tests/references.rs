@@ -177,3 +177,29 @@ fn body_with(body: &Value, recording: &str) -> Value {
     body["recording"] = json!(recording);
     body
 }
+
+#[tokio::test]
+async fn a_new_study_takes_the_reference_gait_nearest_to_its_subject() {
+    let (_folder, service) = service().await;
+    let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
+    let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await.json();
+    let form = "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on";
+    let kind = "application/x-www-form-urlencoded";
+    let known = format!("{form}&subject={}&reference_gait=", service.subject().await);
+    let tall = format!("{form}&subject=new&pseudonym=S09&height_m=1.98&body_mass_kg=66&reference_gait=");
+    for (body, reference) in [(known, &near), (tall.clone(), &far), (format!("{tall}{}", text(&near["id"])), &near)] {
+        let checked = service.post_text("/studies/new/check", kind, &body).await.json();
+        let shown = text(&checked["reference"]);
+        let is_nearest = body.ends_with('=');
+        assert_eq!(shown.contains(&format!("{}: the nearest", text(&reference["name"]))), is_nearest, "{checked}");
+        assert_eq!(shown.contains("Nearer to the subject in height and body mass: far"), !is_nearest, "{checked}");
+    }
+    let made = service.post_text("/studies/new", kind, &tall).await;
+    let study = made.headers["location"].to_str().unwrap().rsplit('/').next().unwrap().parse().unwrap();
+    assert_eq!(json!(service.get(study).await.plan.reference_gait_id), far["id"]);
+    service.stop().await;
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap()
+}

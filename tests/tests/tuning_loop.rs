@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::{LearnerSettings, Partner};
+use gait_learner::{Dimension, LearnerSettings, Partner, SearchSpace};
 use gaitwright::store::feedback::{Said, Source};
-use gaitwright::store::studies::StudyState;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::{Trial, TrialState};
 use gaitwright::store::{StudyId, trials};
+use gaitwright::studies::comparison::open_question;
 use gaitwright::studies::plan::NewStudy;
+use gaitwright::studies::standing::Standing;
 use gaitwright::workers::{Attempt, InProcess};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::away::Away;
@@ -274,5 +276,32 @@ async fn a_trial_whose_workers_are_never_heard_of_again_is_lost_and_can_be_tried
     assert_eq!(service.post(&path, &json!({})).await.status, StatusCode::OK);
     service.wait_for(study, &[StudyState::Finished]).await;
     assert!(service.trials(study).await.iter().all(|trial| trial.state.is_result()));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn nobody_is_asked_to_compare_a_gait_with_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service
+        .study(|new| {
+            // A bound that changes nothing: every trial that starts from the first gait gives one and the same gait.
+            let acceleration = Dimension { name: "a2".to_owned(), values: vec![70.0, 80.0, 90.0], lengthscale: 10.0 };
+            new.search_space = Some(SearchSpace::new(vec![acceleration]).unwrap());
+            new.learner = LearnerSettings { partner: Partner::Previous, buffer: 1, ..LearnerSettings::default() };
+            (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human);
+        })
+        .await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let [first, second] = service.trials(study).await.try_into().unwrap();
+    let answer = json!({"trial_a": first.id, "trial_b": second.id, "answer": "a", "author": "S01"});
+    service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
+    service.wait_for_trials(study, 3).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let third = service.trials(study).await.remove(2);
+    assert_eq!((third.warm_started_from, second.warm_started_from), (Some(first.id), Some(first.id)));
+    assert_eq!(third.gait_rmse_rad, second.gait_rmse_rad);
+    let standing = Standing::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
+    assert_eq!(open_question(&standing).unwrap(), Some((third.id, first.id)), "the one before is the same gait");
     service.stop().await;
 }

@@ -262,6 +262,7 @@ class Player {
     this.phase.textContent = other
       ? `${percent.toFixed(0)} %`
       : `${percent.toFixed(0)} %, ${time.toFixed(2)} s: ${inWords(frameAt(motion, time).domain)}`;
+    this.scrub.setAttribute("aria-valuetext", this.phase.textContent);
   }
 }
 

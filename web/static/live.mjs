@@ -7,6 +7,10 @@ const live = /** @type {HTMLElement | null} */ (document.getElementById("live"))
 
 /** Shortest time between two looks at a running solve, ms. */
 const PAUSE = 500;
+/** Time before listening anew to a service that could not answer, ms. */
+const AGAIN = 3000;
+/** What is recorded of a study and changes its page. */
+const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined", "trial_explained"];
 
 /**
  * Replaces what changed and leaves the rest, its focus and its scroll position alone.
@@ -19,9 +23,13 @@ function update(shown, fresh) {
     if (!next || next.innerHTML === part.innerHTML) continue;
     const held = part.contains(document.activeElement) ? document.activeElement : null;
     const name = held?.getAttribute("value") ?? held?.textContent;
+    const opened = [...part.querySelectorAll("details[open] > summary")].map((summary) => summary.textContent);
     const across = part.querySelector(".scroll")?.scrollLeft ?? 0;
     part.replaceChildren(...next.childNodes);
     part.querySelector(".scroll")?.scrollTo({ left: across });
+    for (const summary of part.querySelectorAll("details > summary")) {
+      if (opened.includes(summary.textContent)) summary.parentElement?.setAttribute("open", "");
+    }
     if (held) {
       const alike = [...part.querySelectorAll(held.tagName)].find((e) => (e.getAttribute("value") ?? e.textContent) === name);
       /** @type {HTMLElement | undefined} */ (alike)?.focus();
@@ -31,7 +39,11 @@ function update(shown, fresh) {
 
 if (live) {
   const study = live.dataset.study;
-  const source = new EventSource(`/api/v1/studies/${study}/events?after=${live.dataset.after}`);
+  let after = live.dataset.after;
+  const connection = /** @type {HTMLElement} */ (document.querySelector("[data-connection]"));
+  const announced = /** @type {HTMLElement} */ (document.querySelector("[data-announced]"));
+  const state = () => live.querySelector("[data-part=state] .state")?.textContent ?? "";
+  let last = state();
   let pending = false;
   let again = false;
 
@@ -45,6 +57,10 @@ if (live) {
     try {
       const answer = await fetch(`/studies/${study}/live${location.search}`);
       if (answer.ok) update(live, new DOMParser().parseFromString(await answer.text(), "text/html"));
+      if (state() !== last) {
+        last = state();
+        announced.textContent = `The study is now: ${last}.`;
+      }
       // The subject withdrew: what is on this page is not shown any more.
       if (answer.status === 409) location.reload();
     } catch {
@@ -85,13 +101,10 @@ if (live) {
     filtered();
   });
 
-  for (const kind of ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined", "trial_explained"]) {
-    source.addEventListener(kind, () => void refresh());
-  }
-
   /** @type {Map<string, number>} When each running solve was last looked at. */
   const looked = new Map();
-  source.addEventListener("progress", async (event) => {
+  /** @param {MessageEvent} event */
+  const follow = async (event) => {
     const { trial_id: trial } = JSON.parse(event.data);
     const now = performance.now();
     if (now - (looked.get(trial) ?? -Infinity) < PAUSE) return;
@@ -103,5 +116,33 @@ if (live) {
       const next = fresh.querySelector(part);
       if (next) live.querySelector(`[data-trial="${trial}"] ${part}`)?.replaceWith(next);
     }
-  });
+  };
+
+  /** Listens, and says when there is nothing to be heard: what is shown was true when the service was last heard of. */
+  const listen = () => {
+    const source = new EventSource(`/api/v1/studies/${study}/events?after=${after}`);
+    for (const kind of RECORDED) {
+      source.addEventListener(kind, (event) => {
+        after = event.lastEventId || after;
+        void refresh();
+      });
+    }
+    source.addEventListener("progress", follow);
+    source.addEventListener("open", () => {
+      if (connection.hidden) return;
+      connection.hidden = true;
+      live.classList.remove("stale");
+      void refresh();
+    });
+    source.addEventListener("error", () => {
+      // A browser tries again by itself, but not when the service answered that it cannot.
+      if (source.readyState === EventSource.CLOSED) setTimeout(listen, AGAIN);
+      if (!connection.hidden) return;
+      const since = new Date().toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+      connection.textContent = `No connection to the service since ${since}: trying again.`;
+      connection.hidden = false;
+      live.classList.add("stale");
+    });
+  };
+  listen();
 }

@@ -20,12 +20,18 @@ if (form) {
     for (const [name, value] of new FormData(form)) body.append(name, String(value));
     const answer = await fetch("/studies/new/check", { method: "POST", body }).catch(() => null);
     // A later question has its own answer.
-    if (!answer?.ok || turn !== asked) return;
+    if (turn !== asked) return;
+    if (answer?.status === 401) outlook.textContent = "You are not signed in any more: what you send is kept until you have signed in again.";
+    if (!answer?.ok) return;
     const { field, text, reference } = await answer.json();
-    for (const input of form.querySelectorAll("[aria-invalid]")) input.removeAttribute("aria-invalid");
+    for (const input of form.querySelectorAll("[aria-invalid]")) {
+      input.removeAttribute("aria-invalid");
+      if (input.getAttribute("aria-describedby") === outlook.id) input.removeAttribute("aria-describedby");
+    }
     if (field) {
       const input = form.querySelector(`[name="${CSS.escape(field)}"]`);
       input?.setAttribute("aria-invalid", "true");
+      if (!input?.hasAttribute("aria-describedby")) input?.setAttribute("aria-describedby", outlook.id);
       input?.closest("details")?.setAttribute("open", "");
     }
     outlook.classList.toggle("bad", Boolean(field));

@@ -16,6 +16,12 @@ if (box) {
   /** @type {HTMLElement} */ (document.querySelector("[data-controls]")).hidden = false;
   save.disabled = true;
   let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const strips = document.querySelector("[data-strips]");
+  if (!playing && strips) {
+    // Who wants no motion sees both strides as pictures, like those without scripts.
+    const pictures = new DOMParser().parseFromString(strips.textContent ?? "", "text/html").body;
+    strips.replaceWith(...pictures.childNodes);
+  }
   let phase = 0;
   let last = 0;
 
@@ -84,23 +90,15 @@ if (box) {
       playing = !playing;
       label();
     });
-    form.addEventListener("submit", (event) => {
-      if (!navigator.onLine) {
-        // A browser that leaves the page would lose what was chosen.
-        event.preventDefault();
-        state.textContent = "There is no connection: nothing was sent. Save again when it is back.";
-        return;
-      }
-      /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms")).value = String(
-        Math.round(performance.now() - begun),
-      );
-    });
+    const took = /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms"));
+    // Before the form is read to be sent.
+    form.addEventListener("submit", () => (took.value = String(Math.round(performance.now() - begun))), { capture: true });
     document.addEventListener("keydown", (event) => {
       const place = ["1", "2", "3"].indexOf(event.key);
       if (place < 0 || /** @type {Element} */ (event.target).closest("textarea")) return;
-      const choice = form.querySelectorAll(".verdict input")[place];
-      /** @type {HTMLInputElement} */ (choice).checked = true;
-      /** @type {HTMLInputElement} */ (choice).focus();
+      const choice = /** @type {HTMLInputElement} */ (form.querySelectorAll(".verdict input")[place]);
+      choice.click();
+      choice.focus();
     });
     save.disabled = false;
     state.textContent = "";

@@ -6,6 +6,9 @@ use crate::subject::{ModelError, Subject};
 
 /// Durations of strides that are kept, s.
 pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
+/// What to do where heel strikes cannot be found in the angles.
+const NO_KNEE: &str = "the right knee (column knee_R_rad) was not recorded, and without it heel strikes cannot be found in the angles: \
+                       tell the times of the right heel strikes, or take a force under the right foot";
 /// A stride with more than so long between two rows is not wholly recorded, s.
 const LONGEST_GAP_S: f64 = 0.1;
 /// Vertical force that tells contact, N.
@@ -114,7 +117,7 @@ impl Recording {
             }
             HeelStrikes::Kinematics => {
                 let knee = self.knee_r_rad.as_ref();
-                self.by_kinematics(knee.ok_or_else(|| malformed("the right knee was not recorded".to_owned()))?)
+                self.by_kinematics(knee.ok_or_else(|| malformed(NO_KNEE.to_owned()))?)
             }
         };
         if found.len() < 2 {

@@ -83,6 +83,15 @@ pub async fn must_say_password(db: &mut Connection, user: &User, session: Option
     Ok(by_fresh_link.is_none())
 }
 
+/// Whether somebody who is signed in has no way in but a one-time link.
+///
+/// # Errors
+/// What the database reports.
+pub async fn has_no_password(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
+    let Some(id) = caller.user else { return Ok(false) };
+    Ok(!users::get(db, id).await?.has_password)
+}
+
 /// Notes a failed attempt with a password.
 ///
 /// # Errors

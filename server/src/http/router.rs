@@ -31,7 +31,7 @@ pub fn router(state: AppState) -> Router {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
     };
     Router::new()
-        .merge(pages::routes())
+        .merge(pages::routes(&state))
         .route("/health", get(api::health::get))
         .merge(api)
         .route("/api/openapi.json", get(description))

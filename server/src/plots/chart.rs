@@ -12,6 +12,10 @@ pub enum Stroke {
     Dashed,
     /// A dotted line.
     Dotted,
+    /// Dashes and dots in turn.
+    DashDotted,
+    /// Long dashes.
+    LongDashed,
     /// Points only.
     Points,
     /// A line that holds its value until the next point, with a mark at each.
@@ -141,11 +145,34 @@ impl Chart {
     pub fn svg(&self) -> String {
         let name = escape(&format!("{}: {} over {}", self.title, self.y_label, self.x_label));
         let body = self.body();
-        format!("<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name}\">{body}</svg>")
+        let (x, y) = self.axes();
+        // Where the axes lie and what they go over, for whoever points at a line.
+        let plot = format!(
+            "data-right=\"{LEFT} {} {} {}\" data-up=\"{} {TOP} {} {}\" data-logarithmic=\"{}\"",
+            WIDTH - RIGHT,
+            x.from,
+            x.to,
+            HEIGHT - BOTTOM,
+            y.from,
+            y.to,
+            self.log_y
+        );
+        let labels = format!("data-across=\"{}\" data-along=\"{}\"", escape(&self.x_label), escape(&self.y_label));
+        format!(
+            "<svg class=\"chart\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{name}\" {plot} {labels}>{body}</svg>"
+        )
     }
 
     /// The elements of the drawing.
     pub(super) fn body(&self) -> String {
+        let (x, y) = self.axes();
+        let mut svg = String::with_capacity(16 * 1024);
+        // Writing to a String cannot fail.
+        let _ = self.draw(&mut svg, &x, &y);
+        svg
+    }
+
+    fn axes(&self) -> (Axis, Axis) {
         let all = || self.series.iter().flat_map(|series| series.points.iter());
         let mut x = Axis::over(all().map(|p| p.0), 8, true);
         if self.whole_x {
@@ -161,10 +188,7 @@ impl Chart {
         if self.log_y {
             y.keep_whole_ticks();
         }
-        let mut svg = String::with_capacity(16 * 1024);
-        // Writing to a String cannot fail.
-        let _ = self.draw(&mut svg, &x, &y);
-        svg
+        (x, y)
     }
 
     /// Where a value stands on the y axis.
@@ -261,11 +285,16 @@ impl Chart {
 }
 
 impl Stroke {
+    /// Lines of one chart that are told apart without their colours; after five they begin anew.
+    pub const APART: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
+
     fn class(self) -> &'static str {
         match self {
             Self::Solid | Self::Steps | Self::Marked => "solid",
             Self::Dashed | Self::DashedSteps => "dashed",
             Self::Dotted => "dotted",
+            Self::DashDotted => "dash_dotted",
+            Self::LongDashed => "long_dashed",
             Self::Points => "points",
         }
     }
@@ -303,7 +332,7 @@ impl Series {
             }
             write!(svg, "\"/>")?;
         }
-        if !matches!(self.stroke, Stroke::Solid | Stroke::Dashed | Stroke::Dotted) {
+        if !Stroke::APART.contains(&self.stroke) {
             for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
                 write!(svg, "<circle class=\"dot c{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\"/>", px(x), py(y))?;
             }
@@ -330,6 +359,15 @@ mod tests {
         assert!(!svg.contains("<script>") && !svg.contains("NaN"));
         assert_eq!(svg.matches("<circle").count(), 2);
         assert_eq!(chart.legend().len(), 2);
+    }
+
+    #[test]
+    fn a_chart_says_where_its_axes_lie() {
+        let svg =
+            Chart::new("", "time, s", "angle, °").with("one", 0, Stroke::Solid, vec![(2.0, 1.0), (4.0, 3.0)]).svg();
+        for said in ["data-right=\"74 ", " 2 4\"", "data-logarithmic=\"false\"", "data-across=\"time, s\""] {
+            assert!(svg.contains(said), "{said}: {svg}");
+        }
     }
 
     #[test]

@@ -275,25 +275,39 @@ pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -
     rows.iter().rev().map(from_row).collect()
 }
 
-/// At most `limit` comparisons of two trials, whichever was named first, by people and scripts other than `author`, that
-/// were not taken back: the newest first.
+/// Whose answers.
+#[derive(Debug, Clone, Copy)]
+pub enum Whose<'a> {
+    /// Those of this author.
+    Own(&'a str),
+    /// Those of everybody else.
+    Others(&'a str),
+}
+
+/// At most `limit` comparisons of two trials, whichever was named first, by people and scripts, that were not taken back:
+/// the newest first.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn by_others(
+pub async fn of_pair(
     db: &mut Connection,
     (a, b): (TrialId, TrialId),
-    author: &str,
+    whose: Whose<'_>,
     limit: u32,
 ) -> StoreResult<Vec<FeedbackRow>> {
+    let (author, own) = match whose {
+        Whose::Own(author) => (author, true),
+        Whose::Others(author) => (author, false),
+    };
     let rows = sqlx::query(select(
-        "where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and f.author <> ?3 \
+        "where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and (f.author = ?3) = ?5 \
          and f.source in ('subject', 'clinician', 'script') and r.feedback_seq is null order by f.seq desc limit ?4",
     ))
     .bind(a)
     .bind(b)
     .bind(author)
     .bind(limit)
+    .bind(own)
     .fetch_all(db)
     .await?;
     rows.iter().map(from_row).collect()

@@ -91,6 +91,15 @@ pub async fn json_of(db: &mut Connection, trial: TrialId) -> StoreResult<String>
     String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
 }
 
+/// Whether the gait of a trial is here: a script may have told figures alone, and trajectories are pruned.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
+    let row = sqlx::query("select exists(select 1 from gaits where trial_id = ?)").bind(trial).fetch_one(db).await?;
+    Ok(row.try_get(0)?)
+}
+
 /// The gait of a trial.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! The table of a study's trials, sorted and filtered by the database: a page of ten thousand is as quick as one of ten.
 
-use super::trials::TrialState;
+use super::trials::{TrialState, of_a_gait};
 use super::{Connection, StoreResult, StudyId, TrialId, json};
 use gait_optimizer::TunedBounds;
 use sqlx::Row;
@@ -55,9 +55,9 @@ pub struct Listed {
     pub from: Option<(TrialId, u32)>,
     /// Where it stands.
     pub state: TrialState,
-    /// Gait RMSE, rad.
+    /// Gait RMSE, rad; of a gait alone.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport.
+    /// Cost of transport; of a gait alone.
     pub cost_of_transport: Option<f64>,
     /// Interior-point iterations.
     pub iterations: Option<u32>,
@@ -78,8 +78,10 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
         "select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
          t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
          count(*) over () as matching, \
-         case ?2 when 'number' then t.number when 'state' then t.state when 'gait_rmse_rad' then t.gait_rmse_rad \
-             when 'cost_of_transport' then t.cost_of_transport when 'iterations' then t.iterations \
+         case ?2 when 'number' then t.number when 'state' then t.state \
+             when 'gait_rmse_rad' then iif(t.state = 'converged', t.gait_rmse_rad, null) \
+             when 'cost_of_transport' then iif(t.state = 'converged', t.cost_of_transport, null) \
+             when 'iterations' then t.iterations \
              when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
          from trials t \
          where t.study_id = ?1 and (?4 is null or t.state = ?4) \
@@ -99,15 +101,16 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
     rows.iter()
         .map(|row| {
             let from: Option<TrialId> = row.try_get("warm_started_from")?;
+            let state = row.try_get::<&str, _>("state")?.parse()?;
             Ok(Listed {
                 id: row.try_get("id")?,
                 number: row.try_get("number")?,
                 action: json::column(row, "action")?,
                 reason: row.try_get("reason")?,
                 from: from.zip(row.try_get("from_number")?),
-                state: row.try_get::<&str, _>("state")?.parse()?,
-                gait_rmse_rad: row.try_get("gait_rmse_rad")?,
-                cost_of_transport: row.try_get("cost_of_transport")?,
+                state,
+                gait_rmse_rad: of_a_gait(row, state, "gait_rmse_rad")?,
+                cost_of_transport: of_a_gait(row, state, "cost_of_transport")?,
                 iterations: row.try_get("iterations")?,
                 seconds_total: row.try_get("seconds_total")?,
                 message: row.try_get("message")?,

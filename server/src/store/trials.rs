@@ -96,9 +96,9 @@ pub struct Trial {
     /// How the solve ended.
     #[schema(value_type = Option<String>)]
     pub status: Option<SolveStatus>,
-    /// Gait RMSE, rad.
+    /// Gait RMSE, rad; of a gait alone: where there is none, the last iterate's is in the report.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport, dimensionless.
+    /// Cost of transport, dimensionless; of a gait alone.
     pub cost_of_transport: Option<f64>,
     /// Objective of the solve.
     pub objective: Option<f64>,
@@ -436,7 +436,14 @@ pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<
     Ok(Some(Measured { solves: rows.len(), median_seconds: middle.try_get(0)? }))
 }
 
+/// A figure that says something of a gait: what it was when the solve gave up says nothing of one.
+pub(super) fn of_a_gait(row: &SqliteRow, state: TrialState, column: &str) -> StoreResult<Option<f64>> {
+    let figure: Option<f64> = row.try_get(column)?;
+    Ok(figure.filter(|_| state == TrialState::Converged))
+}
+
 fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
+    let state = row.try_get::<&str, _>("state")?.parse()?;
     Ok(Trial {
         id: row.try_get("id")?,
         study_id: row.try_get("study_id")?,
@@ -447,10 +454,10 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         best_before: row.try_get("best_before")?,
         warm_started_from: row.try_get("warm_started_from")?,
         asked_by: row.try_get("asked_by")?,
-        state: row.try_get::<&str, _>("state")?.parse()?,
+        state,
         status: json::optional_column(row, "status")?,
-        gait_rmse_rad: row.try_get("gait_rmse_rad")?,
-        cost_of_transport: row.try_get("cost_of_transport")?,
+        gait_rmse_rad: of_a_gait(row, state, "gait_rmse_rad")?,
+        cost_of_transport: of_a_gait(row, state, "cost_of_transport")?,
         objective: row.try_get("objective")?,
         max_violation: row.try_get("max_violation")?,
         iterations: row.try_get("iterations")?,

@@ -4,7 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
-use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
+use crate::store::feedback::{FeedbackRow, Said, Source, Voice, Whose};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies, trials};
 use crate::studies::objections::Objections;
@@ -121,7 +121,7 @@ const BESIDE: u32 = 20;
 /// What the database reports.
 pub async fn beside(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
     let (Said::Preference { winner: a, loser: b } | Said::Tie { a, b }) = row.said else { return Ok(Vec::new()) };
-    Ok(feedback::by_others(db, (a, b), &row.author, BESIDE).await?)
+    Ok(feedback::of_pair(db, (a, b), Whose::Others(&row.author), BESIDE).await?)
 }
 
 /// Takes an answer back.

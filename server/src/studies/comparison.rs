@@ -3,7 +3,7 @@
 use super::standing::Standing;
 use crate::store::TrialId;
 use crate::store::feedback::Said;
-use crate::store::trials::TrialState;
+use crate::store::trials::{Trial, TrialState};
 use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};
 
 /// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
@@ -33,16 +33,33 @@ pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> Said {
     }
 }
 
+/// Whether two trials gave the very same motion, as when a bound changed that no gait comes near: a person has nothing to
+/// compare then. So many figures agree to the last bit in no other case.
+fn is_same_gait(one: &Trial, other: &Trial) -> bool {
+    let figures = |trial: &Trial| {
+        let report = trial.report.as_ref()?;
+        let single = [report.objective, report.cost_of_transport, report.stride_length_m];
+        let all = single.iter().chain(&report.gait_rmse_parts_rad).chain(&report.durations_s).chain(&report.vhip_m_s);
+        Some(all.map(|figure| figure.to_bits()).collect::<Vec<_>>())
+    };
+    figures(one).is_some_and(|figures_of_one| figures(other) == Some(figures_of_one))
+}
+
 /// The pair of trials that a person should compare now, if there is one: the newest converged trial with a
-/// partner that nobody has compared it with.
+/// partner that nobody has compared it with, and that is another gait.
 ///
 /// # Errors
 /// When the learner refuses the log.
 pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
     let plan = &standing.study.plan;
     let log = standing.log();
-    let comparable = standing.comparable();
+    let mut comparable = standing.comparable();
     let Some(&newest) = log.visited.iter().rev().find(|action| comparable.contains(action)) else { return Ok(None) };
+    if let Some(own) = standing.trial_of(newest) {
+        comparable.retain(|action| {
+            *action == newest || !standing.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
+        });
+    }
     // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
     // best one, and with it the question.
     let mut before = log.clone();

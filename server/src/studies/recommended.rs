@@ -6,7 +6,7 @@ use super::examination;
 use super::standing::Standing;
 use crate::error::Error;
 use crate::store::audit::Actor;
-use crate::store::{Connection, Store, StoreResult, TrialId, certificates, commit};
+use crate::store::{Connection, Store, StoreResult, TrialId, certificates, commit, gaits};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use utoipa::ToSchema;
@@ -87,7 +87,9 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
                 break;
             }
             CertificateState::Failed => {}
-            _ if place < MOST_EXAMINED => drop(judged.unexamined.get_or_insert(trial)),
+            _ if place < MOST_EXAMINED && gaits::is_here(db, trial).await? => {
+                judged.unexamined.get_or_insert(trial);
+            }
             _ => {}
         }
     }
@@ -110,7 +112,7 @@ pub async fn next_to_examine(
     for &trial in ranking.iter().take(MOST_EXAMINED) {
         match certificates::passed(db, trial).await? {
             Some(true) => return Ok(None),
-            None if !refused.contains(&trial) => return Ok(Some(trial)),
+            None if !refused.contains(&trial) && gaits::is_here(db, trial).await? => return Ok(Some(trial)),
             Some(false) | None => {}
         }
     }

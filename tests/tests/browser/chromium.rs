@@ -10,7 +10,7 @@ use chromiumoxide::cdp::browser_protocol::input::{
     DispatchTouchEventParams, DispatchTouchEventReturns, DispatchTouchEventType, InsertTextParams, TouchPoint,
 };
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
-use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent, OverrideNetworkStateParams};
+use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent};
 use chromiumoxide::cdp::js_protocol::runtime::EventExceptionThrown;
 use chromiumoxide::page::ScreenshotParams;
 use chromiumoxide::types::MethodId;
@@ -202,9 +202,9 @@ impl Tab {
         .await
     }
 
-    /// Tells the page that the connection is cut, or back.
-    pub(crate) async fn disconnect(&self, gone: bool) {
-        self.page.execute(OverrideNetworkStateParams::new(gone, 0.0, -1.0, -1.0)).await.unwrap();
+    /// Forgets every session.
+    pub(crate) async fn forget_cookies(&self) {
+        self.page.execute(network::ClearBrowserCookiesParams::default()).await.unwrap();
     }
 
     /// A picture of the whole page.
@@ -228,6 +228,12 @@ impl Tab {
         self.wait_for(selector).await;
         let point = self.page.find_element(selector).await.unwrap().clickable_point().await.unwrap();
         self.page.click(point).await.unwrap();
+    }
+
+    /// Moves the mouse over an element.
+    pub(crate) async fn point_at(&self, selector: &str) {
+        self.wait_for(selector).await;
+        self.page.find_element(selector).await.unwrap().hover().await.unwrap();
     }
 
     /// From now on the screen is one to touch.

@@ -4,15 +4,69 @@ use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use axum::http::StatusCode;
+use gait_learner::{Dimension, SearchSpace};
 use gait_optimizer::SolveStatus;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::trials::{Trial, TrialState};
-use gaitwright::store::{TrialId, commit, explanations};
+use gaitwright::store::{StudyId, TrialId, commit, explanations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{explanation, without_gaits};
 use gaitwright_tests::measured::{electromyogram, motion};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
+
+/// Users and tokens in every state.
+async fn people(site: &Site) {
+    let send = async |path: &str, body: Value| site.service.post(&format!("/api/v1/{path}"), &body).await.json();
+    for (name, role) in [("Ada", "admin"), ("K1", "clinician"), ("R1", "rater")] {
+        let user = send("users", json!({"name": name, "role": role})).await;
+        if role == "rater" {
+            send(&format!("users/{}/disable", user["id"].as_str().unwrap()), json!({})).await;
+        }
+    }
+    for name in ["treadmill", "an old one"] {
+        let token = send("tokens", json!({"name": name, "scopes": ["read", "run"]})).await;
+        if name != "treadmill" {
+            send(&format!("tokens/{}/revoke", token["id"].as_str().unwrap()), json!({})).await;
+        }
+    }
+}
+
+/// A study that a script evaluates, and its trial that has figures and no gait.
+async fn by_script(site: &Site) -> (StudyId, String) {
+    let study = site.service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3)).await;
+    let ask = async || site.service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
+    let trial = ask().await["id"].as_str().unwrap().to_owned();
+    let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
+    site.service.post(&format!("/api/v1/trials/{trial}/tell"), &told).await;
+    // One that is being evaluated.
+    ask().await;
+    (study, trial)
+}
+
+/// A study in which nothing converged.
+async fn study_without_gaits(site: &Site) -> StudyId {
+    let study = site
+        .service
+        .study(|new| {
+            (new.base_bounds.a5, new.base_bounds.a6, new.trial_budget) = (0.039, 0.0, 2);
+            let velocity = Dimension { name: "a1".to_owned(), values: vec![15.0, 20.0], lengthscale: 5.0 };
+            new.search_space = Some(SearchSpace::new(vec![velocity]).unwrap());
+        })
+        .await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    study
+}
+
+/// A subject who withdrew, and a study of theirs.
+async fn withdrawn(site: &Site) -> (String, StudyId) {
+    let described = json!({"pseudonym": "S09", "height_m": 1.7, "body_mass_kg": 66});
+    let subject = site.service.post("/api/v1/subjects", &described).await.json()["id"].as_str().unwrap().to_owned();
+    let study = site.service.study(|new| (new.subject_id, new.trial_budget) = (subject.parse().unwrap(), 2)).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    site.service.post(&format!("/api/v1/subjects/{subject}/withdraw"), &json!({"reason": "moved away"})).await;
+    (subject, study)
+}
 
 /// Every page with something on it: name and address.
 async fn pages(site: &Site) -> Vec<(&'static str, String)> {
@@ -65,7 +119,17 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
     site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
     let decision = json!({"verdict": "walkable", "author": "K2", "reason": "walked slowly, with a harness"});
     site.service.post(&format!("/api/v1/trials/{lifted}/safety-reviews"), &decision).await;
+    people(site).await;
+    let (script, told) = by_script(site).await;
+    let without_gaits = study_without_gaits(site).await;
+    let (gone, closed) = withdrawn(site).await;
     vec![
+        ("script-study", format!("/studies/{script}")),
+        ("told-trial", format!("/trials/{told}")),
+        ("study-without-gaits", format!("/studies/{without_gaits}")),
+        ("withdrawn-subject", format!("/subjects/{gone}")),
+        ("withdrawn-study", format!("/studies/{closed}")),
+        ("account", "/account".to_owned()),
         ("lifted-gait", format!("/trials/{lifted}")),
         ("lab-question", format!("/lab/{}", walked[0])),
         ("lab-answered", format!("/lab/{}", walked[1])),
@@ -120,7 +184,7 @@ async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
     [trials[0].id, trials[1].id, *id]
 }
 
-const WIDTHS: [i64; 3] = [1280, 768, 360];
+const WIDTHS: [i64; 3] = [1280, 768, 320];
 /// What A4 is wide between margins of 1 cm, in pixels of a style sheet.
 const PAPER: i64 = 718;
 
@@ -143,7 +207,7 @@ async fn browser_every_page_fits_and_is_for_everybody() {
                 if beyond != "0" {
                     wrong.push(format!("{name}: {beyond} px beyond {width} px"));
                 }
-                if let Some(folder) = pictures.as_deref().filter(|_| width > 360) {
+                if let Some(folder) = pictures.as_deref().filter(|_| width > 320) {
                     page.picture(&folder.join(format!("{name}-{width}-{scheme}.png"))).await;
                 }
             }

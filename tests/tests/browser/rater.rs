@@ -159,7 +159,8 @@ async fn browser_rater_with_two_tabs_answers_once() {
         )
         .await;
     }
-    assert!(other.text("main").await.contains("was answered already"));
+    let told = other.text("main").await;
+    assert!(told.contains("was answered already") && told.contains("“first” counts"), "{told}");
     assert_eq!(answers(&site, study).await.len(), 1);
     browser.close().await;
 }
@@ -177,26 +178,55 @@ async fn browser_rater_who_wants_no_motion_gets_none() {
     let before = page.value(pictures).await;
     tokio::time::sleep(std::time::Duration::from_millis(300)).await;
     assert_eq!(page.value(pictures).await, before, "it stands still");
+    assert_eq!(page.count("svg.tiles").await, 2, "both strides as pictures");
     page.click("[data-play]").await;
     page.wait_until(&format!("{pictures} !== {before:?}")).await;
     page.is_clean(&site.origin).await;
     browser.close().await;
 }
 
+/// What is chosen and written on the page of a pair.
+const GIVEN: &str = "`${document.querySelector('input:checked')?.value} ${document.querySelector('#note')?.value}`";
+
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_rater_loses_the_connection_and_nothing_else() {
+async fn browser_rater_keeps_choice_and_note_while_the_service_is_gone() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
     let page = at_the_pair(&browser, &site).await;
-    page.click("input[value=first]").await;
-    page.disconnect(true).await;
-    page.run("document.querySelector('[data-answer] [type=submit]').click()").await;
-    page.wait_until("document.querySelector('[data-state]').textContent.includes('no connection')").await;
-    assert!(answers(&site, study).await.is_empty());
-    page.disconnect(false).await;
-    page.run("document.querySelector('[data-answer] [type=submit]').click()").await;
+    page.press("3").await;
+    page.fill("#note", "softer at the heel").await;
+    let save = "document.querySelector('[data-answer] [type=submit]').click()";
+    let site = site
+        .restart(Analytic::default(), async |_| {
+            page.run(save).await;
+            page.wait_for("[data-unsent]:not([hidden])").await;
+            assert!(page.text("[data-unsent]").await.contains("nothing was stored"));
+            assert_eq!(page.value(GIVEN).await, "second softer at the heel");
+        })
+        .await;
+    page.run(save).await;
     page.wait_for(".notice.good").await;
-    assert_eq!(answers(&site, study).await.len(), 1);
+    let given = answers(&site, study).await;
+    assert_eq!(given.iter().map(|row| row.note.as_str()).collect::<Vec<_>>(), ["softer at the heel"]);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_keeps_choice_and_note_over_a_reload() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    page.click("input[value=cannot_tell]").await;
+    page.fill("#note", "both limp").await;
+    page.reload().await;
+    page.wait_until(&format!("{GIVEN} === 'cannot_tell both limp'")).await;
+    page.wait_until("document.querySelector('[data-answer] [type=submit]').disabled === false").await;
+    page.click("[data-answer] [type=submit]").await;
+    page.wait_for(".notice.good").await;
+    assert!(answers(&site, study).await.is_empty(), "no preference");
+    assert_eq!(page.value("sessionStorage.length").await, "0", "what is saved is not kept here");
+    page.is_clean(&site.origin).await;
     browser.close().await;
 }

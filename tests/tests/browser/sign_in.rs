@@ -2,11 +2,12 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright::access::Role;
 use gaitwright::access::people::{self, NewUser};
+use gaitwright::access::{Role, secret};
 use gaitwright::http::Access;
 use gaitwright::store::audit::Actor;
 use gaitwright::store::commit;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 
@@ -88,5 +89,50 @@ async fn browser_adds_a_rater_and_a_token_and_reads_the_trail() {
     page.wait_for("main h1").await;
     page.wait_until("location.pathname === '/rate'").await;
     assert_eq!(page.count("nav").await, 0);
+    // Without a password there is no way back in: that is said before it is too late.
+    page.click("main .notice a[href='/account']").await;
+    page.wait_for("#password").await;
+    assert_eq!(page.value("[...document.querySelectorAll('nav a')].map(a => a.pathname).join()").await, "/rate");
+    // What is for the staff leads back to what is for raters.
+    page.goto(&site.at("/studies/new")).await;
+    page.click("main a").await;
+    page.wait_until("location.pathname === '/rate'").await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_sends_an_answer_after_the_session_has_ended() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let (site, _) = guarded().await;
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    let mut writer = site.service.store.write().await.unwrap();
+    let new = NewUser { name: "R1".to_owned(), role: Role::Rater };
+    let rater = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    let hashed = secret::hash_password("correct horse battery").unwrap();
+    people::set_password(&mut writer, &Actor::program(), rater.id, &hashed).await.unwrap();
+    commit(writer).await.unwrap();
+
+    let page = browser.open(&site.at("/sign-in")).await;
+    let sign_in = async || {
+        page.fill("#name", "R1").await;
+        page.fill("#password", "correct horse battery").await;
+        page.click("main form button").await;
+    };
+    sign_in().await;
+    page.click("main form[action^='/rate/'] button").await;
+    page.wait_until("document.querySelector('[data-answer] [type=submit]')?.disabled === false").await;
+    page.click("input[value=no_difference]").await;
+    page.fill("#note", "both fine").await;
+    page.forget_cookies().await;
+    page.click("[data-answer] [type=submit]").await;
+    page.wait_for("#password").await;
+    assert!(page.text("main").await.contains("nothing of what you sent was stored"));
+    sign_in().await;
+    page.wait_until("document.querySelector('h1').textContent === 'Send it now'").await;
+    page.click("main form button").await;
+    page.wait_for(".notice.good").await;
+    let heard = site.service.feedback(study).await;
+    assert_eq!(heard.iter().filter(|row| (row.author.as_str(), row.note.as_str()) == ("R1", "both fine")).count(), 1);
     browser.close().await;
 }

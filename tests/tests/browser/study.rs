@@ -186,8 +186,10 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     page.press("Enter").await;
     page.wait_for(".notice.good").await;
     let said = page.text(".notice.good").await;
-    assert!(said.contains("no difference between trial") && said.contains("how the study goes"), "{said}");
-    assert_eq!(page.count("input[name=answer]").await, 0, "nothing to answer, no form");
+    assert!(said.contains("no difference between trial"), "{said}");
+    // The next comparison comes by itself.
+    page.wait_for("input[name=answer]").await;
+    assert!(page.text(".notice.good").await.contains("The next comparison stands below"));
 
     while site.service.trials(study).await.len() < 3 {
         tokio::time::sleep(Duration::from_millis(10)).await;
@@ -248,5 +250,54 @@ async fn browser_opens_ten_thousand_trials_within_a_second() {
     let cores = std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64);
     assert!(fastest < 1000.0 * (load / cores).max(1.0), "{fastest} ms at a load of {load} on {cores} cores");
     page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_says_the_values_of_a_point_beside_the_pointer() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 6).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let history = site.service.fetch(&format!("/api/v1/studies/{study}/history")).await.json();
+    let last = history.as_array().unwrap().last().unwrap();
+    page.point_at("[data-part=history] svg circle.dot.c0:last-of-type").await;
+    page.wait_for(".readout:not([hidden])").await;
+    let said = page.text(".readout").await;
+    let value: f64 = said.lines().last().unwrap().rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(said.starts_with("best action so far") && said.contains("Gait RMSE, rad"), "{said}");
+    assert!((value - last["gait_rmse_rad"].as_f64().unwrap()).abs() < 2e-3, "{said} of {last}");
+    assert_eq!(page.count("svg .here").await, 1);
+    page.point_at("h1").await;
+    page.wait_for(".readout[hidden]").await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_says_that_the_service_is_gone_and_that_it_is_back() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let site = site
+        .restart(Analytic::default(), async |_| {
+            page.wait_for("[data-connection]:not([hidden])").await;
+            assert!(page.text("[data-connection]").await.contains("trying again"));
+            page.wait_for("#live.stale").await;
+        })
+        .await;
+    page.wait_for("[data-connection][hidden]").await;
+    page.wait_for("#live:not(.stale)").await;
+    // What changes is announced.
+    site.service.post(&format!("/api/v1/studies/{study}/pause"), &serde_json::json!({})).await;
+    page.wait_until("document.querySelector('[data-announced]').textContent === 'The study is now: paused.'").await;
+    // Ending a study is asked once more.
+    page.click("[data-part=state] details summary").await;
+    page.click("[data-part=state] button[value=stop]").await;
+    page.wait_for("[data-part=state] .state.stopped").await;
+    assert_eq!(page.count("[data-part=state] button[value=extend]").await, 1);
     browser.close().await;
 }

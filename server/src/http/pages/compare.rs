@@ -12,13 +12,14 @@ use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::http::shown::Shown;
 use crate::plots::Figure;
-use crate::store::feedback::{FeedbackRow, Source};
+use crate::printable;
+use crate::store::feedback::{FeedbackRow, Source, Whose};
 use crate::store::idempotency::{self, Kept, fingerprint};
-use crate::store::studies::Study;
+use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialState;
 use crate::store::{
-    Connection, FeedbackId, RemarkId, StoreError, StudyId, TrialId, commit, feedback, gaits, presentations,
-    reference_gaits, remarks, studies, trials,
+    Connection, FeedbackId, Instant, RemarkId, StoreError, StudyId, TrialId, commit, events, feedback, gaits, now,
+    presentations, reference_gaits, remarks, studies, trials,
 };
 use crate::studies::answer::{self, Answer, Verdict};
 use crate::studies::choice::MANY;
@@ -84,6 +85,9 @@ struct ComparePage {
     saved: Option<Saved>,
     /// The learner asks for a comparison.
     waits: bool,
+    /// The study goes on by itself: another gait is being computed, or will be at once.
+    is_going_on: bool,
+    last_event: i64,
     typed: Submitted,
     refused: Option<String>,
 }
@@ -127,7 +131,7 @@ pub(super) async fn get(
     Params(choice): Params<Choice>,
 ) -> Page {
     // Who signed in need not say so again; whoever may see this page is of the staff, unless told otherwise.
-    let mut typed = Submitted::default();
+    let mut typed = Submitted { shown: Some(now()), ..Submitted::default() };
     if may.caller.user.is_some() {
         (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
     }
@@ -136,7 +140,9 @@ pub(super) async fn get(
 
 async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
+    let last_event = events::last(&mut reader, id).await?;
     let study = studies::get(&mut reader, id).await?;
+    let is_going_on = matches!(study.state, StudyState::Running | StudyState::Waiting);
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
     let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
     let standing = if large {
@@ -197,6 +203,8 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         key: FeedbackId::fresh(),
         saved,
         waits,
+        is_going_on,
+        last_event,
         typed,
         refused,
     })
@@ -257,6 +265,8 @@ pub(super) struct Submitted {
     #[serde(default)]
     note: String,
     key: String,
+    /// When the page was shown first; without it, no earlier answer of the same person was seen.
+    shown: Option<Instant>,
 }
 
 /// What a form says.
@@ -297,7 +307,7 @@ impl Submitted {
 
     /// What tells this answer from another one with the same key.
     fn fingerprint(&self, study: StudyId) -> String {
-        let Self { a, b, answer, source, author, note, key } = self;
+        let Self { a, b, answer, source, author, note, key, shown: _ } = self;
         let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
         fingerprint("form", &format!("/studies/{study}/compare"), said.as_bytes())
     }
@@ -313,6 +323,8 @@ enum Given {
     Saved(Recorded),
     /// The same form was sent before with another answer: that one is recorded.
     Before(Recorded),
+    /// The same person has answered elsewhere, after this page was shown: that answer is recorded.
+    Elsewhere(Recorded),
 }
 
 /// `POST /studies/{id}/compare`.
@@ -329,6 +341,12 @@ pub(super) async fn post(
         Ok(Given::Before(saved)) => {
             let why = "This form was sent before with another answer. Recorded is the one above; this second one was \
                        not taken. To change the answer, take the first one back and save again.";
+            (Some(saved), StatusCode::CONFLICT, why.to_owned())
+        }
+        Ok(Given::Elsewhere(saved)) => {
+            let why = "You have answered this comparison elsewhere since this page was shown, in another tab or window. \
+                       Recorded is the answer above, and it counts; this one was not taken. To change your mind, take \
+                       that answer back and save again.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
@@ -351,6 +369,9 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
         let recorded = Recorded::try_from(before.body)?;
         return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
     }
+    if let Some(saved) = answered_elsewhere(&mut writer, id, form).await? {
+        return Ok(Given::Elsewhere(saved));
+    }
     let saved = match said {
         Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
         Said::Remark(new) => Recorded::Remark(remark::give(&mut writer, caller, id, &new).await?),
@@ -360,6 +381,22 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     commit(writer).await?;
     app.director.changed();
     Ok(Given::Saved(saved))
+}
+
+/// The newest answer to the same comparison that the same person gave since the page of a form was shown, and that stands.
+async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
+    let (a, b) = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
+    let author = printable::name("author", &form.author, 80)?;
+    let is_unseen = |at: Instant| form.shown.is_none_or(|shown| shown <= at);
+    let mut made = remarks::of_study(db, study).await?;
+    made.retain(|remark| remark.retraction.is_none() && remark.author == author && is_unseen(remark.created_at));
+    if let Some(remark) = made.iter().rfind(|remark| [(a, b), (b, a)].contains(&remark.pair())) {
+        return Ok(Some(Recorded::Remark(remark.id)));
+    }
+    // What somebody said blindly is not shown here.
+    let given = feedback::of_pair(db, (a, b), Whose::Own(author), OFFERED).await?;
+    let row = given.into_iter().find(|row| !row.by_rater && is_unseen(row.created_at));
+    Ok(row.map(|row| Recorded::Preference(row.id)))
 }
 
 /// Taking an answer back.

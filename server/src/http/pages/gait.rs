@@ -14,7 +14,7 @@ use crate::http::may::May;
 use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::studies::Study;
-use crate::store::trials::Trial;
+use crate::store::trials::{Trial, TrialState};
 use crate::store::{Instant, StoreError, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 use crate::studies::explanation::{self, ExplanationState};
 use crate::studies::objections::{Closed, Objections};
@@ -170,8 +170,8 @@ fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
     let parts = ["torso", "left hip", "left knee", "left ankle", "right hip"];
     let parts: Vec<String> =
         parts.iter().zip(r.gait_rmse_parts_rad).map(|(name, value)| format!("{name} {value:.4}")).collect();
-    vec![
-        ("Gait RMSE by coordinate, rad", parts.join(", ")),
+    let rmse = (trial.state == TrialState::Converged).then(|| ("Gait RMSE by coordinate, rad", parts.join(", ")));
+    let solved = [
         ("Walking speed, m/s", format!("{:.3}", r.speed_m_s)),
         ("Stride length, m", format!("{:.3}", r.stride_length_m)),
         ("Stride time, s", format!("{:.3}", r.durations_s.iter().sum::<f64>())),
@@ -180,5 +180,6 @@ fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
             "Size of the problem",
             format!("{} variables, {} equalities, {} inequalities", r.variables, r.equalities, r.inequalities),
         ),
-    ]
+    ];
+    rmse.into_iter().chain(solved).collect()
 }

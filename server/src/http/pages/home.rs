@@ -2,18 +2,19 @@
 
 use super::error::{Page, page};
 use super::format::{variant, words};
-use crate::access::Read;
+use crate::access::{Caller, Permission, Rate, Read, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
-use crate::http::may::May;
+use crate::http::may::{May, Refused};
 use crate::plots::sparkline;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialCounts;
-use crate::store::{Connection, StudyId, consents, studies, subjects, trials, users};
+use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
 use crate::studies::objections;
 use askama::Template;
 use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
 use serde::Deserialize;
 
 /// How many studies the page shows.
@@ -58,12 +59,21 @@ struct Waiting {
     link: String,
 }
 
-/// `GET /`.
+/// `GET /`: the studies; for whoever may compare gaits and nothing else, that.
 pub(super) async fn get(
-    may: May<Read>,
+    caller: Option<Caller>,
+    may: Result<May<Read>, Refused>,
     State(app): State<AppState>,
     Params(Before { before }): Params<Before>,
-) -> Page {
+) -> Result<Response, Refused> {
+    match may {
+        Ok(may) => Ok(show(&app, &may, before).await.into_response()),
+        Err(_) if caller.is_some_and(|caller| caller.may(Rate::NEEDED)) => Ok(Redirect::to("/rate").into_response()),
+        Err(refused) => Err(refused),
+    }
+}
+
+async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page {
     let mut reader = app.read().await?;
     let mut found = studies::page(&mut reader, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;
@@ -76,10 +86,7 @@ pub(super) async fn get(
     let unsafe_gaits = objections::undecided(&mut reader, PAGE).await?.into_iter().map(unsafe_gaits);
     let held = studies::waiting_for_people(&mut reader, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
-    let no_password = match may.caller.user {
-        Some(id) => !users::get(&mut reader, id).await?.has_password,
-        None => false,
-    };
+    let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
     page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
 }
 

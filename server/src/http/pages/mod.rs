@@ -30,14 +30,16 @@ mod sign_in;
 mod study;
 mod subject;
 mod system;
+mod unsent;
 
 use super::AppState;
 use super::api::recordings;
 use axum::Router;
+use axum::middleware::from_fn_with_state;
 use axum::routing::{get, post};
 
 /// Every page.
-pub fn routes() -> Router<AppState> {
+pub fn routes(state: &AppState) -> Router<AppState> {
     Router::new()
         .route("/", get(home::get))
         .route("/studies/new", get(new_study::get).post(new_study::post))
@@ -89,4 +91,5 @@ pub fn routes() -> Router<AppState> {
         .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))
         .route("/sign-out", post(sign_in::out))
         .route("/account", get(sign_in::account).post(sign_in::set_password))
+        .route_layer(from_fn_with_state(state.clone(), unsent::keep))
 }

@@ -2,7 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format::words;
-use crate::access::Rate;
+use crate::access::{Rate, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
@@ -25,6 +25,8 @@ struct RatePage {
     studies: Vec<(StudyId, String)>,
     nothing: bool,
     saved: Option<Saved>,
+    /// Whoever asks came by a link that works once, and has no other way in.
+    no_password: bool,
 }
 
 /// An answer as read back from the record.
@@ -75,7 +77,8 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         // Names can say what is tuned: a rater sees the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
-    page(&RatePage { studies, nothing: before.nothing, saved })
+    let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
+    page(&RatePage { studies, nothing: before.nothing, saved, no_password })
 }
 
 async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Saved>, Error> {

@@ -1,6 +1,7 @@
 //! Signing in and out, and a person's own account.
 
 use super::error::{Page, PageError, page};
+use super::unsent::{SignInPage, Unsent, send_now};
 use crate::access::{Caller, Role, people, secret, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
@@ -17,13 +18,6 @@ use serde::Deserialize;
 use std::time::Instant;
 
 #[derive(Template)]
-#[template(path = "sign_in.html")]
-struct SignInPage {
-    refused: Option<String>,
-    name: String,
-}
-
-#[derive(Template)]
 #[template(path = "sign_in_link.html")]
 struct LinkPage {
     link: String,
@@ -37,7 +31,7 @@ struct NoAccountPage;
 #[template(path = "account.html")]
 struct AccountPage {
     name: String,
-    role: &'static str,
+    role: Role,
     shortest: usize,
     /// Whether the present password is asked for.
     must_say_password: bool,
@@ -47,14 +41,16 @@ struct AccountPage {
 
 /// `GET /sign-in`.
 pub(super) async fn get() -> Page {
-    page(&SignInPage { refused: None, name: String::new() })
+    page(&SignInPage { refused: None, name: String::new(), unsent: Unsent::default() })
 }
 
-/// Name and password.
+/// Name and password, and what was sent before.
 #[derive(Deserialize)]
 pub(super) struct Credentials {
     name: String,
     password: String,
+    #[serde(flatten)]
+    unsent: Unsent,
 }
 
 /// `POST /sign-in`.
@@ -71,13 +67,17 @@ pub(super) async fn post(State(app): State<AppState>, Form(form): Form<Credentia
         app.access.back_off.succeeded(&name);
         let session = sign_in::with_password(&mut writer, &user).await?;
         commit(writer).await?;
+        if form.unsent.is_any() {
+            let cookie = cookie(Some(&session), app.access.secure)?;
+            return Ok(([(header::SET_COOKIE, cookie)], send_now(&form.unsent)?).into_response());
+        }
         return signed_in(&app, &session, user.role);
     }
     app.access.back_off.failed(&name, Instant::now());
     sign_in::failed(&mut writer, &name).await?;
     commit(writer).await?;
     let refused = Some("name or password is not right".to_owned());
-    Ok((StatusCode::UNAUTHORIZED, page(&SignInPage { refused, name })?).into_response())
+    Ok((StatusCode::UNAUTHORIZED, page(&SignInPage { refused, name, unsent: form.unsent })?).into_response())
 }
 
 /// `GET /sign-in/{link}`: a button, so that whatever only looks at the link does not use it up.
@@ -90,7 +90,8 @@ pub(super) async fn use_link(State(app): State<AppState>, Path(link): Path<Strin
     let mut writer = app.write().await?;
     let (user, session) = match sign_in::with_link(&mut writer, &link).await {
         Err(Error::NotSignedIn(reason)) => {
-            let refused = page(&SignInPage { refused: Some(reason), name: String::new() })?;
+            let refused = SignInPage { refused: Some(reason), name: String::new(), unsent: Unsent::default() };
+            let refused = page(&refused)?;
             return Ok((StatusCode::UNAUTHORIZED, refused).into_response());
         }
         found => found?,
@@ -137,7 +138,7 @@ async fn account_of(
     let user = users::get(&mut reader, id).await?;
     let shown = AccountPage {
         name: user.name.clone(),
-        role: user.role.as_str(),
+        role: user.role,
         shortest: secret::SHORTEST_PASSWORD,
         must_say_password: sign_in::must_say_password(&mut reader, &user, session_of(headers)).await?,
         refused: None,

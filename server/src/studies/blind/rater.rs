@@ -158,13 +158,27 @@ pub async fn answer(
     };
     let row = NewAnswer { said: given.answer, response_ms: given.response_ms, note: &given.note, feedback: heard };
     if !presentations::answer(writer, shown.id, row).await? {
-        return Err(Error::conflict("this pair was answered already"));
+        return Err(Error::conflict(answered_already(shown.answer)));
     }
     let payload = json!({ "feedback_id": heard, "presentation_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
     let detail = json!({ "study": shown.study_id, "number": shown.number, "answer": given.answer });
     audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
     Ok((shown.study_id, Answered { number: shown.number, answer: given.answer }))
+}
+
+/// Why a second answer is not taken, and what counts.
+fn answered_already(before: Option<Said>) -> String {
+    match before {
+        Some(Said::Withdrawn) => "this pair was answered already, and that answer counts no more".to_owned(),
+        Some(said) => {
+            let said = said.as_str().replace('_', " ");
+            format!(
+                "this pair was answered already: your answer \u{201c}{said}\u{201d} counts, and this one was not taken"
+            )
+        }
+        None => "this pair was answered already".to_owned(),
+    }
 }
 
 /// Takes a rater's last answer back: what was said stays in the record, and counts no more.

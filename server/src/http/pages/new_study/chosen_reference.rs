@@ -52,11 +52,13 @@ fn nearest(matches: &[Match], chosen: &Match) -> String {
     let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
     match matches.first() {
         _ if known == 0 => {
-            "Height and body mass are not known of any reference gait, so none can be proposed as the nearest."
-                .to_owned()
+            let why =
+                "Height and body mass are not known of any reference gait, so none can be proposed as the nearest.";
+            format!("{why} Taken: {}.", chosen.reference_gait.name)
         }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
-            format!("The nearest to the subject in height and body mass{}.", away(first))
+            let name = &first.reference_gait.name;
+            format!("{name}: the nearest to the subject in height and body mass{}.", away(first))
         }
         Some(first) => format!(
             "Nearer to the subject in height and body mass: {}{}, and not this one{}.",
@@ -74,6 +76,6 @@ fn chart(reference: &ReferenceGait) -> Chart {
     ANGLES.iter().enumerate().fold(chart, |chart, (column, name)| {
         let rows = reference.definition.angles_rad.iter().enumerate();
         let line = rows.map(|(row, angles)| (row as f64, angles[column].to_degrees())).collect();
-        chart.with(name, column, Stroke::Solid, line)
+        chart.with(name, column, Stroke::APART[column % Stroke::APART.len()], line)
     })
 }

@@ -16,16 +16,17 @@ use crate::store::devices::Device;
 use crate::store::reference_gaits::ReferenceGait;
 use crate::store::studies::{FeedbackMode, Study};
 use crate::store::subjects::{self, Subject};
-use crate::store::{Connection, SubjectId, Writer, commit, devices, reference_gaits, trials};
+use crate::store::{Connection, ReferenceGaitId, SubjectId, Writer, commit, devices, reference_gaits, trials};
 use crate::studies::person::{self, NewSubject};
 use crate::studies::plan::{self, NewStudy};
+use crate::studies::recording;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_learner::{LearnerSettings, Method};
-use gait_optimizer::{BasinChoice, SolveOptions};
+use gait_optimizer::{BasinChoice, SolveOptions, TunedBounds};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -114,6 +115,38 @@ fn learner(name: &str) -> Option<LearnerSettings> {
 /// The subject option that means: the person described below it.
 const NEW_SUBJECT: &str = "new";
 
+/// The fields that describe a new subject.
+const DESCRIPTION: [&str; 3] = ["pseudonym", "height_m", "body_mass_kg"];
+
+/// What people read beside a field.
+fn label(field: &str) -> String {
+    let named = match field {
+        "name" => "Name",
+        "subject" => "Subject",
+        "pseudonym" => "Pseudonym",
+        "height_m" => "Height, m",
+        "body_mass_kg" => "Body mass, kg",
+        "device" | "device_id" => "Device",
+        "reference_gait" | "reference_gait_id" => "Reference gait",
+        "muscles" => "Variant",
+        "feedback_mode" => "Comparisons are answered by",
+        "trial_budget" => "Trials",
+        "learner" => "Learner",
+        "unchanged_limit" => "Stop early",
+        "parallel_trials" => "At the same time",
+        "seed" => "Seed",
+        "basin_within_percent" => "Of several gaits, the nearest to the reference within, %",
+        other => other,
+    };
+    match field.split_once('_') {
+        Some(("tuned", bound)) => format!("{bound} is tuned"),
+        Some(("values", bound)) => format!("Values of {bound}"),
+        Some(("lengthscale", bound)) => format!("Lengthscale of {bound}"),
+        Some(("fixed", bound)) => format!("Fixed value of {bound}"),
+        _ => named.to_owned(),
+    }
+}
+
 /// What there is to choose from, and how long solves took.
 struct Offered {
     subjects: Vec<Subject>,
@@ -153,8 +186,26 @@ impl NewStudyPage {
         self.refused.as_ref().is_some_and(|refused| refused.field == field)
     }
 
-    fn refuses_part(&self, part: &str, bound: &str) -> bool {
-        self.refuses(&format!("{part}_{bound}")) || self.refuses(bound)
+    /// Attributes of a field: of the one that was refused, that it was and where it is said why, and the focus.
+    fn invalid(&self, field: &str) -> &'static str {
+        if self.refuses(field) { " aria-invalid=\"true\" aria-describedby=\"refused\" autofocus" } else { "" }
+    }
+
+    /// The same in the table of bounds, where a bound may be refused as a whole.
+    fn invalid_part(&self, part: &str, bound: &str) -> &'static str {
+        let of_part = self.invalid(&format!("{part}_{bound}"));
+        if of_part.is_empty() { self.invalid(bound) } else { of_part }
+    }
+
+    /// Whether something in the table of bounds was refused: it is shown then.
+    fn refuses_bound(&self) -> bool {
+        let of_bound = |field: &str| TunedBounds::NAMES.iter().any(|bound| field.ends_with(bound));
+        self.refused.as_ref().is_some_and(|refused| of_bound(&refused.field))
+    }
+
+    /// Whether a new subject is described, or something in that description was refused.
+    fn describes(&self) -> bool {
+        self.fields.subject == NEW_SUBJECT || DESCRIPTION.iter().any(|field| self.refuses(field))
     }
 
     /// Whether one of the fields for experts was changed or refused: they are shown then.
@@ -247,7 +298,10 @@ pub(super) async fn check(
 /// A refusal that belongs to a field; any other error is passed on.
 fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
     match error {
-        Error::Invalid(field) => Ok(*field),
+        Error::Invalid(field) => {
+            let said = field.message.strip_prefix(&field.field).map(|said| format!("{}{said}", label(&field.field)));
+            Ok(FieldError { message: said.unwrap_or(field.message), ..*field })
+        }
         Error::Conflict(message) => Ok(FieldError {
             field: "pseudonym".to_owned(),
             value: Some(fields.pseudonym.clone().into()),
@@ -292,7 +346,10 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
     let new = NewStudy {
         name: Some(fields.name.clone()),
         device_id: optional("device", &fields.device, "a device of the list")?,
-        reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait of the list")?,
+        reference_gait_id: match optional("reference_gait", &fields.reference_gait, "a reference gait of the list")? {
+            None => nearest_reference(writer, subject).await?,
+            chosen => chosen,
+        },
         muscles: match fields.muscles.as_str() {
             "on" => true,
             "off" => false,
@@ -314,6 +371,13 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
     plan::create(writer, &caller.actor, new).await
 }
 
+/// The matcher's proposal for a subject; none where nothing is known of whose the reference gaits are.
+async fn nearest_reference(db: &mut Connection, subject: SubjectId) -> Result<Option<ReferenceGaitId>, Error> {
+    let body = subjects::get(db, subject).await?.body();
+    let matches = recording::matches(db, &body).await?;
+    Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait.id))
+}
+
 /// Nothing: the lowest objective counts alone.
 fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
     let field = "basin_within_percent";
@@ -328,9 +392,7 @@ fn basin_choice(fields: &Fields) -> Result<BasinChoice, Error> {
 
 /// A person who is described but not chosen would be left out without a word.
 fn nothing_described(fields: &Fields) -> Result<(), Error> {
-    for (field, text) in
-        [("pseudonym", &fields.pseudonym), ("height_m", &fields.height_m), ("body_mass_kg", &fields.body_mass_kg)]
-    {
+    for (field, text) in DESCRIPTION.into_iter().zip([&fields.pseudonym, &fields.height_m, &fields.body_mass_kg]) {
         if !text.trim().is_empty() {
             let allowed = "nothing, as a subject of the list is chosen; or choose \"A new subject\"";
             return Err(Error::invalid(field, text.as_str(), allowed));

@@ -83,6 +83,9 @@ impl SpaceEditor {
             LearnerError::InvalidDimension { dimension, reason } => {
                 Error::invalid(&format!("values_{dimension}"), self.values_of(&dimension), &reason)
             }
+            LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
+                Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))
+            }
             other => Error::Learner(other),
         })?;
         Ok((space, fixed))
@@ -100,7 +103,7 @@ fn number(field: &str, text: &str, allowed: &str) -> Result<f64, Error> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
     use crate::studies::search::table_i;
 
@@ -131,11 +134,19 @@ mod tests {
     }
 
     #[test]
+    fn a_range_is_told_without_the_noise_of_its_last_digits() {
+        let fields = typed(&[("tuned_a3", "on"), ("lengthscale_a3", "0")]);
+        let Err(Error::Invalid(field)) = SpaceEditor::typed(&fields).and_then(|editor| editor.read()) else { panic!() };
+        assert_eq!((field.field.as_str(), field.allowed.as_deref()), ("lengthscale_a3", Some("0.001 to 2000")));
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, high")]), "values_a5");
         assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, 7")]), "values_a5");
         assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "")]), "values_a5");
         assert_eq!(refused(&[("tuned_a5", "on"), ("lengthscale_a5", "wide")]), "lengthscale_a5");
+        assert_eq!(refused(&[("tuned_a1", "on"), ("lengthscale_a1", "-5")]), "lengthscale_a1");
         assert_eq!(refused(&[("tuned_a5", "on"), ("fixed_a6", "NaN")]), "fixed_a6");
         assert_eq!(refused(&[("fixed_a6", "0.1")]), "tuned_a1");
         assert!(matches!(SpaceEditor::typed(&typed(&[("values_a9", "1")])), Err(Error::Malformed(_))));

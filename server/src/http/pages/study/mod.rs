@@ -18,14 +18,15 @@ use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, Tree};
 use crate::store::feedback::{FeedbackRow, Retraction, Said, Source};
 use crate::store::remarks::{self, Remark};
-use crate::store::studies::{FeedbackMode, Study, StudyState};
+use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{
-    Instant, StudyId, TrialId, commit, consents, devices, events, explanations, presentations, reference_gaits,
+    Instant, StudyId, TrialId, commit, consents, devices, events, explanations, gaits, presentations, reference_gaits,
     studies, trials,
 };
 use crate::studies::belief::Beliefs;
+use crate::studies::change::{self, Extend};
 use crate::studies::choice::{MANY, last_believed, ranking_to_show};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
@@ -74,9 +75,15 @@ struct Live {
     study: Study,
     state: String,
     acts: Vec<ActButton>,
+    /// It can be ended, which is asked once more.
+    may_stop: bool,
+    /// It has ended and can be given more trials.
+    may_extend: bool,
     counts: TrialCounts,
     /// Why trials have no gait.
     without_gait: Option<WithoutGait>,
+    /// How many results there are, and of how many.
+    progress: [String; 2],
     /// How long it will go on; empty: it does not.
     pace: String,
     running: Vec<RunningRow>,
@@ -123,6 +130,8 @@ struct Best {
     cost: String,
     bounds: Vec<Bound>,
     has_gait: bool,
+    /// A script evaluated it, and told figures alone.
+    by_script: bool,
     /// What its certificate says.
     judged: Judged,
     /// Where that failed, the best trial whose gait passed.
@@ -229,6 +238,9 @@ pub(super) async fn running(
 #[derive(Debug, Deserialize)]
 pub(super) struct Do {
     act: String,
+    /// How many trials in all, where there are to be more.
+    #[serde(default)]
+    trial_budget: String,
 }
 
 /// `POST /studies/{id}/do`.
@@ -240,24 +252,36 @@ pub(super) async fn post(
 ) -> Result<Redirect, PageError> {
     let act = lifecycle::Act::ALL
         .into_iter()
-        .find(|act| button(*act).is_some_and(|b| b.act == form.act))
-        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop"))?;
+        .find(|act| act.as_str() == form.act && acts_for_pages(*act))
+        .ok_or_else(|| Error::invalid("act", form.act, "start, pause, resume, stop, extend"))?;
     let mut writer = app.write().await?;
-    let done = command::act(&mut writer, &may.caller.actor, id, act, "").await?;
+    let cancelled = if act == Act::Extend {
+        let refused = || Error::invalid("trial_budget", form.trial_budget.as_str(), "how many trials in all");
+        let more = Extend { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
+        change::extend(&mut writer, &may.caller.actor, id, &more).await?;
+        Vec::new()
+    } else {
+        command::act(&mut writer, &may.caller.actor, id, act, "").await?.cancelled
+    };
     commit(writer).await?;
-    for trial in done.cancelled {
+    for trial in cancelled {
         app.director.cancel_solve(trial).await;
     }
     app.director.changed();
     Ok(Redirect::to(&format!("/studies/{id}")))
 }
 
+/// Whether a person does it with a button; the others happen by themselves.
+fn acts_for_pages(act: Act) -> bool {
+    matches!(act, Act::Start | Act::Pause | Act::Resume | Act::Stop | Act::Extend)
+}
+
+/// What needs no second thought.
 fn button(act: Act) -> Option<ActButton> {
     match act {
         Act::Start => Some(ActButton { act: "start", label: "Start" }),
         Act::Pause => Some(ActButton { act: "pause", label: "Pause" }),
         Act::Resume => Some(ActButton { act: "resume", label: "Resume" }),
-        Act::Stop => Some(ActButton { act: "stop", label: "Stop" }),
         _ => None,
     }
 }
@@ -268,6 +292,8 @@ pub(super) struct Figures {
     /// People are to answer and nobody has: what the learner believes then is only what it began with.
     unanswered: bool,
     pub(super) best: Option<TrialId>,
+    /// The trajectory of the best one is here.
+    has_gait: bool,
     /// The gaits, the best one first, and what their certificates say.
     ranking: Vec<TrialId>,
     judged: Judged,
@@ -309,6 +335,9 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     let mut reader = app.read().await?;
     figures.judged = recommended::judged(&mut reader, &figures.ranking).await?;
     figures.without_gait = WithoutGait::of(&standing.trials, &explanations::in_common(&mut reader, id).await?);
+    if let Some(best) = figures.best {
+        figures.has_gait = gaits::is_here(&mut reader, best).await?;
+    }
     drop(reader);
     if let Some(next) = figures.judged.unexamined {
         figures.judged.examined_by_service(app.director.is_examining(id, next));
@@ -378,7 +407,8 @@ fn view(
         rmse: format::figure(trial.gait_rmse_rad),
         cost: format::figure(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
-        has_gait: trial.state == TrialState::Converged,
+        has_gait: figures.has_gait,
+        by_script: trial.asked_by.is_some(),
         passing: figures.judged.passing.and_then(|id| standing.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,
@@ -397,9 +427,12 @@ fn view(
     let acts = if may_run { acts_of_people(standing.study.state) } else { Vec::new() };
     Live {
         state: words(standing.study.state.as_str()),
+        may_stop: acts.contains(&Act::Stop),
+        may_extend: acts.contains(&Act::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
         pace: pace(&standing, counts),
         without_gait: figures.without_gait.clone(),
+        progress: [counts.results(), standing.study.plan.trial_budget].map(|trials| format::count(trials.into())),
         counts,
         running,
         best,
@@ -497,6 +530,9 @@ fn pace(standing: &Standing, counts: TrialCounts) -> String {
     let mut seconds: Vec<f64> = standing.trials.iter().filter_map(|trial| trial.seconds_total).collect();
     seconds.sort_by(f64::total_cmp);
     let Some(median) = seconds.get(seconds.len() / 2) else {
+        if counts.results() > 0 || study.plan.evaluation == Evaluation::Script {
+            return String::new();
+        }
         return "The first trial starts from a guess and takes longest: up to a minute.".to_owned();
     };
     let left = study.plan.trial_budget.saturating_sub(counts.results());

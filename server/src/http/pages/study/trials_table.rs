@@ -149,14 +149,15 @@ fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
 }
 
 fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
+    let count = |value: u32| format::count(value.into());
     if shown == 0 {
-        return format!("None of {total} trials.");
+        return format!("None of {} trials.", count(total));
     }
-    let (first, last) = (offset + 1, offset + shown);
+    let (first, last) = (count(offset + 1), count(offset + shown));
     if matching < total {
-        format!("{first} to {last} of {matching} that fit, of {total} trials.")
+        format!("{first} to {last} of {} that fit, of {} trials.", count(matching), count(total))
     } else {
-        format!("{first} to {last} of {total} trials; all of them are in the downloads.")
+        format!("{first} to {last} of {} trials; all of them are in the downloads.", count(total))
     }
 }
 
