@@ -1,7 +1,7 @@
 //! OpenSim's motion and storage files (.mot, .sto): a header that ends with `endheader`, then a table over time.
 
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table, malformed};
+use crate::table::{Clock, Separator, Table, lines_of, malformed};
 
 /// Unit of the angles of an OpenSim file whose header does not say it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub(crate) struct StorageFile {
 impl StorageFile {
     /// Reads the header and the table; `what` names the file.
     pub(crate) fn read(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = text.lines().collect();
+        let lines: Vec<&str> = lines_of(text);
         let end = lines
             .iter()
             .position(|line| line.trim().eq_ignore_ascii_case("endheader"))

@@ -7,7 +7,7 @@ use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::reference::LARGEST_ANGLE_RAD;
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table};
+use crate::table::{Clock, Separator, Table, lines_of};
 use serde::{Deserialize, Serialize};
 
 /// Order of one pass of the low-pass.
@@ -55,7 +55,7 @@ impl JointRecording {
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = text.lines().collect();
+        let lines: Vec<&str> = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
         let joints = JOINTS.into_iter().filter_map(|joint| Some((joint, table.find(&format!("{joint}_rad"))?)));

@@ -2,6 +2,11 @@
 
 use crate::subject::ModelError;
 
+/// The lines of a file, without the byte order mark that spreadsheets write at the beginning.
+pub(crate) fn lines_of(text: &str) -> Vec<&str> {
+    text.trim_start_matches('\u{feff}').lines().collect()
+}
+
 /// Named columns of equal length over time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Table {

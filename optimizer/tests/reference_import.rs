@@ -265,7 +265,9 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
     for (found, wanted) in recording.angles_rad[7].iter().zip(wanted) {
         assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
     }
+    let marked = Recording::from_csv("own.csv", &format!("\u{feff}{own}")).unwrap();
     let recording = Recording::from_csv("own.csv", &own).unwrap();
+    assert_eq!(marked, recording, "with a byte order mark as without");
     assert_eq!(recording.angles_rad[39], [0.1, 0.2, 0.39, 0.4, 0.5]);
     assert_eq!(recording.steps[0], "one adult");
 }

@@ -5,7 +5,7 @@ use crate::filter::{self, band_pass, low_pass};
 use crate::opensim::StorageFile;
 use crate::reference::{contacts, given};
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table};
+use crate::table::{Clock, Separator, Table, lines_of};
 
 /// Sampling rates that are accepted where a file has no time, Hz.
 const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
@@ -32,7 +32,7 @@ impl EmgRecording {
             Some(rate_hz) => Clock::Rate(checked_rate(rate_hz)?),
             None => Clock::Column("time_s"),
         };
-        let lines: Vec<&str> = text.lines().collect();
+        let lines: Vec<&str> = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, clock)?;
         Self::from_table(&table)

@@ -3,7 +3,7 @@
 use super::LARGEST_ANGLE_RAD;
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::subject::ModelError;
-use crate::table::{Clock, Separator, Table};
+use crate::table::{Clock, Separator, Table, lines_of};
 
 /// Place of the left knee among the reference's angles.
 const KNEE: usize = 2;
@@ -106,7 +106,7 @@ impl Recording {
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = text.lines().collect();
+        let lines: Vec<&str> = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
         let mut steps: Vec<String> =
@@ -218,6 +218,6 @@ fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
 
 /// A table of Camargo et al. 2021: the first column has the time, s.
 fn camargo_table(what: &str, text: &str) -> Result<Table, ModelError> {
-    let lines: Vec<&str> = text.lines().collect();
+    let lines: Vec<&str> = lines_of(text);
     Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))
 }

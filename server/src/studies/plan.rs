@@ -1,6 +1,6 @@
 //! Making a study: one way in for the form, the REST interface and the command line.
 
-use super::{catalogue, search};
+use super::{catalogue, recording, search};
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
@@ -26,7 +26,8 @@ pub struct NewStudy {
     /// With which device; by default the built-in one.
     #[serde(default)]
     pub device_id: Option<DeviceId>,
-    /// What Gait RMSE is measured against; by default the built-in reference.
+    /// What Gait RMSE is measured against; by default the reference gait nearest to the subject in height and body mass, and
+    /// the built-in one where no reference says whose it is.
     #[serde(default)]
     pub reference_gait_id: Option<ReferenceGaitId>,
     /// With muscles (C1-C12) or without (C1-C4).
@@ -212,7 +213,10 @@ async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
     };
     let reference_gait_id = match new.reference_gait_id {
         Some(id) => reference_gaits::get(writer, id).await?.id,
-        None => catalogue::reference_gait(writer).await?.id,
+        None => match recording::nearest(writer, &subject.body()).await? {
+            Some(nearest) => nearest.id,
+            None => catalogue::reference_gait(writer).await?.id,
+        },
     };
     let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {

@@ -197,3 +197,12 @@ pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Match
     });
     Ok(found)
 }
+
+/// The reference gait nearest to a subject; none where no reference says whose it is.
+///
+/// # Errors
+/// What the database reports.
+pub async fn nearest(db: &mut Connection, subject: &Subject) -> Result<Option<ReferenceGait>, Error> {
+    let matches = matches(db, subject).await?;
+    Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait))
+}

@@ -42,6 +42,7 @@ fn lower_rmse(subject: u32, verdicts: &[Verdict]) -> Statement {
         here: format!("throughout for {throughout} of {} seeds; at {lower} of {compared} iterations", pairs.len()),
         agrees: match throughout {
             0 => "no",
+            1 if pairs.len() == 1 => "with its only seed",
             all if all == pairs.len() => "yes",
             _ => "in part",
         },

@@ -16,10 +16,9 @@ use crate::store::devices::Device;
 use crate::store::reference_gaits::ReferenceGait;
 use crate::store::studies::{FeedbackMode, Study};
 use crate::store::subjects::{self, Subject};
-use crate::store::{Connection, ReferenceGaitId, SubjectId, Writer, commit, devices, reference_gaits, trials};
+use crate::store::{Connection, SubjectId, Writer, commit, devices, reference_gaits, trials};
 use crate::studies::person::{self, NewSubject};
 use crate::studies::plan::{self, NewStudy};
-use crate::studies::recording;
 use askama::Template;
 use axum::Json;
 use axum::extract::State;
@@ -346,10 +345,7 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
     let new = NewStudy {
         name: Some(fields.name.clone()),
         device_id: optional("device", &fields.device, "a device of the list")?,
-        reference_gait_id: match optional("reference_gait", &fields.reference_gait, "a reference gait of the list")? {
-            None => nearest_reference(writer, subject).await?,
-            chosen => chosen,
-        },
+        reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait of the list")?,
         muscles: match fields.muscles.as_str() {
             "on" => true,
             "off" => false,
@@ -369,13 +365,6 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
         ..NewStudy::of(subject)
     };
     plan::create(writer, &caller.actor, new).await
-}
-
-/// The matcher's proposal for a subject; none where nothing is known of whose the reference gaits are.
-async fn nearest_reference(db: &mut Connection, subject: SubjectId) -> Result<Option<ReferenceGaitId>, Error> {
-    let body = subjects::get(db, subject).await?.body();
-    let matches = recording::matches(db, &body).await?;
-    Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait.id))
 }
 
 /// Nothing: the lowest objective counts alone.
