@@ -94,7 +94,7 @@ fn every_limit_is_examined() {
         ("C4 forward hip velocity in SS1", |gait| gait.settings.limits.phase_rate_min_m_s = 1.0),
         ("C5-C8 activations, fibre lengths", |gait| gait.settings.limits.fibre_length_min = 0.7),
         ("C3 load of contacts before they lift off", |gait| gait.settings.naturalness.trailing_load_share = 0.5),
-        ("C3 load of contacts before they lift off", |gait| gait.settings.limits.liftoff_force_n = 400.0),
+        ("C3 load of contacts before they lift off", |gait| gait.settings.limits.liftoff_force_n = 200.0),
     ];
     let (_, whole) = golden_gait(1, true);
     assert!(certificate(&whole).passed);

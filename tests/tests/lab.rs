@@ -360,6 +360,8 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
         let kept = service.post(&bring, &with_heel(walk, &electromyogram(strength))).await;
         assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
     }
+    let same = service.post(&bring, &with_heel(3, &electromyogram(1.5))).await;
+    assert!(same.status == StatusCode::CONFLICT && same.text.contains("brought as that of walk 2"), "{}", same.text);
     let done = service.post(&format!("{api}/emg-results"), &json!({})).await;
     assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
     let walks = done.json()["result"]["walks"].as_array().unwrap().clone();

@@ -80,6 +80,11 @@ impl PackedRecording {
             raw_sha256: json::sha256(file.as_bytes()),
         })
     }
+
+    /// Whether it is the file of a recording of the same kind.
+    pub fn is_file_of(&self, recording: &LabRecording) -> bool {
+        (self.kind, &self.raw_sha256) == (recording.kind, &recording.raw_sha256)
+    }
 }
 
 /// Adds a recording.

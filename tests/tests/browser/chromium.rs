@@ -307,10 +307,22 @@ impl Tab {
         self.page.evaluate(script.to_owned()).await.unwrap();
     }
 
-    /// The value of an expression, of a promise its outcome, as JSON text or bare string.
+    /// The value of an expression, of a promise its outcome, as JSON text or bare string; while a page gives way to the next
+    /// one, a moment later.
     pub(crate) async fn value(&self, expression: &str) -> String {
-        let value = self.page.evaluate(expression.to_owned()).await.unwrap().value().cloned().unwrap_or_default();
-        value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+        for _ in 0..100 {
+            match self.page.evaluate(expression.to_owned()).await {
+                Ok(found) => {
+                    let value = found.value().cloned().unwrap_or_default();
+                    return value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                }
+                Err(error) if error.to_string().contains("Cannot find context") => {
+                    tokio::time::sleep(Duration::from_millis(50)).await;
+                }
+                Err(error) => panic!("{expression}: {error}"),
+            }
+        }
+        panic!("no page has a value for {expression}");
     }
 
     /// Changes the size of the window.

@@ -247,7 +247,8 @@ pub async fn brought(db: &mut Connection, id: LabRecordingId) -> Result<Brought,
 /// Keeps a file with the walk that it is of.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when the session is closed or the walk was not recorded.
+/// [`Error::NotFound`], [`Error::Conflict`] when the session is closed, the walk was not recorded, or the very same file was
+/// brought of another walk.
 pub async fn keep(
     writer: &mut Writer,
     actor: &Actor,
@@ -257,6 +258,13 @@ pub async fn keep(
     let walk = checked.walk;
     if still_open(writer, id).await?.done(Act::Walk(walk)).is_none() {
         return Err(Error::conflict(format!("walk {walk} was not recorded yet: say so in the lab first")));
+    }
+    let brought = lab_recordings::of_session(writer, id).await?;
+    if let Some(other) = brought.iter().find(|other| other.walk != walk && checked.packed.is_file_of(other)) {
+        let other = other.walk;
+        return Err(Error::conflict(format!(
+            "this very file was brought as that of walk {other}: no two walks are alike"
+        )));
     }
     let added = lab_recordings::insert(writer, actor, id, walk, &checked.packed).await?;
     let detail = json!({ "walk": walk, "kind": added.kind, "recording": added.id, "sha256": added.raw_sha256 });
