@@ -486,7 +486,7 @@ async fn limit_cycles_lie_over_the_orbit_of_the_gait_once_it_may_be_known() {
     }
     let recording = motion().replace('\n', "%0A").replace(',', "%2C");
     for walk in 1..=2 {
-        let form = format!("walk={walk}&form=csv&unit=&cutoff_hz=6&recording={recording}");
+        let form = format!("walk={walk}&form=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
         let kept = service.post_text(&format!("{page}/motions"), FORM, &form).await;
         assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     }

@@ -106,7 +106,9 @@ fn a_short_comparison_ends_in_a_report_that_stands_alone() {
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
     let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
     let report = read("report.html");
-    assert!(report.contains("Subject 1, seed 1: Gait RMSE of the best action") && report.contains("<svg"));
+    assert!(report.contains("<h2>Subject 1, seed 1</h2>") && report.contains("<h4>Gait RMSE of the best action</h4>"));
+    assert_eq!(report.matches("class=\"tiles\"").count(), 2, "the strides of both gaits");
+    assert!(report.contains("<h4>Right ankle</h4>"), "an orbit of every joint");
     assert!(!report.contains("src=") && !report.contains("<link"), "nothing from elsewhere");
     assert_eq!(read("studies.csv").lines().count(), 3);
     assert_eq!(read("iterations.csv").lines().count(), 3);
