@@ -42,7 +42,7 @@ pub(crate) struct StorageFile {
 impl StorageFile {
     /// Reads the header and the table; `what` names the file.
     pub(crate) fn read(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = lines_of(text);
+        let lines = lines_of(text);
         let end = lines
             .iter()
             .position(|line| line.trim().eq_ignore_ascii_case("endheader"))

@@ -55,7 +55,7 @@ impl JointRecording {
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = lines_of(text);
+        let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
         let joints = JOINTS.into_iter().filter_map(|joint| Some((joint, table.find(&format!("{joint}_rad"))?)));

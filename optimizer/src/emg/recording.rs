@@ -32,7 +32,7 @@ impl EmgRecording {
             Some(rate_hz) => Clock::Rate(checked_rate(rate_hz)?),
             None => Clock::Column("time_s"),
         };
-        let lines: Vec<&str> = lines_of(text);
+        let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, clock)?;
         Self::from_table(&table)

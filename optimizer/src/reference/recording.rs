@@ -106,7 +106,7 @@ impl Recording {
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
     pub fn from_csv(what: &str, text: &str) -> Result<Self, ModelError> {
-        let lines: Vec<&str> = lines_of(text);
+        let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, Clock::Column("time_s"))?;
         let mut steps: Vec<String> =
@@ -171,7 +171,7 @@ impl Recording {
                 return Err(table.malformed_row(row, None, reason));
             }
         }
-        if let Some(reason) = still_knee(&angles[KNEE]) {
+        if let Some(reason) = still_knee(&angles[KNEE]).or_else(|| backward_knee(&angles[KNEE])) {
             return Err(table.malformed_row(0, None, format!("{} {reason}", super::REFERENCE_COLUMNS[KNEE])));
         }
         let time_s = table.times();
@@ -181,18 +181,19 @@ impl Recording {
                 return Err(table.malformed_row(row, None, reason));
             }
         }
-        if let Some(reason) = backward_knee(&angles[KNEE]) {
-            return Err(table.malformed_row(0, None, format!("{} {reason}", super::REFERENCE_COLUMNS[KNEE])));
-        }
         let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
         Ok(Self { what: what.to_owned(), time_s, angles_rad, knee_r_rad, right_force, steps })
     }
 }
 
+/// The lowest and the highest value.
+fn extremes(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+}
+
 /// Why this is no knee that walks: it hardly bends.
 fn still_knee(flexion_rad: &[f64]) -> Option<String> {
-    let lowest = flexion_rad.iter().copied().fold(f64::INFINITY, f64::min);
-    let highest = flexion_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (lowest, highest) = extremes(flexion_rad);
     let range = highest - lowest;
     (range < SMALLEST_KNEE_RANGE_RAD)
         .then(|| format!("moves over {range:.3} rad only, less than {SMALLEST_KNEE_RANGE_RAD} rad; is the unit right?"))
@@ -207,8 +208,7 @@ fn jump(time_s: &[f64], angle_rad: &[f64]) -> Option<(usize, f64)> {
 
 /// Why this is no knee that walks, flexion positive: it is bent backwards, as where a file has the other sign.
 fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
-    let lowest = flexion_rad.iter().copied().fold(f64::INFINITY, f64::min);
-    let highest = flexion_rad.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (lowest, highest) = extremes(flexion_rad);
     (lowest + highest < 0.0).then(|| {
         format!(
             "is from {lowest:.2} to {highest:.2} rad with flexion positive: the file's knee angle has the other sign"
@@ -218,6 +218,6 @@ fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
 
 /// A table of Camargo et al. 2021: the first column has the time, s.
 fn camargo_table(what: &str, text: &str) -> Result<Table, ModelError> {
-    let lines: Vec<&str> = lines_of(text);
+    let lines = lines_of(text);
     Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))
 }

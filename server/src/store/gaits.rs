@@ -91,7 +91,7 @@ pub async fn json_of(db: &mut Connection, trial: TrialId) -> StoreResult<String>
     String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
 }
 
-/// Whether the gait of a trial is here: a script may have told figures alone, and trajectories are pruned.
+/// Whether the gait of a trial, or the last iterate of a solve without one, is here: a script may have told figures alone, and trajectories are pruned.
 ///
 /// # Errors
 /// What the database reports.
@@ -106,14 +106,6 @@ pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
 /// As [`json_of`].
 pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Gait> {
     json::from_text("gait", &json_of(db, trial).await?)
-}
-
-/// Whether a trial has a gait, or the last iterate of a solve without one.
-///
-/// # Errors
-/// What the database reports.
-pub async fn is_kept(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
-    Ok(sqlx::query("select 1 from gaits where trial_id = ?").bind(trial).fetch_optional(db).await?.is_some())
 }
 
 /// What another solve can start from.

@@ -135,7 +135,7 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
             "trial {number} is {state}: only a trial that did not converge is explained"
         )));
     };
-    if !gaits::is_kept(db, trial.id).await? {
+    if !gaits::is_here(db, trial.id).await? {
         return Err(Error::conflict(format!("the last iterate of trial {number} was not kept")));
     }
     Ok(status)
