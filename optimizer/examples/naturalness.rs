@@ -8,47 +8,64 @@ mod arguments;
 
 use arguments::argument;
 use gait_optimizer::gait::{Axis, DomainTrajectory, Side};
-use gait_optimizer::{CancelToken, Gait, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
+use gait_optimizer::{
+    BasinChoice, CancelToken, Gait, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve,
+};
 use std::error::Error;
 use std::path::Path;
 
-/// Settings by name.
-fn wishes() -> Vec<(&'static str, GaitSettings)> {
-    let with = |change: &dyn Fn(&mut GaitSettings)| {
+/// A wish for a natural gait: what of a solve it changes.
+struct Wish {
+    name: &'static str,
+    settings: GaitSettings,
+    basin_choice: BasinChoice,
+    cold_guesses: usize,
+    /// Then solved on a mesh twice as fine.
+    finer: bool,
+}
+
+impl Wish {
+    fn new(name: &'static str, change: impl Fn(&mut GaitSettings)) -> Self {
         let mut settings = GaitSettings::default();
         change(&mut settings);
-        settings
-    };
+        let SolveOptions { basin_choice, cold_guesses, .. } = SolveOptions::default();
+        Self { name, settings, basin_choice, cold_guesses, finer: false }
+    }
+
+    /// Of four cold guesses the gait nearest to the reference among those that cost at most 3 % more than the cheapest.
+    fn of_the_natural_basin(self) -> Self {
+        Self { cold_guesses: 4, basin_choice: BasinChoice::NearestToReference { within_percent: 3.0 }, ..self }
+    }
+}
+
+fn wishes() -> Vec<Wish> {
     let fast = |s: &mut GaitSettings| (s.limits.speed_min_m_s, s.limits.speed_max_m_s) = (1.2, 1.3);
     // Perry and Burnfield 2010: double support of about 12 % of the stride per step, 0.13 s of 1.1 s.
     let long_double_support =
         |s: &mut GaitSettings| (s.limits.duration_min_s.ds2, s.limits.duration_min_s.ds3) = (0.06, 0.06);
     let loaded = |s: &mut GaitSettings| s.naturalness.trailing_load_share = 0.5;
     let tracking = |weight: f64| move |s: &mut GaitSettings| s.naturalness.reference_weight = weight;
+    let plain = || Wish::new("none", |_| {});
     vec![
-        ("none", GaitSettings::default()),
-        ("speed 1.2 to 1.3 m/s", with(&fast)),
-        ("double support of 0.12 s", with(&long_double_support)),
-        ("gradual weight transfer", with(&loaded)),
-        (
-            "gradual transfer in 0.12 s",
-            with(&|s| {
-                long_double_support(s);
-                loaded(s);
-            }),
-        ),
-        ("reference weight 0.01", with(&tracking(0.01))),
-        ("reference weight 0.1", with(&tracking(0.1))),
-        ("reference weight 1", with(&tracking(1.0))),
-        (
-            "all, reference weight 0.1",
-            with(&|s| {
-                fast(s);
-                long_double_support(s);
-                loaded(s);
-                tracking(0.1)(s);
-            }),
-        ),
+        plain(),
+        Wish { name: "nearest of four guesses within 3 %", ..plain().of_the_natural_basin() },
+        Wish { name: "mesh twice as fine", finer: true, ..plain() },
+        Wish::new("speed 1.2 to 1.3 m/s", fast),
+        Wish::new("double support of 0.12 s", long_double_support),
+        Wish::new("gradual weight transfer", loaded),
+        Wish::new("gradual transfer in 0.12 s", |s| {
+            long_double_support(s);
+            loaded(s);
+        }),
+        Wish::new("reference weight 0.01", tracking(0.01)),
+        Wish::new("reference weight 0.1", tracking(0.1)),
+        Wish::new("reference weight 1", tracking(1.0)),
+        Wish::new("all, reference weight 0.1", |s| {
+            fast(s);
+            long_double_support(s);
+            loaded(s);
+            tracking(0.1)(s);
+        }),
     ]
 }
 
@@ -82,13 +99,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         "wish,status,gait_rmse_rad,cost_of_transport,iterations,seconds,speed_m_s,double_support_percent,\
          trailing_share_percent,left_knee_peak_deg,right_knee_peak_deg"
     );
-    for (name, settings) in wishes() {
-        let problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
-        let options = SolveOptions { threads: 2, ..SolveOptions::default() };
-        let outcome = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new())?;
+    for Wish { name, settings, basin_choice, cold_guesses, finer } in wishes() {
+        let mut problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
+        let options = SolveOptions { threads: 2, basin_choice, cold_guesses, ..SolveOptions::default() };
+        let mut solve_from = |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
+        let mut outcome = solve_from(&problem, None)?;
+        let (mut iterations, mut seconds) = (outcome.report.iterations, outcome.report.seconds_total);
+        if finer {
+            let Mesh { ds2, ds3, ss2, ss1 } = problem.settings.mesh;
+            problem.settings.mesh = Mesh { ds2: 2 * ds2, ds3: 2 * ds3, ss2: 2 * ss2, ss1: 2 * ss1 };
+            outcome = solve_from(&problem, Some(&outcome.warm_start))?;
+            iterations += outcome.report.iterations;
+            seconds += outcome.report.seconds_total;
+        }
         let (gait, report) = (&outcome.gait, &outcome.report);
         if !folder.is_empty() {
-            let file = Path::new(&folder).join(format!("{}.json", name.replace(' ', "_").replace('/', "_per_")));
+            let file = Path::new(&folder).join(format!("{}.json", name.replace(' ', "_").replace('/', "_per_").replace('%', "percent")));
             std::fs::write(file, serde_json::to_string(gait)?)?;
         }
         let double: f64 = gait.domains.iter().filter(|d| d.name.starts_with("DS")).map(|d| d.duration_s).sum();
@@ -97,8 +123,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             report.status,
             report.gait_rmse_rad,
             report.cost_of_transport,
-            report.iterations,
-            report.seconds_total,
+            iterations,
+            seconds,
             report.speed_m_s,
             100.0 * double / gait.stride_time_s,
             100.0 * trailing_share(gait),

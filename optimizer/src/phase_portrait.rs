@@ -14,6 +14,8 @@ use serde::{Deserialize, Serialize};
 const ORDER: usize = 4;
 /// Longest time between two rows, s: what lies in a longer one is not known.
 const LONGEST_GAP_S: f64 = 0.05;
+/// Shortest recording, s: one stride and its way back; the paper shows ten seconds.
+const SHORTEST_S: f64 = 2.0;
 
 /// The joints of the walker, as columns of our own table. Forward lean, flexion and dorsiflexion are positive, hips are
 /// measured from the trunk.
@@ -103,7 +105,12 @@ impl JointRecording {
             let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
             return Err(table.malformed_row(row + 1, Some(1), reason));
         }
-        let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
+        let lasts = times[times.len() - 1] - times[0];
+        if lasts < SHORTEST_S {
+            let reason = format!("{lasts:.3} s are recorded, a limit cycle needs at least {SHORTEST_S} s");
+            return Err(table.malformed_row(times.len() - 1, Some(1), reason));
+        }
+        let rate_hz = (times.len() - 1) as f64 / lasts;
         let joints = joints.into_iter().map(|(joint, angles)| (joint, evenly(&times, &angles))).collect();
         Ok(Self { rate_hz, joints })
     }

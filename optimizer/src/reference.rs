@@ -22,6 +22,9 @@ pub(crate) const LARGEST_ANGLE_RAD: f64 = PI;
 pub const REFERENCE_ROWS: usize = 101;
 /// Column names after the percentage.
 pub const REFERENCE_COLUMNS: [&str; 5] = ["torso_rad", "hip_L_rad", "knee_L_rad", "ankle_L_rad", "hip_R_rad"];
+/// Column names of the standard deviations of these angles, where a file has them.
+pub const DEVIATION_COLUMNS: [&str; 5] =
+    ["torso_sd_rad", "hip_L_sd_rad", "knee_L_sd_rad", "ankle_L_sd_rad", "hip_R_sd_rad"];
 
 /// Mean joint angles over one gait cycle from right heel strike, radians, seven-link convention.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,7 +56,8 @@ impl ReferenceGait {
         Self::from_csv("Falisse 2019, subject 1", BUILTIN_CSV)
     }
 
-    /// Reads `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` with 101 rows; lines before the header
+    /// Reads `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` with 101 rows, and where they are there the
+    /// standard deviations `torso_sd_rad,hip_L_sd_rad,knee_L_sd_rad,ankle_L_sd_rad,hip_R_sd_rad`; lines before the header
     /// that start with `#` are the provenance.
     ///
     /// # Errors
@@ -64,38 +68,54 @@ impl ReferenceGait {
             reason,
         };
         let comments: Vec<&str> = text.lines().take_while(|l| l.starts_with('#')).collect();
-        let skipped = comments.len() as u64;
+        let header_line = comments.len() as u64 + 1;
         let provenance = comments.iter().map(|l| l.trim_start_matches('#').trim()).collect::<Vec<_>>().join("\n");
         let mut reader =
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-        let headers = reader.headers().map_err(|e| malformed(skipped + 1, e.to_string()))?.clone();
-        let mut columns = [0; 5];
-        for (column, wanted) in columns.iter_mut().zip(REFERENCE_COLUMNS) {
-            *column = headers
-                .iter()
-                .position(|h| h == wanted)
-                .ok_or_else(|| malformed(skipped + 1, format!("column {wanted} is missing")))?;
-        }
+        let headers = reader.headers().map_err(|e| malformed(header_line, e.to_string()))?.clone();
+        let places = |wanted: [&'static str; 5]| -> Result<[usize; 5], ModelError> {
+            let mut found = [0; 5];
+            for (place, wanted) in found.iter_mut().zip(wanted) {
+                *place = headers
+                    .iter()
+                    .position(|h| h == wanted)
+                    .ok_or_else(|| malformed(header_line, format!("column {wanted} is missing")))?;
+            }
+            Ok(found)
+        };
+        let angles = places(REFERENCE_COLUMNS)?;
+        let has_deviations = headers.iter().any(|h| DEVIATION_COLUMNS.contains(&h));
+        let deviations = has_deviations.then(|| places(DEVIATION_COLUMNS)).transpose()?;
         let mut angles_rad = Vec::with_capacity(REFERENCE_ROWS);
+        let mut deviations_rad = Vec::new();
         for record in reader.records() {
             let record = record.map_err(|e| malformed(e.position().map_or(0, csv::Position::line), e.to_string()))?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let mut row = [0.0; 5];
-            for ((value, &column), wanted) in row.iter_mut().zip(&columns).zip(REFERENCE_COLUMNS) {
-                let cell = record.get(column).unwrap_or("");
-                *value =
-                    cell.parse::<f64>().ok().filter(|angle| angle.abs() <= LARGEST_ANGLE_RAD).ok_or_else(|| {
-                        let range = format!("[-{LARGEST_ANGLE_RAD:.2}, {LARGEST_ANGLE_RAD:.2}] rad");
-                        malformed(line, format!("{wanted} = {cell:?} is not an angle in {range}"))
-                    })?;
+            let cells = |places: [usize; 5], names: [&str; 5], least: f64| {
+                let mut row = [0.0; 5];
+                for ((value, place), wanted) in row.iter_mut().zip(places).zip(names) {
+                    let cell = record.get(place).unwrap_or("");
+                    *value = cell
+                        .parse::<f64>()
+                        .ok()
+                        .filter(|angle| (least..=LARGEST_ANGLE_RAD).contains(angle))
+                        .ok_or_else(|| {
+                            let range = format!("[{least:.2}, {LARGEST_ANGLE_RAD:.2}] rad");
+                            let line = record.position().map_or(0, csv::Position::line);
+                            malformed(line, format!("{wanted} = {cell:?} is not an angle in {range}"))
+                        })?;
+                }
+                Ok(row)
+            };
+            angles_rad.push(cells(angles, REFERENCE_COLUMNS, -LARGEST_ANGLE_RAD)?);
+            if let Some(places) = deviations {
+                deviations_rad.push(cells(places, DEVIATION_COLUMNS, 0.0)?);
             }
-            angles_rad.push(row);
         }
         let reference = Self {
             name: name.to_owned(),
             provenance,
             angles_rad,
-            standard_deviation_rad: None,
+            standard_deviation_rad: has_deviations.then_some(deviations_rad),
             height_m: None,
             body_mass_kg: None,
         };

@@ -57,6 +57,18 @@ fn settings_are_refused_by_name() {
 }
 
 /// 0 to 2 s at 100 Hz, rising by 1 per second.
+#[test]
+fn channels_that_are_no_muscles_are_refused() {
+    let refused = |change: fn(&mut Vec<f64>)| {
+        let mut changed = recording(2000);
+        change(&mut changed.channels[0].1);
+        changed.envelopes(&EmgSettings::default()).unwrap_err().to_string()
+    };
+    assert_eq!(refused(|samples| samples.fill(0.25)), "channel TA: every sample is 0.25: nothing was connected");
+    let artefact = refused(|samples| samples[700] = 1e6);
+    assert!(artefact.starts_with("channel TA: 1000000 at 0.7000 s is more than 100 times as far"), "{artefact}");
+}
+
 fn ramp() -> Envelope {
     let values = (0..=200).map(|k| f64::from(k) / 100.0).collect();
     Envelope { channel: "TA".to_owned(), start_s: 0.0, rate_hz: 100.0, values }

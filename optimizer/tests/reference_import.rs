@@ -221,8 +221,10 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
         // The file has eight decimals; linear between rows, 90 rad/s² leave h²/8 qdd = 3e-6 rad. Where an impact changes
         // a velocity by up to 10 rad/s between two rows, h/4 of that: 1.3e-3 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
-        let strikes = HeelStrikes::Given(vec![0.0, end]);
-        let reference = recording.reference("gait", &strikes, Walker::default()).unwrap();
+        let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
+        assert!(reference.provenance.contains(&format!("2 right heel strikes at the ends of the recording: 0.0000, {end:.4} s")));
+        let within = recording.heel_strikes(&HeelStrikes::Kinematics).unwrap_err().to_string();
+        assert!(within.ends_with("a recording of one stride begins and ends with one: choose its ends"), "{within}");
         for (domain, name) in gait.domains.iter().zip(0..) {
             for ((time, q), k) in domain.time_s.iter().zip(&domain.q).zip(0..) {
                 let at_an_impact = k == 0 || k + 1 == domain.time_s.len();
@@ -270,6 +272,45 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
     assert_eq!(marked, recording, "with a byte order mark as without");
     assert_eq!(recording.angles_rad[39], [0.1, 0.2, 0.39, 0.4, 0.5]);
     assert_eq!(recording.steps[0], "one adult");
+}
+
+#[test]
+fn hips_the_other_way_round_are_refused() {
+    let recording = read(&opensim(5)).unwrap();
+    let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2]);
+    let refused = |change: fn(&mut [f64; 5]), how: &HeelStrikes| {
+        let mut other = recording.clone();
+        other.angles_rad.iter_mut().for_each(change);
+        other.reference("x", how, Walker::default()).unwrap_err().to_string()
+    };
+    let behind = "at right heel strike the right thigh is 50° behind the left one";
+    for change in [|angles: &mut [f64; 5]| angles.swap(1, 4), |angles| (angles[1], angles[4]) = (-angles[1], -angles[4])] {
+        let reason = refused(change, &given);
+        assert!(reason.contains(behind), "{reason}");
+    }
+    // Heel strikes of the left foot.
+    let left = recording.reference("x", &HeelStrikes::Given(vec![0.55, 1.65, 2.75]), Walker::default());
+    assert!(left.unwrap_err().to_string().contains(behind));
+}
+
+#[test]
+fn the_built_in_reference_has_the_deviations_of_its_trials() {
+    let reference = ReferenceGait::builtin().unwrap();
+    let deviation = reference.standard_deviation_rad.unwrap();
+    // Falisse 2019: torso .77°, hip .53°, knee 1.08°, ankle 1.43° at heel strike; the left leg half a cycle later.
+    for (found, wanted) in [deviation[0][0], deviation[0][4], deviation[50][2], deviation[50][3]]
+        .into_iter()
+        .zip([0.773_924, 0.532_748, 1.078_66, 1.429_88_f64])
+    {
+        assert!((found - wanted.to_radians()).abs() < 1e-6, "{found} {wanted}");
+    }
+    let half = "torso_sd_rad,hip_L_sd_rad,knee_L_sd_rad,ankle_L_sd_rad";
+    let columns = format!("pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,{half}\n");
+    let refused = ReferenceGait::from_csv("half", &columns).unwrap_err().to_string();
+    assert!(refused.contains("line 1: column hip_R_sd_rad is missing"), "{refused}");
+    let negative = format!("{},hip_R_sd_rad\n0,.1,.1,.1,.1,.1,.01,.01,-.01,.01,.01\n", columns.trim_end());
+    let refused = ReferenceGait::from_csv("negative", &negative).unwrap_err().to_string();
+    assert!(refused.contains("line 2: knee_L_sd_rad = \"-.01\" is not an angle in [0.00, 3.14] rad"), "{refused}");
 }
 
 #[test]

@@ -487,5 +487,5 @@ def read_reference(path):
     with open(path) as file:
         lines = [line for line in file if not line.startswith("#")]
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-    assert table.shape == (101, 6), table.shape
-    return list(table[:, 1:].T)
+    assert table.shape[0] == 101 and table.shape[1] >= 6, table.shape
+    return list(table[:, 1:6].T)

@@ -9,6 +9,9 @@ use crate::table::{Clock, Separator, Table, lines_of};
 
 /// Sampling rates that are accepted where a file has no time, Hz.
 const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
+/// A sample farther from the median than so many times what 99 of 100 samples keep within is no muscle's: those of bursts
+/// of activity reach about 10.
+const FARTHEST_SAMPLE: f64 = 100.0;
 
 /// Raw signals of several channels over the same time.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,7 +128,8 @@ impl EmgRecording {
     /// The envelope of every channel.
     ///
     /// # Errors
-    /// [`ModelError`] naming a setting out of range, or when the recording is too short to be filtered.
+    /// [`ModelError`] naming a setting out of range, or a channel that is too short to be filtered, does not change, or has
+    /// a sample that no muscle gives.
     pub fn envelopes(&self, settings: &EmgSettings) -> Result<Vec<Envelope>, ModelError> {
         settings.validate(self.rate_hz)?;
         let share = |hz: f64| hz / (0.5 * self.rate_hz);
@@ -139,12 +143,42 @@ impl EmgRecording {
                     let reason = format!("{} samples, the filters need {fewest}", samples.len());
                     return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
                 }
+                if let Some(reason) = self.no_muscle(samples) {
+                    return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
+                }
                 let rectified: Vec<f64> = filter::filter(&band, samples).into_iter().map(f64::abs).collect();
                 let values = filter::filter(&smooth, &rectified);
                 Ok(Envelope { channel: channel.clone(), start_s: self.start_s, rate_hz: self.rate_hz, values })
             })
             .collect()
     }
+}
+
+impl EmgRecording {
+    /// Why this is no signal of a muscle: nothing was connected, or one sample stands out of all others.
+    fn no_muscle(&self, samples: &[f64]) -> Option<String> {
+        let first = samples.first()?;
+        if samples.iter().all(|sample| sample == first) {
+            return Some(format!("every sample is {first}: nothing was connected"));
+        }
+        let median = quantile(samples.to_vec(), 0.5);
+        let kept_within = quantile(samples.iter().map(|sample| (sample - median).abs()).collect(), 0.99);
+        let place = samples.iter().position(|sample| (sample - median).abs() > FARTHEST_SAMPLE * kept_within)?;
+        let time_s = self.start_s + place as f64 / self.rate_hz;
+        Some(format!(
+            "{} at {time_s:.4} s is more than {FARTHEST_SAMPLE} times as far from the median as 99 of 100 samples are \
+             ({kept_within:.3e}): an artefact that would pass for activity",
+            samples[place]
+        ))
+    }
+}
+
+/// The value below which a share of the values lies.
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 <= place < length
+    let place = (share * (values.len() - 1) as f64) as usize;
+    values[place]
 }
 
 fn checked_rate(rate_hz: f64) -> Result<f64, ModelError> {

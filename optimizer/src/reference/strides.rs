@@ -17,6 +17,10 @@ const CONTACT_FORCE_N: f64 = 20.0;
 const SHORTEST_SWING_S: f64 = 0.1;
 /// A heel strike by kinematics is the farthest forward heel within so long before and after, s.
 const NEIGHBOURHOOD_S: f64 = 0.3;
+/// Place of the left knee among the reference's angles.
+const LEFT_KNEE: usize = 2;
+/// A knee may bend so much more while it carries than while it swings, rad: legs that swing nearly straight are walked with, too.
+const STANCE_FLEXION_RAD: f64 = 0.26;
 /// So many heel strikes are written down one by one.
 const MANY_STRIKES: usize = 200;
 /// Thigh and shank, in body heights (Winter 2009).
@@ -31,6 +35,8 @@ pub enum HeelStrikes {
     Force,
     /// Where the right heel is farthest ahead of the pelvis (Zeni et al. 2008, Gait & Posture 27:710).
     Kinematics,
+    /// The first and the last row: the recording is one stride, as this program writes gaits.
+    Ends,
 }
 
 /// Whose gait was recorded, where that is known.
@@ -87,6 +93,26 @@ pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<
     Ok(())
 }
 
+/// Why the mean of the strides does not begin where the right heel strikes: then the right thigh is ahead of the left one,
+/// and the left leg swings in the first half.
+fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
+    let [_, hip_l, _, _, hip_r] = mean[0];
+    let cause = "are left and right, or the signs of the hips, the other way round, or the heel strikes not the right foot's?";
+    if hip_r <= hip_l {
+        let behind = (hip_l - hip_r).to_degrees();
+        return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one: {cause}"));
+    }
+    let highest = |rows: &[[f64; 5]]| rows.iter().map(|row| row[LEFT_KNEE]).fold(f64::NEG_INFINITY, f64::max);
+    let (first, second) = mean.split_at(REFERENCE_ROWS / 2 + 1);
+    (highest(second) > highest(first) + STANCE_FLEXION_RAD).then(|| {
+        let (first, second) = (highest(first).to_degrees(), highest(second).to_degrees());
+        format!(
+            "the left knee bends to {second:.0}° in the second half of the stride from right heel strike and to {first:.0}° in \
+             the first, in which the left leg swings: {cause}"
+        )
+    })
+}
+
 /// Times, s; of many, the first and the last.
 fn in_words(times: &[f64]) -> String {
     match times {
@@ -119,6 +145,7 @@ impl Recording {
                 let knee = self.knee_r_rad.as_ref();
                 self.by_kinematics(knee.ok_or_else(|| malformed(NO_KNEE.to_owned()))?)
             }
+            HeelStrikes::Ends => vec![self.time_s[0], self.time_s[self.time_s.len() - 1]],
         };
         if found.len() < 2 {
             let force = self.right_force.as_ref().filter(|_| *how == HeelStrikes::Force);
@@ -126,7 +153,12 @@ impl Recording {
                 let span = |times: &[f64]| format!("{:.3} to {:.3} s", times[0], times[times.len() - 1]);
                 format!(" (angles from {}, forces from {})", span(&self.time_s), span(&force.time_s))
             });
-            return Err(malformed(format!("{} right heel strikes{recorded}, two make a stride", found.len())));
+            let hint = match how {
+                HeelStrikes::Kinematics => "; a recording of one stride begins and ends with one: choose its ends",
+                _ => "",
+            };
+            let reason = format!("{} right heel strikes{recorded}, two make a stride{hint}", found.len());
+            return Err(malformed(reason));
         }
         Ok(found)
     }
@@ -200,8 +232,12 @@ impl Recording {
                 deviation[row][i] = if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
             }
         }
+        if let Some(reason) = not_from_right_heel_strike(&mean) {
+            return Err(ModelError::Malformed { what: self.what.clone(), reason });
+        }
         let found = match how {
             HeelStrikes::Given(_) => "given",
+            HeelStrikes::Ends => "at the ends of the recording",
             HeelStrikes::Force => "by the force under the right foot (20 N)",
             HeelStrikes::Kinematics => "by the farthest forward right heel (Zeni et al. 2008)",
         };

@@ -62,6 +62,8 @@ pub enum Strikes {
     /// Where the right heel is farthest ahead of the pelvis.
     #[default]
     Kinematics,
+    /// The first and the last row: the recording is one stride, as exported gaits are.
+    Ends,
 }
 
 /// A recording to make a reference gait of.
@@ -134,6 +136,7 @@ impl NewReferenceGait {
             _ if !self.heel_strikes_s.is_empty() => HeelStrikes::Given(self.heel_strikes_s.clone()),
             Strikes::Force => HeelStrikes::Force,
             Strikes::Kinematics => HeelStrikes::Kinematics,
+            Strikes::Ends => HeelStrikes::Ends,
         };
         let walker = Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
         let definition = recording.reference(name, &strikes, walker)?;
