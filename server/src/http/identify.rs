@@ -1,7 +1,7 @@
 //! Finds out who makes a request, once, before any handler: a token, a session, or nobody.
 
 use super::AppState;
-use crate::access::{Caller, sign_in};
+use crate::access::{Caller, Role, sign_in};
 use crate::error::Error;
 use crate::store::commit;
 use axum::extract::{Request, State};
@@ -12,13 +12,24 @@ use axum::response::Response;
 /// Name of the session cookie.
 const COOKIE: &str = "gaitwright_session";
 
-/// Puts the [`Caller`] into the request. A token that is not good is refused; a session that is not, is nobody.
+/// Whose answer this is, for the pages that errors become.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AnsweredTo(pub(super) Option<Role>);
+
+/// Puts the [`Caller`] into the request, and the caller's role into the answer. A token that is not good is refused; a
+/// session that is not, is nobody.
 pub(super) async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Error> {
     let (path, headers) = (request.uri().path().to_owned(), request.headers().clone());
+    let mut answered_to = None;
     if let Some(caller) = caller(&app, &path, &headers).await? {
+        answered_to = Some(AnsweredTo(caller.role));
         request.extensions_mut().insert(caller);
     }
-    Ok(next.run(request).await)
+    let mut answer = next.run(request).await;
+    if let Some(to) = answered_to {
+        answer.extensions_mut().insert(to);
+    }
+    Ok(answer)
 }
 
 async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Option<Caller>, Error> {

@@ -1,6 +1,8 @@
 //! Errors as pages.
 
+use crate::access::Role;
 use crate::error::Error;
+use crate::http::identify::AnsweredTo;
 use crate::http::problem::Problem;
 use askama::Template;
 use axum::extract::Request;
@@ -22,23 +24,23 @@ impl<E: Into<Error>> From<E> for PageError {
 #[template(path = "error.html")]
 struct ErrorPage {
     problem: Problem,
+    /// Whom it is shown to: nobody has no navigation, a rater has one of its own.
+    to: Option<AnsweredTo>,
 }
 
 impl IntoResponse for PageError {
     fn into_response(self) -> Response {
-        if !self.0.is_input() {
-            tracing::error!(error = %self.0, "a page failed");
-        }
         if matches!(self.0, Error::NotSignedIn(_)) {
             return Redirect::to("/sign-in").into_response();
         }
-        shown(Problem::from(&self.0))
+        // `problems_as_pages` makes a page of it, with the navigation of whoever asked.
+        self.0.into_response()
     }
 }
 
-fn shown(problem: Problem) -> Response {
+fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
     let status = problem.status();
-    match (ErrorPage { problem }).render() {
+    match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),
         Err(_) => status.into_response(),
     }
@@ -80,7 +82,8 @@ pub async fn problems_as_pages(request: Request, next: Next) -> Response {
     }
     let Some(problem) = answer.extensions_mut().remove::<Problem>() else { return answer };
     let allow = answer.headers_mut().remove(header::ALLOW);
-    let mut shown = shown(problem);
+    let to = answer.extensions().get::<AnsweredTo>().copied();
+    let mut shown = shown(problem, to);
     if let Some(allow) = allow {
         shown.headers_mut().insert(header::ALLOW, allow);
     }
