@@ -8,9 +8,7 @@ mod arguments;
 
 use arguments::argument;
 use gait_optimizer::gait::{Axis, DomainTrajectory, Side};
-use gait_optimizer::{
-    BasinChoice, CancelToken, Gait, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve,
-};
+use gait_optimizer::{BasinChoice, CancelToken, Gait, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
 use std::error::Error;
 use std::path::Path;
 
@@ -102,7 +100,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for Wish { name, settings, basin_choice, cold_guesses, finer } in wishes() {
         let mut problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
         let options = SolveOptions { threads: 2, basin_choice, cold_guesses, ..SolveOptions::default() };
-        let mut solve_from = |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
+        let mut solve_from =
+            |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
         let mut outcome = solve_from(&problem, None)?;
         let (mut iterations, mut seconds) = (outcome.report.iterations, outcome.report.seconds_total);
         if finer {
@@ -114,7 +113,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let (gait, report) = (&outcome.gait, &outcome.report);
         if !folder.is_empty() {
-            let file = Path::new(&folder).join(format!("{}.json", name.replace(' ', "_").replace('/', "_per_").replace('%', "percent")));
+            let file = Path::new(&folder)
+                .join(format!("{}.json", name.replace(' ', "_").replace('/', "_per_").replace('%', "percent")));
             std::fs::write(file, serde_json::to_string(gait)?)?;
         }
         let double: f64 = gait.domains.iter().filter(|d| d.name.starts_with("DS")).map(|d| d.duration_s).sum();

@@ -222,7 +222,11 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
         // a velocity by up to 10 rad/s between two rows, h/4 of that: 1.3e-3 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
         let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
-        assert!(reference.provenance.contains(&format!("2 right heel strikes at the ends of the recording: 0.0000, {end:.4} s")));
+        assert!(
+            reference
+                .provenance
+                .contains(&format!("2 right heel strikes at the ends of the recording: 0.0000, {end:.4} s"))
+        );
         let within = recording.heel_strikes(&HeelStrikes::Kinematics).unwrap_err().to_string();
         assert!(within.ends_with("a recording of one stride begins and ends with one: choose its ends"), "{within}");
         for (domain, name) in gait.domains.iter().zip(0..) {
@@ -284,7 +288,9 @@ fn hips_the_other_way_round_are_refused() {
         other.reference("x", how, Walker::default()).unwrap_err().to_string()
     };
     let behind = "at right heel strike the right thigh is 50° behind the left one";
-    for change in [|angles: &mut [f64; 5]| angles.swap(1, 4), |angles| (angles[1], angles[4]) = (-angles[1], -angles[4])] {
+    for change in
+        [|angles: &mut [f64; 5]| angles.swap(1, 4), |angles| (angles[1], angles[4]) = (-angles[1], -angles[4])]
+    {
         let reason = refused(change, &given);
         assert!(reason.contains(behind), "{reason}");
     }
@@ -298,10 +304,12 @@ fn the_built_in_reference_has_the_deviations_of_its_trials() {
     let reference = ReferenceGait::builtin().unwrap();
     let deviation = reference.standard_deviation_rad.unwrap();
     // Falisse 2019: torso .77°, hip .53°, knee 1.08°, ankle 1.43° at heel strike; the left leg half a cycle later.
-    for (found, wanted) in [deviation[0][0], deviation[0][4], deviation[50][2], deviation[50][3]]
-        .into_iter()
-        .zip([0.773_924, 0.532_748, 1.078_66, 1.429_88_f64])
-    {
+    for (found, wanted) in [deviation[0][0], deviation[0][4], deviation[50][2], deviation[50][3]].into_iter().zip([
+        0.773_924,
+        0.532_748,
+        1.078_66,
+        1.429_88_f64,
+    ]) {
         assert!((found - wanted.to_radians()).abs() < 1e-6, "{found} {wanted}");
     }
     let half = "torso_sd_rad,hip_L_sd_rad,knee_L_sd_rad,ankle_L_sd_rad";

@@ -97,7 +97,8 @@ pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<
 /// and the left leg swings in the first half.
 fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
     let [_, hip_l, _, _, hip_r] = mean[0];
-    let cause = "are left and right, or the signs of the hips, the other way round, or the heel strikes not the right foot's?";
+    let cause =
+        "are left and right, or the signs of the hips, the other way round, or the heel strikes not the right foot's?";
     if hip_r <= hip_l {
         let behind = (hip_l - hip_r).to_degrees();
         return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one: {cause}"));
