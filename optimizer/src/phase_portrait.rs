@@ -105,14 +105,23 @@ impl JointRecording {
             let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
             return Err(table.malformed_row(row + 1, Some(1), reason));
         }
-        let lasts = times[times.len() - 1] - times[0];
-        if lasts < SHORTEST_S {
-            let reason = format!("{lasts:.3} s are recorded, a limit cycle needs at least {SHORTEST_S} s");
-            return Err(table.malformed_row(times.len() - 1, Some(1), reason));
-        }
-        let rate_hz = (times.len() - 1) as f64 / lasts;
+        let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
         let joints = joints.into_iter().map(|(joint, angles)| (joint, evenly(&times, &angles))).collect();
         Ok(Self { rate_hz, joints })
+    }
+
+    /// Checks that enough was recorded for a limit cycle.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`], of the file named `what`.
+    pub fn check_duration(&self, what: &str) -> Result<(), ModelError> {
+        let samples = self.joints.first().map_or(0, |(_, angles)| angles.len());
+        let lasts = samples.saturating_sub(1) as f64 / self.rate_hz;
+        if lasts < SHORTEST_S {
+            let reason = format!("{lasts:.3} s are recorded, a limit cycle needs at least {SHORTEST_S} s");
+            return Err(ModelError::Malformed { what: what.to_owned(), reason });
+        }
+        Ok(())
     }
 
     /// The phase portrait of every joint; `cutoff_hz` is the edge of the low-pass.

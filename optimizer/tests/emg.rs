@@ -62,7 +62,7 @@ fn channels_that_are_no_muscles_are_refused() {
     let refused = |change: fn(&mut Vec<f64>)| {
         let mut changed = recording(2000);
         change(&mut changed.channels[0].1);
-        changed.envelopes(&EmgSettings::default()).unwrap_err().to_string()
+        changed.check_channels().unwrap_err().to_string()
     };
     assert_eq!(refused(|samples| samples.fill(0.25)), "channel TA: every sample is 0.25: nothing was connected");
     let artefact = refused(|samples| samples[700] = 1e6);

@@ -230,6 +230,24 @@ async fn what_is_sent_after_the_session_has_ended_is_not_stored_and_not_lost() {
 }
 
 #[tokio::test]
+async fn a_refusal_offers_no_way_that_is_closed() {
+    let (_folder, service) = service().await;
+    let main = |page: &str| page.contains("<nav aria-label=\"Main\">");
+    for (role, staff) in [(Role::Rater, false), (Role::Clinician, true)] {
+        let (_, link) = user(&service, role.as_str(), role).await;
+        let who = session_of(&send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await);
+        for (address, status) in [("/people", StatusCode::FORBIDDEN), ("/nowhere", StatusCode::NOT_FOUND)] {
+            let shown = send(&service, &who, &Method::GET, address, "", "").await;
+            assert_eq!((shown.status, shown.text.contains("href=\"/subjects\"")), (status, staff), "{}", shown.text);
+            assert!(main(&shown.text) && (staff || shown.text.contains("href=\"/rate\"")), "{}", shown.text);
+        }
+    }
+    let shown = send(&service, &As::Nobody, &Method::GET, "/nowhere", "", "").await;
+    assert!(shown.status == StatusCode::NOT_FOUND && !main(&shown.text), "{}", shown.text);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn a_link_signs_in_once_and_a_password_after_that() {
     let (_folder, service) = service().await;
     let (_, link) = user(&service, "Ada", Role::Admin).await;

@@ -152,7 +152,7 @@ async fn the_table_of_a_gait_comes_back_as_the_same_curves() {
         table.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(0.0)).collect()).collect();
     rows.dedup_by_key(|row| row[0].to_bits());
     let end = rows.last().unwrap()[0];
-    let body = json!({"name": "our own", "form": "csv", "recording": table, "heel_strikes_s": [0.0, end]});
+    let body = json!({"name": "our own", "form": "csv", "recording": table, "strikes": "ends"});
     let imported = service.post("/api/v1/reference-gaits", &body).await;
     assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
     let angles = imported.json()["definition"]["angles_rad"].clone();

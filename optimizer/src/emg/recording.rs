@@ -117,44 +117,19 @@ impl EmgRecording {
         given(what, heel_strikes_s, self.start_s, self.end_s())
     }
 
-    /// The mean cycle of every channel, cut at heel strikes (s).
+    /// Checks that every channel is the signal of a muscle: it changes, and no sample stands far out of all others.
     ///
     /// # Errors
-    /// As [`Self::envelopes`] and [`CycleActivity::cut`].
-    pub fn cycles(&self, heel_strikes_s: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
-        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::cut(envelope, heel_strikes_s)).collect()
+    /// [`ModelError::Malformed`] naming the channel and the reason.
+    pub fn check_channels(&self) -> Result<(), ModelError> {
+        for (channel, samples) in &self.channels {
+            if let Some(reason) = self.no_muscle(samples) {
+                return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
+            }
+        }
+        Ok(())
     }
 
-    /// The envelope of every channel.
-    ///
-    /// # Errors
-    /// [`ModelError`] naming a setting out of range, or a channel that is too short to be filtered, does not change, or has
-    /// a sample that no muscle gives.
-    pub fn envelopes(&self, settings: &EmgSettings) -> Result<Vec<Envelope>, ModelError> {
-        settings.validate(self.rate_hz)?;
-        let share = |hz: f64| hz / (0.5 * self.rate_hz);
-        let band = band_pass(settings.order, share(settings.band_low_hz), share(settings.band_high_hz));
-        let smooth = low_pass(settings.order, share(settings.envelope_hz));
-        let fewest = filter::extension(&band) + 1;
-        self.channels
-            .iter()
-            .map(|(channel, samples)| {
-                if samples.len() < fewest {
-                    let reason = format!("{} samples, the filters need {fewest}", samples.len());
-                    return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
-                }
-                if let Some(reason) = self.no_muscle(samples) {
-                    return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
-                }
-                let rectified: Vec<f64> = filter::filter(&band, samples).into_iter().map(f64::abs).collect();
-                let values = filter::filter(&smooth, &rectified);
-                Ok(Envelope { channel: channel.clone(), start_s: self.start_s, rate_hz: self.rate_hz, values })
-            })
-            .collect()
-    }
-}
-
-impl EmgRecording {
     /// Why this is no signal of a muscle: nothing was connected, or one sample stands out of all others.
     fn no_muscle(&self, samples: &[f64]) -> Option<String> {
         let first = samples.first()?;
@@ -170,6 +145,38 @@ impl EmgRecording {
              ({kept_within:.3e}): an artefact that would pass for activity",
             samples[place]
         ))
+    }
+
+    /// The mean cycle of every channel, cut at heel strikes (s).
+    ///
+    /// # Errors
+    /// As [`Self::envelopes`] and [`CycleActivity::cut`].
+    pub fn cycles(&self, heel_strikes_s: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
+        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::cut(envelope, heel_strikes_s)).collect()
+    }
+
+    /// The envelope of every channel.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming a setting out of range, or when the recording is too short to be filtered.
+    pub fn envelopes(&self, settings: &EmgSettings) -> Result<Vec<Envelope>, ModelError> {
+        settings.validate(self.rate_hz)?;
+        let share = |hz: f64| hz / (0.5 * self.rate_hz);
+        let band = band_pass(settings.order, share(settings.band_low_hz), share(settings.band_high_hz));
+        let smooth = low_pass(settings.order, share(settings.envelope_hz));
+        let fewest = filter::extension(&band) + 1;
+        self.channels
+            .iter()
+            .map(|(channel, samples)| {
+                if samples.len() < fewest {
+                    let reason = format!("{} samples, the filters need {fewest}", samples.len());
+                    return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
+                }
+                let rectified: Vec<f64> = filter::filter(&band, samples).into_iter().map(f64::abs).collect();
+                let values = filter::filter(&smooth, &rectified);
+                Ok(Envelope { channel: channel.clone(), start_s: self.start_s, rate_hz: self.rate_hz, values })
+            })
+            .collect()
     }
 }
 

@@ -136,7 +136,9 @@ impl Emg {
             heel_strike_column: self.heel_strike_column.clone(),
             heel_strike_threshold: self.heel_strike_threshold,
         };
-        reading.read(&path.display().to_string(), &read(path)?)
+        let (recording, strikes) = reading.read(&path.display().to_string(), &read(path)?)?;
+        recording.check_channels()?;
+        Ok((recording, strikes))
     }
 }
 

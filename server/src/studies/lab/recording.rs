@@ -95,9 +95,10 @@ impl EmgReading {
         Ok((recording, strikes))
     }
 
-    /// Checks that a file can be cut into strides, whatever it is filtered with later.
+    /// Checks that a file has signals of muscles and can be cut into strides, whatever it is filtered with later.
     fn check(&self, text: &str) -> Result<(), Error> {
         let (recording, strikes) = self.read(WHAT, text)?;
+        recording.check_channels()?;
         for (channel, values) in recording.channels {
             let raw = Envelope { channel, start_s: recording.start_s, rate_hz: recording.rate_hz, values };
             CycleActivity::cut(&raw, &strikes)?;
@@ -145,16 +146,25 @@ impl MotionReading {
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
     pub fn portraits(&self, text: &str) -> Result<Vec<PhasePortrait>, Error> {
-        let recording = match self.form {
-            FileForm::Csv => JointRecording::from_csv(WHAT, text)?,
-            FileForm::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
-        };
-        recording.portraits(self.cutoff_hz).map_err(|error| match error {
+        self.joints(text)?.portraits(self.cutoff_hz).map_err(|error| match error {
             ModelError::OutOfRange { field, value, minimum, maximum } => {
                 ModelError::OutOfRange { field: format!("reading.{field}"), value, minimum, maximum }.into()
             }
             other => other.into(),
         })
+    }
+
+    fn joints(&self, text: &str) -> Result<JointRecording, Error> {
+        Ok(match self.form {
+            FileForm::Csv => JointRecording::from_csv(WHAT, text)?,
+            FileForm::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
+        })
+    }
+
+    /// Checks that a file has a limit cycle, and portraits with these settings.
+    fn check(&self, text: &str) -> Result<(), Error> {
+        self.joints(text)?.check_duration(WHAT)?;
+        self.portraits(text).map(|_| ())
     }
 }
 
@@ -203,7 +213,7 @@ impl NewMotion {
     pub async fn checked(self) -> Result<Checked, Error> {
         aside(move || {
             let walk = checked_walk(self.walk)?;
-            self.reading.portraits(&self.recording)?;
+            self.reading.check(&self.recording)?;
             let packed = PackedRecording::new(RecordingKind::Motion, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
         })
