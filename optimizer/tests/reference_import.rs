@@ -288,9 +288,10 @@ fn hips_the_other_way_round_are_refused() {
         other.reference("x", how, Walker::default()).unwrap_err().to_string()
     };
     let behind = "at right heel strike the right thigh is 50° behind the left one";
-    for change in
-        [|angles: &mut [f64; 5]| angles.swap(1, 4), |angles| (angles[1], angles[4]) = (-angles[1], -angles[4])]
-    {
+    for change in [
+        |angles: &mut [f64; 5]| angles.swap(1, 4),
+        |angles: &mut [f64; 5]| (angles[1], angles[4]) = (-angles[1], -angles[4]),
+    ] {
         let reason = refused(change, &given);
         assert!(reason.contains(behind), "{reason}");
     }

@@ -223,7 +223,7 @@ pub fn cart_pole(intervals: usize, limit: f64, copies: usize) -> Sparse {
 }
 
 /// Nested dissection of a chain: parents and the block of each point; the last block is an empty root.
-fn dissect(points: usize, leaf: usize) -> (Vec<Option<usize>>, Vec<usize>) {
+pub fn dissect(points: usize, leaf: usize) -> (Vec<Option<usize>>, Vec<usize>) {
     fn cut(low: usize, high: usize, leaf: usize, parent: usize, parents: &mut Vec<usize>, of: &mut [usize]) {
         if low >= high {
             return;
