@@ -44,7 +44,7 @@ impl Dimension {
     fn validate(&self) -> Result<()> {
         let refuse = |reason: String| Err(LearnerError::InvalidDimension { dimension: self.name.clone(), reason });
         if self.values.is_empty() {
-            return refuse("it has no level".into());
+            return refuse("it has no value to try".into());
         }
         if self.values.len() > MAX_LEVELS {
             return refuse(format!("it has {} levels, at most {MAX_LEVELS} are accepted", self.values.len()));
@@ -53,7 +53,7 @@ impl Dimension {
             return refuse(format!("level {value} is not between {:e} and {MAX_LEVEL:e}", -MAX_LEVEL));
         }
         if let Some([low, high]) = self.values.array_windows().find(|[low, high]| low >= high) {
-            return refuse(format!("levels must increase strictly, but {low} is followed by {high}"));
+            return refuse(format!("values must increase, but {low} is followed by {high}"));
         }
         let steps = self.values.array_windows().map(|[low, high]| high - low);
         let nearest = steps.reduce(f64::min).unwrap_or(1.0);

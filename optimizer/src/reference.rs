@@ -53,7 +53,9 @@ impl ReferenceGait {
     /// # Errors
     /// Never in practice: a test reads the built-in file.
     pub fn builtin() -> Result<Self, ModelError> {
-        Self::from_csv("Falisse 2019, subject 1", BUILTIN_CSV)
+        // The source says the mass and not the height.
+        let reference = Self::from_csv("Falisse 2019, subject 1", BUILTIN_CSV)?;
+        Ok(Self { body_mass_kg: Some(62.0), ..reference })
     }
 
     /// Reads `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` with 101 rows, and where they are there the

@@ -81,6 +81,7 @@ const PAGES: [(&str, Option<Right>); 61] = [
     ("post /studies/{id}/compare", Some(Right::Answer)),
     ("post /studies/{id}/retract", Some(Right::Answer)),
     ("get /subjects", Some(Right::Read)),
+    ("post /subjects", Some(Right::Run)),
     ("get /subjects/{id}", Some(Right::Read)),
     ("post /subjects/{id}/consent", Some(Right::Run)),
     ("post /subjects/{id}/withdraw", Some(Right::Run)),

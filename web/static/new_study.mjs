@@ -50,5 +50,8 @@ if (form) {
   const subject = /** @type {HTMLSelectElement} */ (form.elements.namedItem("subject"));
   const description = form.querySelector("details[data-new-subject]");
   subject.addEventListener("change", () => description?.toggleAttribute("open", subject.value === "new"));
+  description?.addEventListener("input", () => {
+    subject.value = "new";
+  });
   void check();
 }

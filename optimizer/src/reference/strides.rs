@@ -19,6 +19,8 @@ const SHORTEST_SWING_S: f64 = 0.1;
 const NEIGHBOURHOOD_S: f64 = 0.3;
 /// Place of the left knee among the reference's angles.
 const LEFT_KNEE: usize = 2;
+/// A thigh that is so far behind is behind, rad.
+const BEHIND_RAD: f64 = 0.05;
 /// A knee may bend so much more while it carries than while it swings, rad: legs that swing nearly straight are walked with, too.
 const STANCE_FLEXION_RAD: f64 = 0.26;
 /// So many heel strikes are written down one by one.
@@ -99,7 +101,7 @@ fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
     let [_, hip_l, _, _, hip_r] = mean[0];
     let cause =
         "are left and right, or the signs of the hips, the other way round, or the heel strikes not the right foot's?";
-    if hip_r <= hip_l {
+    if hip_l - hip_r > BEHIND_RAD {
         let behind = (hip_l - hip_r).to_degrees();
         return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one: {cause}"));
     }

@@ -44,8 +44,8 @@ pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static)
 /// [`Error::Invalid`] for a password that is too short or too long.
 pub fn hash_password(password: &str) -> Result<String, Error> {
     let length = password.chars().count();
-    if length < SHORTEST_PASSWORD || password.len() > 1000 {
-        let allowed = format!("{SHORTEST_PASSWORD} characters or more, at most 1000 bytes");
+    if length < SHORTEST_PASSWORD || password.len() > 1000 || password.trim().is_empty() {
+        let allowed = format!("{SHORTEST_PASSWORD} characters or more, not all of them blank, at most 1000 bytes");
         return Err(Error::invalid("password", format!("{length} characters"), &allowed));
     }
     let mut salt = [0_u8; 16];

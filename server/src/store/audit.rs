@@ -89,17 +89,22 @@ pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &s
     Ok(())
 }
 
-/// At most `limit` rows before `before`, newest first.
+/// At most `limit` rows before `before`, newest first; those that `contains` stands in, where it is not empty: in who, what,
+/// to what, or exactly.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn page(db: &mut Connection, before: Option<i64>, limit: u32) -> StoreResult<Vec<AuditRow>> {
-    let rows = sqlx::query("select * from audit where ? is null or seq < ? order by seq desc limit ?")
-        .bind(before)
-        .bind(before)
-        .bind(limit)
-        .fetch_all(db)
-        .await?;
+pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limit: u32) -> StoreResult<Vec<AuditRow>> {
+    let rows = sqlx::query(
+        "select * from audit where (?1 is null or seq < ?1)
+             and (?2 = '' or instr(lower(actor || ' ' || action || ' ' || object || ' ' || detail), lower(?2)) > 0)
+         order by seq desc limit ?3",
+    )
+    .bind(before)
+    .bind(contains)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
     rows.iter().map(from_row).collect()
 }
 

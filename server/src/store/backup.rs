@@ -26,6 +26,31 @@ pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
     Ok((to, size))
 }
 
+/// The copies that lie beside the record under the names that this program gives them, newest first: name and bytes.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, u64)>> {
+    let own = record.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = record.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let kind = name.strip_prefix(&own).and_then(|rest| rest.strip_prefix('.'));
+        // `backup-20260501T101500`, made when asked for; `v42`, made before a new version changed the form.
+        let is_copy = |kind: &str| {
+            let of_form = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit()) && !rest.contains('.');
+            kind.starts_with("backup-") || kind.strip_prefix('v').is_some_and(of_form)
+        };
+        if kind.is_some_and(is_copy) {
+            found.push((entry.metadata()?.modified()?, name, entry.metadata()?.len()));
+        }
+    }
+    found.sort();
+    Ok(found.into_iter().rev().map(|(_, name, bytes)| (name, bytes)).collect())
+}
+
 /// Writes a compact copy of a record that another process may own, and checks the copy.
 ///
 /// # Errors

@@ -58,6 +58,24 @@ pub async fn get(db: &mut Connection, id: DeviceId) -> StoreResult<Device> {
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "device", id: id.to_string() })
 }
 
+/// Whether a device has this name, in letters of either case.
+///
+/// # Errors
+/// What the database reports.
+pub async fn has_name(db: &mut Connection, name: &str) -> StoreResult<bool> {
+    let found = sqlx::query("select 1 from devices where lower(trim(name)) = lower(trim(?)) limit 1").bind(name);
+    Ok(found.fetch_optional(db).await?.is_some())
+}
+
+/// Whether this very definition is there.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_there(db: &mut Connection, definition: &Definition) -> StoreResult<bool> {
+    let hash = json::sha256(json::to_text("device", definition)?.as_bytes());
+    Ok(sqlx::query("select 1 from devices where sha256 = ?").bind(hash).fetch_optional(db).await?.is_some())
+}
+
 /// Every device, newest first.
 ///
 /// # Errors

@@ -29,6 +29,9 @@ const FILES: [(i64, &str, &str); 19] = [
     (43, "explanations", include_str!("../../../migrations/0043_explanations.sql")),
 ];
 
+/// Version of the form of a record that this program writes.
+pub const FORM: i64 = FILES[FILES.len() - 1].0;
+
 /// Length of the header of an SQLite file.
 const SQLITE_HEADER_BYTES: usize = 100;
 

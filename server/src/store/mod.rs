@@ -48,6 +48,7 @@ pub use id::{
     DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, RemarkId,
     SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
+pub use migrations::FORM;
 pub use time::{Instant, now};
 pub use writing::Writer;
 

@@ -17,12 +17,17 @@ pub fn check(definition: &Definition) -> Result<(), Error> {
     Ok(definition.validate()?)
 }
 
-/// Checks a device and writes it; the one that is there already where it is the very same.
+/// Checks a device and writes it; the one that is there already where it is the very same. Two devices of one name could
+/// not be told apart where one is chosen.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<Device, Error> {
     check(definition)?;
+    let name = definition.name.as_str();
+    if !devices::is_there(writer, definition).await? && devices::has_name(writer, name).await? {
+        return Err(Error::invalid("device.name", name, "a name that no other device has"));
+    }
     let (device, added) = devices::ensure(writer, definition).await?;
     if added {
         let detail = json!({ "name": device.name });

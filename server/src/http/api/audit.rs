@@ -28,6 +28,6 @@ pub(super) async fn list(
     Params(page): Params<Before<i64>>,
 ) -> Result<Response, Error> {
     let limit = page.limit(1000)?;
-    let rows = audit::page(&mut *app.read().await?, page.before, limit + 1).await?;
+    let rows = audit::page(&mut *app.read().await?, "", page.before, limit + 1).await?;
     Ok(linked("/api/v1/audit", rows, limit, |row| row.seq.to_string()))
 }

@@ -20,6 +20,9 @@ pub(super) struct Choice {
     before: Option<i64>,
     #[serde(default)]
     verify: bool,
+    /// What the rows contain.
+    #[serde(default)]
+    contains: String,
 }
 
 #[derive(Template)]
@@ -28,6 +31,7 @@ struct AuditPage {
     rows: Vec<AuditRow>,
     older: Option<i64>,
     verdict: Option<Verdict>,
+    contains: String,
 }
 
 impl AuditPage {
@@ -46,6 +50,12 @@ impl AuditPage {
         }
     }
 
+    /// The rows before one, with the same words.
+    fn before(&self, row: &i64) -> String {
+        let query = serde_urlencoded::to_string([("contains", self.contains.as_str())]).unwrap_or_default();
+        format!("/audit?before={row}&{query}")
+    }
+
     /// `study 0190...` as a link, where there is a page for it.
     fn link(row: &AuditRow) -> Option<String> {
         let (kind, id) = row.object.split_once(' ')?;
@@ -61,10 +71,10 @@ impl AuditPage {
 /// `GET /audit`.
 pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
     let mut reader = app.read().await?;
-    let mut rows = audit::page(&mut reader, choice.before, PAGE + 1).await?;
+    let mut rows = audit::page(&mut reader, choice.contains.trim(), choice.before, PAGE + 1).await?;
     let more = rows.len() > PAGE as usize;
     rows.truncate(PAGE as usize);
     let older = rows.last().filter(|_| more).map(|row| row.seq);
     let verdict = if choice.verify { Some(audit::verify(&mut reader).await?) } else { None };
-    page(&AuditPage { rows, older, verdict })
+    page(&AuditPage { rows, older, verdict, contains: choice.contains })
 }

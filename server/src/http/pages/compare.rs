@@ -135,6 +135,10 @@ pub(super) async fn get(
     if may.caller.user.is_some() {
         (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
     }
+    if choice.a.is_some() && choice.a == choice.b {
+        let refused = "Gait A and gait B were the same: choose two different ones.".to_owned();
+        return show(&app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused)).await;
+    }
     show(&app, id, choice, typed, None).await
 }
 
@@ -245,9 +249,6 @@ async fn check(reader: &mut Connection, standing: &Standing, choice: &Choice) ->
             answer::comparable(reader, standing.study.id, field, trial).await?;
             standing.objections.refuse(field, trial)?;
         }
-    }
-    if choice.a.is_some() && choice.a == choice.b {
-        return Err(Error::invalid("b", choice.b.map(|b| b.to_string()), "another trial than a"));
     }
     Ok(())
 }

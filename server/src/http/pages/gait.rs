@@ -170,7 +170,8 @@ fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
     let parts = ["torso", "left hip", "left knee", "left ankle", "right hip"];
     let parts: Vec<String> =
         parts.iter().zip(r.gait_rmse_parts_rad).map(|(name, value)| format!("{name} {value:.4}")).collect();
-    let rmse = (trial.state == TrialState::Converged).then(|| ("Gait RMSE by coordinate, rad", parts.join(", ")));
+    let rmse = (trial.state == TrialState::Converged)
+        .then(|| ("Gait RMSE is the sum over coordinates, rad", parts.join(", ")));
     let solved = [
         ("Walking speed, m/s", format!("{:.3}", r.speed_m_s)),
         ("Stride length, m", format!("{:.3}", r.stride_length_m)),

@@ -20,8 +20,8 @@ const LISTED: u32 = 100;
 #[derive(Template)]
 #[template(path = "lab.html")]
 struct LabPage {
-    /// The open sessions and when they were planned: names of studies can say what is tuned.
-    sessions: Vec<(LabSessionId, Instant)>,
+    /// The open sessions, when they were planned, and what is next: names of studies can say what is tuned.
+    sessions: Vec<(LabSessionId, Instant, String)>,
 }
 
 #[derive(Template)]
@@ -36,8 +36,18 @@ struct WalkPage {
 
 /// `GET /lab`.
 pub(super) async fn list(_: May<Rate>, State(app): State<AppState>) -> Page {
-    let open = lab_sessions::open(&mut *app.read().await?, LISTED).await?;
-    page(&LabPage { sessions: open.iter().map(|session| (session.id, session.created_at)).collect() })
+    let mut reader = app.read().await?;
+    let mut sessions = Vec::new();
+    for session in lab_sessions::open(&mut reader, LISTED).await? {
+        let seen = lab::in_the_lab(&mut reader, session.id).await?;
+        let next = match (seen.walk, seen.asks) {
+            (Some(walk), _) => format!("walk {walk} is next"),
+            (None, Some(_)) => "all walks recorded: which one was better?".to_owned(),
+            (None, None) => "all walks recorded, and answered".to_owned(),
+        };
+        sessions.push((session.id, session.created_at, next));
+    }
+    page(&LabPage { sessions })
 }
 
 /// `GET /lab/{id}`.

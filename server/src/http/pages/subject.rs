@@ -3,7 +3,7 @@
 use super::error::{Page, PageError, page};
 use super::format::{variant, words};
 use crate::access::{Permission, Read, Run};
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
@@ -15,6 +15,7 @@ use crate::store::trials::TrialCounts;
 use crate::store::{Connection, SubjectId, commit, lab_sessions, studies, trials};
 use crate::studies::consent::{self, NewConsent, Withdrawal};
 use crate::studies::lab::SessionView;
+use crate::studies::person::{self, NewSubject};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -29,6 +30,41 @@ struct SubjectsPage {
     subjects: Vec<Row>,
     /// The last subject of this page, when others follow.
     next: Option<SubjectId>,
+    may_run: bool,
+    fields: Described,
+    refused: Option<FieldError>,
+}
+
+impl SubjectsPage {
+    fn refuses(&self, field: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.field == field)
+    }
+}
+
+/// A subject as typed, so that a refused form comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Described {
+    pseudonym: String,
+    height_m: String,
+    body_mass_kg: String,
+    notes: String,
+}
+
+impl Described {
+    fn read(&self) -> Result<NewSubject, Error> {
+        let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
+        Ok(NewSubject {
+            pseudonym: self.pseudonym.clone(),
+            height_m: number("height_m", &self.height_m, "a number of metres with a decimal point, as in 1.75")?,
+            body_mass_kg: number(
+                "body_mass_kg",
+                &self.body_mass_kg,
+                "a number of kilograms with a decimal point, as in 65.7",
+            )?,
+            notes: self.notes.clone(),
+        })
+    }
 }
 
 struct Row {
@@ -74,7 +110,50 @@ pub(super) struct Before {
 }
 
 /// `GET /subjects`.
-pub(super) async fn list(_: May<Read>, State(app): State<AppState>, Params(Before { before }): Params<Before>) -> Page {
+pub(super) async fn list(
+    may: May<Read>,
+    State(app): State<AppState>,
+    Params(Before { before }): Params<Before>,
+) -> Page {
+    show_list(&app, before, may.caller.may(Run::NEEDED), Described::default(), None).await
+}
+
+/// `POST /subjects`: adds one, before it has a study.
+pub(super) async fn add(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Form(fields): Form<Described>,
+) -> Result<Response, PageError> {
+    let added = async {
+        let new = fields.read()?;
+        let mut writer = app.write().await?;
+        let subject = person::add(&mut writer, &may.caller.actor, &new).await?;
+        commit(writer).await?;
+        Ok(subject.id)
+    };
+    let error = match added.await {
+        Ok(id) => return Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => error,
+        Err(other) => return Err(other.into()),
+    };
+    let status = Problem::from(&error).status();
+    let refused = match error {
+        Error::Invalid(refused) => *refused,
+        // The one conflict there is: somebody has this pseudonym.
+        other => {
+            FieldError { message: other.to_string(), ..FieldError::new("pseudonym", fields.pseudonym.clone(), "") }
+        }
+    };
+    Ok((status, show_list(&app, None, true, fields, Some(refused)).await?).into_response())
+}
+
+async fn show_list(
+    app: &AppState,
+    before: Option<SubjectId>,
+    may_run: bool,
+    fields: Described,
+    refused: Option<FieldError>,
+) -> Page {
     let mut reader = app.read().await?;
     let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;
@@ -85,7 +164,7 @@ pub(super) async fn list(_: May<Read>, State(app): State<AppState>, Params(Befor
         let said = consents::of_subject(&mut reader, subject.id).await?;
         rows.push(Row { subject, consent: said.last().map_or("nothing written down", |last| last.kind.as_str()) });
     }
-    page(&SubjectsPage { subjects: rows, next })
+    page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
 }
 
 /// `GET /subjects/{id}`.

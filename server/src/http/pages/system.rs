@@ -3,11 +3,12 @@
 use super::error::{Page, page};
 use super::format::{duration, words};
 use crate::access::{Administer, Caller, Permission, Read};
+use crate::error::Error;
 use crate::http::AppState;
 use crate::http::api::{Copy, Workers};
 use crate::http::may::May;
 use crate::store::totals::{self, Totals};
-use crate::store::{commit, jobs, trials};
+use crate::store::{FORM, backup, commit, jobs, trials};
 use askama::Template;
 use axum::extract::State;
 
@@ -15,9 +16,13 @@ use axum::extract::State;
 #[template(path = "system.html")]
 struct SystemPage {
     version: &'static str,
+    /// Version of the form of the record.
+    form: i64,
     workers: Workers,
     /// The backup that was just made.
     copied: Option<Copy>,
+    /// The copies beside the record, newest first: name and bytes.
+    copies: Vec<(String, u64)>,
     queued: u32,
     running: u32,
     oldest_queued: String,
@@ -28,8 +33,8 @@ struct SystemPage {
 }
 
 impl SystemPage {
-    fn megabytes(&self) -> String {
-        format!("{:.1}", self.totals.bytes as f64 / 1e6)
+    fn megabytes(bytes: impl Into<Size>) -> String {
+        format!("{:.1}", bytes / 1e6)
     }
 
     /// `3 finished, 1 running`.
@@ -47,7 +52,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>) -> Page {
 }
 
 /// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
-pub(super) async fn backup(may: May<Administer>, State(app): State<AppState>) -> Page {
+pub(super) async fn make_backup(may: May<Administer>, State(app): State<AppState>) -> Page {
     let copy = Copy::make(&app).await?;
     let mut writer = app.write().await?;
     copy.record(&mut writer, &may.caller.actor).await?;
@@ -60,17 +65,22 @@ async fn show(app: &AppState, caller: &Caller, copied: Option<Copy>) -> Page {
     let mut reader = app.read().await?;
     let totals = totals::read(&mut reader).await?;
     let (queued, running) = jobs::depth(&mut reader).await?;
+    let may_administer = caller.may(Administer::NEEDED);
+    let record = app.store().path();
+    let copies = if may_administer { backup::those_beside(record) } else { Ok(Vec::new()) };
     let measured = [trials::measured(&mut reader, true).await?, trials::measured(&mut reader, false).await?];
     page(&SystemPage {
         version: env!("CARGO_PKG_VERSION"),
+        form: FORM,
+        copies: copies.map_err(|e| Error::Internal(format!("cannot list the copies of the record: {e}")))?,
         workers,
         copied,
         queued,
         running,
         oldest_queued: duration(totals.oldest_queued_seconds),
         totals,
-        record: app.store().path().display().to_string(),
+        record: record.display().to_string(),
         measured,
-        may_administer: caller.may(Administer::NEEDED),
+        may_administer,
     })
 }

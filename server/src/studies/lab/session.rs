@@ -204,7 +204,7 @@ pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewS
     objections.refuse("gait_one", new.gait_one)?;
     objections.refuse("gait_two", new.gait_two)?;
     if new.gait_one == new.gait_two {
-        return Err(Error::invalid("gait_two", new.gait_two.to_string(), "another gait than gait_one"));
+        return Err(Error::invalid("gait_two", new.gait_two.to_string(), "another gait than gait one"));
     }
     let before = lab_sessions::of_study(writer, study).await?.len();
     let lot = derive(seed, Purpose::LabSession, before as u64 / 4);

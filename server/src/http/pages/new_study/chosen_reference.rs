@@ -52,8 +52,7 @@ fn nearest(matches: &[Match], chosen: &Match) -> String {
     let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
     match matches.first() {
         _ if known == 0 => {
-            let why =
-                "Height and body mass are not known of any reference gait, so none can be proposed as the nearest.";
+            let why = "Height and body mass are not both known of any reference gait, so none can be proposed as the nearest.";
             format!("{why} Taken: {}.", chosen.reference_gait.name)
         }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {

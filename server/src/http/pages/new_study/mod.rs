@@ -156,9 +156,13 @@ struct Offered {
 
 impl Offered {
     async fn read(db: &mut Connection) -> Result<Self, Error> {
+        // The first one is chosen where nobody chooses: the built-in one.
+        let built_in = gait_optimizer::Device::ampro3()?;
+        let mut devices = devices::all(db).await?;
+        devices.sort_by_key(|device| device.definition != built_in);
         Ok(Self {
             subjects: subjects::all(db).await?,
-            devices: devices::all(db).await?,
+            devices,
             references: reference_gaits::all(db).await?,
             measured: [trials::measured(db, true).await?, trials::measured(db, false).await?],
         })
@@ -331,8 +335,12 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
     let subject = if fields.subject == NEW_SUBJECT {
         let new = NewSubject {
             pseudonym: fields.pseudonym.clone(),
-            height_m: number("height_m", &fields.height_m, "a number of metres")?,
-            body_mass_kg: number("body_mass_kg", &fields.body_mass_kg, "a number of kilograms")?,
+            height_m: number("height_m", &fields.height_m, "a number of metres with a decimal point, as in 1.75")?,
+            body_mass_kg: number(
+                "body_mass_kg",
+                &fields.body_mass_kg,
+                "a number of kilograms with a decimal point, as in 65.7",
+            )?,
             notes: String::new(),
         };
         person::add(writer, &caller.actor, &new).await?.id

@@ -80,9 +80,11 @@ impl SpaceEditor {
         }
         let space = SearchSpace::new(dimensions).map_err(|error| match error {
             LearnerError::NoDimension => Error::invalid("tuned_a1", "no bound", "at least one bound that is tuned"),
-            LearnerError::InvalidDimension { dimension, reason } => {
-                Error::invalid(&format!("values_{dimension}"), self.values_of(&dimension), &reason)
-            }
+            LearnerError::InvalidDimension { dimension, reason } => Error::invalid(
+                &format!("values_{dimension}"),
+                self.values_of(&dimension),
+                &format!("increasing values; here {reason}"),
+            ),
             LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
                 Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))
             }

@@ -16,13 +16,14 @@ use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, Tree};
+use crate::store::devices::{self, Device};
 use crate::store::feedback::{FeedbackRow, Retraction, Said, Source};
 use crate::store::remarks::{self, Remark};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
 use crate::store::trials::{Trial, TrialCounts, TrialState};
 use crate::store::{
-    Instant, StudyId, TrialId, commit, consents, devices, events, explanations, gaits, presentations, reference_gaits,
+    Instant, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, presentations, reference_gaits,
     studies, trials,
 };
 use crate::studies::belief::Beliefs;
@@ -50,7 +51,7 @@ use std::sync::Arc;
 struct StudyPage {
     study: Study,
     subject: Subject,
-    device: String,
+    device: Device,
     reference: String,
     live: String,
     last_event: i64,
@@ -197,7 +198,7 @@ pub(super) async fn get(
         return page(&ClosedPage { study, subject, counts });
     }
     let last_event = events::last(&mut reader, id).await?;
-    let device = devices::get(&mut reader, study.plan.device_id).await?.name;
+    let device = devices::get(&mut reader, study.plan.device_id).await?;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     drop(reader);
     let live = read_live(&app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
@@ -349,7 +350,12 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
         .map(|trial| running_row(trial, app.director.board().track(trial.id).as_ref()))
         .collect();
     let answers = answers(&standing, &remarks);
-    Ok(view(standing, counts, &figures, running, table, answers, caller.may(Run::NEEDED)))
+    let is_queued = standing.trials.iter().any(|trial| trial.state == TrialState::Queued);
+    let mut live = view(standing, counts, &figures, running, table, answers, caller.may(Run::NEEDED));
+    if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
+        live.pace = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
+    }
+    Ok(live)
 }
 
 pub(super) fn figures(
@@ -519,6 +525,20 @@ pub(super) fn remark_in_words(remark: &Remark, standing: &Standing) -> Option<St
         presentations::Said::UnsafeBoth => format!("{first} and {second} are unsafe"),
         _ => format!("cannot tell {first} from {second}"),
     })
+}
+
+/// That nothing is solved for the study, and what stands before it; of all studies the solves that wait and that run.
+fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
+    let solves = |count: u32| if count == 1 { "1 solve".to_owned() } else { format!("{count} solves") };
+    match (running, queued.saturating_sub(1)) {
+        (0, _) => "Its next solve waits for a worker; none is at work.".to_owned(),
+        (_, 0) => format!("Its next solve waits for a worker: {} of other studies in progress.", solves(running)),
+        (_, others) => format!(
+            "Its next solve waits for a worker: {} of other studies in progress, {} more in the queue.",
+            solves(running),
+            others
+        ),
+    }
 }
 
 /// How long the study will go on by itself, as far as its own solves tell.
