@@ -51,7 +51,10 @@ fn print(certificate: &Certificate, all: bool) {
             map.differences_resolve,
             map.disagreement()
         );
-        println!("   zero dynamics: {:.3e} (leak {:.1e})", map.zero_dynamics, map.zero_dynamics_leak);
+        println!(
+            "   of a change of speed a stride leaves {:.3e} (and {:.1e} elsewhere)",
+            map.speed_kept, map.speed_leak
+        );
         println!(
             "   gait to periodic motion: {:.1e}, residual there {:.1e} rad, rad/s",
             map.fixed_point_distance, map.fixed_point_residual

@@ -47,7 +47,7 @@ use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 
 /// Version of [`Certificate`]'s layout and of what it examines.
-pub const FORMAT_VERSION: u32 = 5;
+pub const FORMAT_VERSION: u32 = 6;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,12 +60,14 @@ pub struct Certificate {
     pub objections: Vec<String>,
     /// Every quantity with its worst value and its limit.
     pub checks: Vec<Check>,
-    /// How the simulated walker fell, where it did; then there is no return map.
+    /// How the simulation ended early, where it did: the walker fell, or no motion follows from the controller's demands; then
+    /// there is no return map.
     pub fall: Option<String>,
     /// The stride-to-stride map.
     pub return_map: Option<ReturnMap>,
-    /// The same with a hip velocity that nobody brings back: what contacts, impacts and SS1 alone make of a change of
-    /// speed. Reported without a judgement of stability; none when such a walker falls.
+    /// The same with a hip velocity that nobody brings back: the hybrid zero dynamics, what contacts, impacts and SS1 alone
+    /// make of a change of speed. Its largest multiplier is theirs: all other directions are the controller's, and end
+    /// within a step. Reported without a judgement of stability; none when such a walker falls.
     pub free_hip_return_map: Option<ReturnMap>,
     /// Pushes that are recovered; only of a stable gait.
     pub pushes: Option<Pushes>,
@@ -123,7 +125,7 @@ fn objections(certificate: &Certificate) -> Vec<String> {
         .map(|c| format!("{}: {} ({}), allowed {}", c.name, c.value_in_words(), c.place, c.limit_in_words()))
         .collect();
     if let Some(fall) = &certificate.fall {
-        objections.push(format!("the simulated walker falls: {fall}"));
+        objections.push(fall.clone());
     }
     if let Some(map) = certificate.return_map.as_ref().filter(|map| !map.is_stable()) {
         objections.push(format!("the gait is unstable: its largest multiplier is {:.4}", map.largest));

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 pub(crate) mod motion;
 mod shape;
 
+/// Version of [`Gait`]'s layout.
+pub(crate) const FORMAT_VERSION: u32 = 1;
+
 /// A gait: eight domains over one stride from right heel strike.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gait {

@@ -107,6 +107,21 @@ fn every_limit_is_examined() {
 }
 
 #[test]
+fn fibre_lengths_are_examined_at_every_point() {
+    let (_, whole) = golden_gait(1, true);
+    for point in 0..whole.domains[3].q.len() {
+        let mut gait = whole.clone();
+        gait.domains[3].muscles.as_mut().unwrap().fibre_length[point][5] += 1e-3;
+        let found = certificate(&gait);
+        assert!(
+            objects_to(&found, "C8 fibre lengths") || objects_to(&found, "C5-C7"),
+            "{point}: {:?}",
+            found.objections
+        );
+    }
+}
+
+#[test]
 fn a_muscle_that_cannot_pull_like_that_is_found() {
     let (_, mut gait) = golden_gait(1, true);
     for activation in &mut gait.domains[6].muscles.as_mut().unwrap().activation {
@@ -146,6 +161,7 @@ fn an_incomplete_gait_is_refused_by_name() {
     assert!(refused.contains("SS1_R: time_s[0] is 1.") && refused.contains("by the durations"), "{refused}");
     for (change, field) in [
         ((|gait| gait.stride_time_s = -4.0) as fn(&mut Gait), "stride_time_s"),
+        (|gait| gait.format_version = 2, "format_version"),
         (|gait| gait.speed_m_s = 99.0, "speed_m_s"),
     ] {
         let mut gait = whole.clone();

@@ -17,10 +17,12 @@ pub(super) struct Tolerance {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub(super) enum StepError {
     /// The right-hand side cannot be evaluated.
-    #[error("the equations of motion have no unique solution")]
+    #[error("contacts, virtual constraints and hip phase determine no motion there")]
     Singular,
     /// The error cannot be kept below the tolerance.
-    #[error("the integration step became too small")]
+    #[error(
+        "the integration step became too small: contacts, virtual constraints and hip phase hardly determine a motion there"
+    )]
     TooSmall,
 }
 

@@ -14,7 +14,7 @@ use thiserror::Error;
 pub enum Fall {
     /// The event that ends the domain did not come within twice the domain's planned duration.
     #[error(
-        "{domain}: the event that ends it has not come {elapsed_s:.3} s after its start (planned: {planned_s:.3} s)"
+        "the simulated walker falls: {domain}: the event that ends it has not come {elapsed_s:.3} s after its start (planned: {planned_s:.3} s)"
     )]
     GuardMissed {
         /// `DS2_R`, ...
@@ -25,7 +25,7 @@ pub enum Fall {
         planned_s: f64,
     },
     /// The domain begins where its end already is.
-    #[error("{domain}: begins beyond the event that ends it (by {amount:.2e})")]
+    #[error("the simulated walker falls: {domain}: begins beyond the event that ends it (by {amount:.2e})")]
     BeginsBeyondGuard {
         /// `DS2_R`, ...
         domain: &'static str,
@@ -33,7 +33,7 @@ pub enum Fall {
         amount: f64,
     },
     /// The state cannot be integrated further.
-    #[error("{domain}: {reason}")]
+    #[error("the simulation cannot go on: {domain}: {reason}")]
     NotIntegrable {
         /// `DS2_R`, ...
         domain: &'static str,

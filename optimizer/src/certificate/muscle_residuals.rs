@@ -9,6 +9,7 @@ use crate::settings::GaitLimits;
 
 const FORCE: Measured = Measured::new("C5-C7 fibre and tendon in equilibrium", "F_max", 1e-6, None);
 const VELOCITY: Measured = Measured::new("C8 fibre velocity", "l_opt/s", 1e-4, Some(0.5));
+const LENGTH: Measured = Measured::new("C8 fibre lengths follow their velocities", "l_opt", 1e-6, None);
 const TORQUE: Measured = Measured::new("C9-C12 joint torques are the muscles'", "N m", 1e-4, None);
 const RANGE: Measured = Measured::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
 const RESET: Quantity = Quantity::judged("C8 continuity of fibre lengths", "l_opt", 1e-6);
@@ -44,6 +45,18 @@ pub(super) fn note(
     worst.note(point, &VELOCITY, velocity_error);
     worst.note(point, &TORQUE, torque_error);
     worst.note(point, &RANGE, excess);
+}
+
+/// Puts the fibre lengths that are written at a mesh point in place of those that the cubic through the interval's ends has
+/// there, and notes how far they are apart.
+pub(super) fn note_written(
+    point: &GridPoint<'_>,
+    written: &[f64; MUSCLE_COUNT],
+    cubic: &[f64; MUSCLE_COUNT],
+    worst: &mut Findings,
+) {
+    let apart = written.iter().zip(cubic).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    worst.note(point, &LENGTH, apart);
 }
 
 /// Fibre lengths from a domain's end to the next one's start.

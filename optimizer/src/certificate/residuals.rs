@@ -114,11 +114,18 @@ pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
         let cells = (trajectory.q.len() - 1) * REFINEMENT;
         for cell in 0..=cells {
             let share = cell as f64 / cells as f64;
-            let point = GridPoint {
-                instant: &instant(trajectory, share),
-                place: Place::within(trajectory, share),
-                on_mesh: cell % REFINEMENT == 0,
-            };
+            let on_mesh = cell % REFINEMENT == 0;
+            let mut here = instant(trajectory, share);
+            let of_cubic = here.muscles.as_ref().map(|muscles| muscles.fibre_length);
+            let written =
+                trajectory.muscles.as_ref().filter(|_| on_mesh).map(|all| all.fibre_length[cell / REFINEMENT]);
+            if let (Some(muscles), Some(written)) = (&mut here.muscles, written) {
+                muscles.fibre_length = written;
+            }
+            let point = GridPoint { instant: &here, place: Place::within(trajectory, share), on_mesh };
+            if let (Some(written), Some(of_cubic)) = (written, of_cubic) {
+                muscle_residuals::note_written(&point, &written, &of_cubic, &mut worst);
+            }
             domain.mechanics(&point, &mut worst);
             domain.outputs(&point, share, &mut worst);
             domain.limits(&point, share, &mut worst);

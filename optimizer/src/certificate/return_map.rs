@@ -58,10 +58,15 @@ pub struct ReturnMap {
     pub largest_by_differences: f64,
     /// What the last extrapolation of the differences changed in it: what they resolve.
     pub differences_resolve: f64,
-    /// Multiplier of a change of the walking speed that keeps all virtual constraints: the zero dynamics.
-    pub zero_dynamics: f64,
-    /// What the stride turns such a change into outside the zero dynamics, over its size: 0 for invariance.
-    pub zero_dynamics_leak: f64,
+    /// What a stride leaves of a change of all velocities in proportion, which keeps contacts and virtual constraints: its
+    /// share in that very direction. A multiplier only as far as the direction is carried into itself, which the switch from
+    /// SS2 to SS1 by force prevents; the multiplier of the zero dynamics is [`Self::largest`] of the map whose hip velocity is
+    /// left alone.
+    #[serde(alias = "zero_dynamics")]
+    pub speed_kept: f64,
+    /// What the stride turns such a change into in other directions, over its size.
+    #[serde(alias = "zero_dynamics_leak")]
+    pub speed_leak: f64,
 }
 
 impl ReturnMap {
@@ -146,11 +151,11 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
     let largest = |matrix| multipliers(matrix).map(|found| found.first().map_or(0.0, Multiplier::modulus));
     let by_differences = largest(finest).ok_or_else(no_eigenvalues)?;
     let less_fine = largest(coarser).ok_or_else(no_eigenvalues)?;
-    // Velocities in proportion keep contacts and virtual constraints: the direction of the zero dynamics.
+    // Velocities in proportion keep contacts and virtual constraints.
     let (_, qd) = split(&fixed);
     let faster = Section::from_fn(|i, _| if i < 8 { 0.0 } else { qd[i - 8] });
     let carried = derivative * faster;
-    let zero_dynamics = carried.dot(&faster) / faster.norm_squared();
+    let speed_kept = carried.dot(&faster) / faster.norm_squared();
     Ok((
         fixed,
         ReturnMap {
@@ -161,8 +166,8 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
             largest_by_differences: by_differences,
             differences_resolve: (by_differences - less_fine).abs(),
             multipliers: multipliers_found,
-            zero_dynamics,
-            zero_dynamics_leak: (carried - faster * zero_dynamics).norm() / faster.norm(),
+            speed_kept,
+            speed_leak: (carried - faster * speed_kept).norm() / faster.norm(),
         },
     ))
 }

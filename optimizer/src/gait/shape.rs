@@ -14,6 +14,8 @@ impl Gait {
     /// # Errors
     /// [`ModelError`] naming what is wrong.
     pub fn validate(&self) -> Result<(), ModelError> {
+        let version = f64::from(self.format_version);
+        ModelError::check_range("format_version", version, 1.0, f64::from(crate::gait::FORMAT_VERSION))?;
         self.subject.validate()?;
         self.device.validate()?;
         self.bounds.validate()?;

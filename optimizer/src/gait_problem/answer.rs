@@ -1,12 +1,9 @@
 //! From variables to a gait in physical units.
 
 use super::programme::GaitProgramme;
-use crate::gait::{ContactRowName, DomainTrajectory, Gait, MuscleTrajectory};
+use crate::gait::{ContactRowName, DomainTrajectory, FORMAT_VERSION, Gait, MuscleTrajectory};
 use crate::solve::GaitProblem;
 use crate::walking::BEZIER_COEFFICIENTS;
-
-/// Version of [`Gait`]'s layout.
-const FORMAT_VERSION: u32 = 1;
 
 /// The gait that the variables of a programme describe.
 pub fn gait_of(problem: &GaitProblem, programme: &GaitProgramme, x: &[f64]) -> Gait {

@@ -42,12 +42,13 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (by differences {:.4e}, to {:.0e}), zero dynamics {:.4e}: {}",
+            "  largest multiplier {:.4e} (by differences {:.4e}, to {:.0e}): {}; of a change of speed a stride leaves {:.1e}, and {:.1e} elsewhere",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
-            map.zero_dynamics,
-            if map.is_stable() { "stable" } else { "unstable" }
+            if map.is_stable() { "stable" } else { "unstable" },
+            map.speed_kept,
+            map.speed_leak
         ));
         lines.push(format!(
             "  from the gait to the periodic motion {:.1e} rad, rad/s; orbit followed for {STRIDES} strides",
@@ -56,7 +57,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.free_hip_return_map {
         lines.push(format!(
-            "  with the hip velocity left alone: largest multiplier {:.4} (by differences {:.4})",
+            "  zero dynamics (hip velocity left alone): multiplier {:.4} (by differences {:.4})",
             map.largest, map.largest_by_differences
         ));
     }

@@ -1,6 +1,6 @@
 //! `gaitwright convert`: a gait for other programs.
 
-use super::gait_file::read_gait;
+use super::gait_file::read_gait_and_status;
 use super::out_file::OutFile;
 use super::output::data;
 use crate::error::Error;
@@ -42,7 +42,16 @@ pub(super) struct Convert {
 
 impl Convert {
     pub(super) fn run(self) -> Result<(), Error> {
-        let gait = read_gait(&self.gait)?;
+        let (gait, status) = read_gait_and_status(&self.gait)?;
+        // What a device executes keeps every constraint; a curve to look at need not.
+        if let (Form::Controller, Some(status)) = (&self.to, status)
+            && status != SolveStatus::Converged
+        {
+            let file = self.gait.display();
+            let reason =
+                format!("{file}: its solve ended as {status:?}; a controller file is made of a converged gait only");
+            return Err(Error::conflict(reason));
+        }
         let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.gait])).transpose()?;
         let text = match self.to {
             Form::Csv => String::from_utf8(gait_csv(&gait)?).map_err(|e| Error::Internal(e.to_string()))?,

@@ -30,7 +30,7 @@ pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
 ///
 /// # Errors
 /// When the folder cannot be read.
-pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, u64)>> {
+pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
     let own = record.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let folder = record.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     let mut found = Vec::new();
@@ -44,7 +44,8 @@ pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, u64)>> {
             kind.starts_with("backup-") || kind.strip_prefix('v').is_some_and(of_form)
         };
         if kind.is_some_and(is_copy) {
-            found.push((entry.metadata()?.modified()?, name, entry.metadata()?.len()));
+            let about = entry.metadata()?;
+            found.push((about.modified()?, name, i64::try_from(about.len()).unwrap_or(i64::MAX)));
         }
     }
     found.sort();

@@ -32,13 +32,14 @@ impl InWords {
             let (found, resolved) =
                 (format::number(map.largest_by_differences), format::number(map.differences_resolve));
             figures.push(("The same by differences, and what they resolve", format!("{found} (to {resolved})")));
-            figures.push(("Multiplier of the zero dynamics", format::number(map.zero_dynamics)));
+            let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
+            figures.push(("What a stride leaves of a change of speed, and elsewhere", format!("{kept}, {leak}")));
             let distance = format::number(map.fixed_point_distance);
             figures.push(("From the gait to the periodic motion, rad, rad/s", distance));
         }
         if let Some(free) = &certificate.free_hip_return_map {
             let words = format!("{:.3} (by differences {:.3})", free.largest, free.largest_by_differences);
-            figures.push(("Largest multiplier with the hip velocity left alone", words));
+            figures.push(("Multiplier of the zero dynamics (hip velocity left alone)", words));
         }
         if let Some(pushes) = certificate.pushes {
             let words = format!(

@@ -22,7 +22,7 @@ struct SystemPage {
     /// The backup that was just made.
     copied: Option<Copy>,
     /// The copies beside the record, newest first: name and bytes.
-    copies: Vec<(String, u64)>,
+    copies: Vec<(String, i64)>,
     queued: u32,
     running: u32,
     oldest_queued: String,
@@ -33,8 +33,8 @@ struct SystemPage {
 }
 
 impl SystemPage {
-    fn megabytes(bytes: impl Into<Size>) -> String {
-        format!("{:.1}", bytes / 1e6)
+    fn megabytes(bytes: &i64) -> String {
+        format!("{:.1}", *bytes as f64 / 1e6)
     }
 
     /// `3 finished, 1 running`.
