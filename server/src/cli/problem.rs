@@ -128,7 +128,12 @@ impl ProblemFlags {
 }
 
 pub(super) fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
+    let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let readable = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + readable.iter().filter(|&&byte| byte == b'\n').count();
+        Error::Malformed(format!("{}, line {line}: this is no UTF-8 text; save the file as UTF-8", path.display()))
+    })
 }
 
 /// A file, read and checked; what is wrong is told with its name.

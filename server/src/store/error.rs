@@ -30,7 +30,7 @@ pub enum StoreError {
         reason: String,
     },
     /// Another process owns the file.
-    #[error("the database {} is in use by another gaitwright process; stop it first or choose another --database", path.display())]
+    #[error("the database {} is in use by another gaitwright process; stop it first or choose another place", path.display())]
     InUse {
         /// The file.
         path: PathBuf,
