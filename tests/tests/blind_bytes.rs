@@ -162,6 +162,10 @@ fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, St
     if let Some((before, rest)) = text.clone().split_once("<noscript data-strips>") {
         text = format!("{before}{}", rest.split_once("</noscript>").unwrap().1);
     }
+    // How long a stride takes is drawn, too.
+    let mut parts = text.split("data-seconds=\"");
+    let first = parts.next().unwrap_or_default().to_owned();
+    text = parts.fold(first, |kept, part| kept + part.split_once('"').unwrap().1);
     let number = pair["number"].to_string();
     for (before, after) in [("Pair ", ""), ("\"number\":", ""), ("answer ", ":")] {
         text = text.replace(&format!("{before}{number}{after}"), &format!("{before}N{after}"));

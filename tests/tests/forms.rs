@@ -485,3 +485,30 @@ async fn a_study_that_has_ended_gets_more_trials_from_its_page() {
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
 }
+
+#[tokio::test]
+async fn a_refused_user_or_token_comes_back_as_typed_with_the_fault_beside_its_field() {
+    let (_folder, service) = service().await;
+    let send = async |body: &str| service.post_text("/people", FORM, body).await;
+    assert!(send("act=add_user&name=K1&role=clinician").await.status.is_success());
+    let taken = send("act=add_user&name=K1&role=admin").await;
+    is_page(&taken, StatusCode::CONFLICT, "there is a user");
+    for kept in [
+        "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
+        "value=\"admin\" selected",
+        "id=\"fault\"",
+    ] {
+        assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
+    }
+    let refused = send("act=make_token&name=treadmill&days=soon&run=on").await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "Ends after, days: \u{201c}soon\u{201d} is not accepted");
+    for kept in ["value=\"treadmill\"", "value=\"soon\"", "name=\"run\" checked"] {
+        assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
+    }
+    assert!(!refused.text.contains("name=\"read\" checked"), "{}", refused.text);
+    assert_eq!(refused.text.matches("aria-invalid").count(), 1);
+    assert!(!refused.text.contains("gait_"), "no secret");
+    let nothing = send("act=make_token&name=treadmill&days=").await;
+    is_page(&nothing, StatusCode::UNPROCESSABLE_ENTITY, "What it allows: needed is some of");
+    service.stop().await;
+}

@@ -1,6 +1,9 @@
 // @ts-check
 // The animated stick figure of a gait, or of two on one clock. Positions come from the server; here they are only drawn.
 
+import { mayMove, showStrips } from "./strips.mjs";
+import { Clocks } from "./two_clocks.mjs";
+
 /**
  * @typedef {[number, number]} Place
  * @typedef {{knee: Place, ankle: Place, heel: Place, toe: Place}} Leg
@@ -191,7 +194,11 @@ class Scene {
   }
 }
 
-/** Plays scenes on one clock: gaits of different length are shown at the same share of their cycles. */
+/** Where two are side by side. */
+const PACES = `<label>Side by side <select data-pace><option value="share" selected>by share of the cycle</option>
+  <option value="time">by time</option></select></label>`;
+
+/** Plays scenes on one clock: gaits of different length at the same share of their cycles, or each in its own time. */
 class Player {
   /**
    * @param {HTMLElement} box
@@ -199,16 +206,17 @@ class Player {
    */
   constructor(box, scenes) {
     this.scenes = scenes;
-    this.stride = scenes.reduce((sum, scene) => sum + scene.motion.stride_time_s, 0) / scenes.length;
-    this.share = 0;
-    this.strides = 0;
+    const seconds = scenes.map((scene) => scene.motion.stride_time_s);
+    this.clocks = new Clocks(seconds, seconds.reduce((sum, stride) => sum + stride, 0) / seconds.length);
     this.last = 0;
-    this.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.playing = mayMove();
+    if (!this.playing) showStrips(box);
     const controls = document.createElement("div");
     controls.className = "controls";
     controls.innerHTML = `
       <button type="button" class="button quiet" data-play></button>
       <label>Speed <select data-speed><option value="0.25">¼</option><option value="0.5">½</option><option value="1" selected>1</option></select></label>
+      ${scenes.length > 1 ? PACES : ""}
       <label class="scrub">Gait cycle <input type="range" min="0" max="100" step="0.5" value="0" data-scrub></label>
       <output data-phase></output>`;
     box.append(controls);
@@ -219,7 +227,12 @@ class Player {
     this.button.addEventListener("click", () => this.setPlaying(!this.playing));
     this.scrub.addEventListener("input", () => {
       this.setPlaying(false);
-      this.share = Number(this.scrub.value) / 100;
+      this.clocks.place = Number(this.scrub.value) / 100;
+      this.draw();
+    });
+    const pace = /** @type {HTMLSelectElement | null} */ (controls.querySelector("[data-pace]"));
+    pace?.addEventListener("change", () => {
+      this.clocks.keep(/** @type {import("./two_clocks.mjs").Pace} */ (pace.value));
       this.draw();
     });
     for (const scene of scenes) new ResizeObserver(() => this.draw()).observe(scene.canvas);
@@ -242,26 +255,25 @@ class Player {
   tick(now) {
     if (!this.playing) return;
     // The first frame may be of a moment before the button was pressed.
-    this.share += (Math.max(now - this.last, 0) / 1000 / this.stride) * Number(this.speed.value);
+    this.clocks.at += (Math.max(now - this.last, 0) / 1000) * Number(this.speed.value);
     this.last = now;
-    while (this.share >= 1) {
-      this.share -= 1;
-      this.strides += 1;
-    }
     this.draw();
     requestAnimationFrame((next) => this.tick(next));
   }
 
   draw() {
-    for (const scene of this.scenes) scene.draw(this.share, this.strides);
-    const percent = 100 * this.share;
-    this.scrub.value = String(percent);
+    this.scenes.forEach((scene, place) => {
+      const strides = this.clocks.strides(place);
+      scene.draw(strides % 1, Math.floor(strides));
+    });
+    const share = this.clocks.place;
+    this.scrub.value = String(100 * share);
     // Gaits beside each other may be in different phases.
     const [{ motion }, other] = this.scenes;
-    const time = this.share * motion.stride_time_s;
-    this.phase.textContent = other
-      ? `${percent.toFixed(0)} %`
-      : `${percent.toFixed(0)} %, ${time.toFixed(2)} s: ${inWords(frameAt(motion, time).domain)}`;
+    const time = share * this.clocks.round;
+    const percent = `${(100 * share).toFixed(0)} %`;
+    if (!other) this.phase.textContent = `${percent}, ${time.toFixed(2)} s: ${inWords(frameAt(motion, time).domain)}`;
+    else this.phase.textContent = this.clocks.pace === "share" ? percent : `${time.toFixed(2)} s`;
     this.scrub.setAttribute("aria-valuetext", this.phase.textContent);
   }
 }
@@ -275,6 +287,7 @@ const load = async (trial) => {
 
 for (const box of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".walker"))) {
   const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
+  for (const moving of /** @type {NodeListOf<HTMLElement>} */ (box.querySelectorAll(".motions"))) moving.hidden = false;
   Promise.all(canvases.map(async (canvas) => new Scene(canvas, await load(canvas.dataset.trial))))
     .then((scenes) => new Player(box, scenes))
     .catch((error) => {

@@ -3,6 +3,8 @@
 // solve. Sorting and filtering the trials changes the address and brings the table alone.
 // Without this script the page is right after a reload, and sorting and filtering load it anew.
 
+import { holdsEdits } from "./edited.mjs";
+
 const live = /** @type {HTMLElement | null} */ (document.getElementById("live"));
 
 /** Shortest time between two looks at a running solve, ms. */
@@ -11,6 +13,26 @@ const PAUSE = 500;
 const AGAIN = 3000;
 /** What is recorded of a study and changes its page. */
 const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined", "trial_explained"];
+
+/** @type {(node: Node) => string} What a folded part is called. */
+const titleOf = (node) => (node instanceof HTMLDetailsElement ? (node.querySelector("summary")?.textContent ?? "") : "");
+
+/**
+ * Replaces what is in a part, but for what is folded in it and being edited: that stays where it is, as it was typed.
+ * @param {HTMLElement} part
+ * @param {Element} next
+ */
+function replace(part, next) {
+  const typed = [...part.querySelectorAll(":scope > details")].filter((folded) => holdsEdits(folded));
+  const fresh = [...next.childNodes];
+  const kept = typed.filter((folded) => fresh.some((node) => titleOf(node) === titleOf(folded)));
+  for (const node of [...part.childNodes]) if (!kept.includes(/** @type {Element} */ (node))) node.remove();
+  let before = part.firstChild;
+  for (const node of fresh) {
+    if (before && kept.some((folded) => titleOf(folded) === titleOf(node))) before = before.nextSibling;
+    else part.insertBefore(node, before);
+  }
+}
 
 /**
  * Replaces what changed and leaves the rest, its focus and its scroll position alone.
@@ -25,12 +47,12 @@ function update(shown, fresh) {
     const name = held?.getAttribute("value") ?? held?.textContent;
     const opened = [...part.querySelectorAll("details[open] > summary")].map((summary) => summary.textContent);
     const across = part.querySelector(".scroll")?.scrollLeft ?? 0;
-    part.replaceChildren(...next.childNodes);
+    replace(part, next);
     part.querySelector(".scroll")?.scrollTo({ left: across });
     for (const summary of part.querySelectorAll("details > summary")) {
       if (opened.includes(summary.textContent)) summary.parentElement?.setAttribute("open", "");
     }
-    if (held) {
+    if (held && !held.isConnected) {
       const alike = [...part.querySelectorAll(held.tagName)].find((e) => (e.getAttribute("value") ?? e.textContent) === name);
       /** @type {HTMLElement | undefined} */ (alike)?.focus();
     }
@@ -138,8 +160,9 @@ if (live) {
       // A browser tries again by itself, but not when the service answered that it cannot.
       if (source.readyState === EventSource.CLOSED) setTimeout(listen, AGAIN);
       if (!connection.hidden) return;
-      const since = new Date().toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-      connection.textContent = `No connection to the service since ${since}: trying again.`;
+      // In UTC, like every other time on these pages.
+      const since = new Date().toISOString().slice(11, 16);
+      connection.textContent = `No connection to the service since ${since} UTC: trying again.`;
       connection.hidden = false;
       live.classList.add("stale");
     });

@@ -1,28 +1,33 @@
 // @ts-check
-// Two motions on one clock. Both have the same length, scale and colours; positions come from the server.
+// Two motions on one clock, both at the same share of their strides or each in its own time. Scale and colours are the same;
+// positions come from the server.
+
+import { mayMove, showStrips } from "./strips.mjs";
+import { Clocks } from "./two_clocks.mjs";
 
 /** @typedef {[number, number]} Place */
 
-const STRIDE_MS = 1400;
+/** A stride where both are shown at the same share of their cycles, s. */
+const STRIDE_S = 1.4;
+/** Size of the drawing in its own units; it is drawn with the points that the screen has. */
+const [WIDTH, HEIGHT] = [640, 420];
 const box = /** @type {HTMLElement | null} */ (document.querySelector("[data-pair]"));
 
 if (box) {
   const state = /** @type {HTMLElement} */ (document.querySelector("[data-state]"));
   const play = /** @type {HTMLButtonElement} */ (document.querySelector("[data-play]"));
+  const scrub = /** @type {HTMLInputElement} */ (document.querySelector("[data-scrub]"));
+  const pace = /** @type {HTMLSelectElement} */ (document.querySelector("[data-pace]"));
   const form = /** @type {HTMLFormElement} */ (document.querySelector("[data-answer]"));
   const save = /** @type {HTMLButtonElement} */ (form.querySelector("[type=submit]"));
   const canvases = /** @type {HTMLCanvasElement[]} */ ([...box.querySelectorAll("canvas")]);
   const speed = /** @type {HTMLSelectElement} */ (document.querySelector("[data-speed]"));
+  const clocks = new Clocks(canvases.map((canvas) => Number(canvas.dataset.seconds) || STRIDE_S), STRIDE_S);
+  box.hidden = false;
   /** @type {HTMLElement} */ (document.querySelector("[data-controls]")).hidden = false;
   save.disabled = true;
-  let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const strips = document.querySelector("[data-strips]");
-  if (!playing && strips) {
-    // Who wants no motion sees both strides as pictures, like those without scripts.
-    const pictures = new DOMParser().parseFromString(strips.textContent ?? "", "text/html").body;
-    strips.replaceWith(...pictures.childNodes);
-  }
-  let phase = 0;
+  let playing = mayMove();
+  if (!playing) showStrips(document);
   let last = 0;
 
   /** @param {string} side @returns {Promise<Place[][]>} */
@@ -32,14 +37,20 @@ if (box) {
     return reply.json();
   };
 
-  /** @param {HTMLCanvasElement} canvas @param {Place[][]} motion */
-  const draw = (canvas, motion) => {
+  /** @param {HTMLCanvasElement} canvas @param {Place[][]} motion @param {number} phase */
+  const draw = (canvas, motion, phase) => {
+    const points = canvas.clientWidth * (window.devicePixelRatio || 1);
+    if (points === 0) return;
+    const size = [Math.round(points), Math.round((points * HEIGHT) / WIDTH)];
+    // Setting it wipes the canvas, also to the same size.
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
     const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    pen.setTransform(size[0] / WIDTH, 0, 0, size[1] / HEIGHT, 0, 0);
     const figure = motion[Math.min(Math.floor(phase * motion.length), motion.length - 1)];
-    const scale = canvas.height / 2.1;
+    const scale = HEIGHT / 2.1;
     const middle = figure[0][0];
     /** @param {Place} place @returns {Place} */
-    const at = ([x, z]) => [canvas.width / 2 + (x - middle) * scale, canvas.height - 30 - z * scale];
+    const at = ([x, z]) => [WIDTH / 2 + (x - middle) * scale, HEIGHT - 30 - z * scale];
     /** @param {number[]} joints @param {number} width @param {number[]} dash */
     const line = (joints, width, dash) => {
       pen.lineWidth = width;
@@ -49,7 +60,7 @@ if (box) {
       pen.stroke();
     };
     const colour = getComputedStyle(canvas).color;
-    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.clearRect(0, 0, WIDTH, HEIGHT);
     pen.strokeStyle = colour;
     pen.lineCap = "round";
     line([1, 0], 6, []);
@@ -64,20 +75,24 @@ if (box) {
     pen.setLineDash([]);
     pen.lineWidth = 1;
     pen.beginPath();
-    pen.moveTo(0, canvas.height - 30);
-    pen.lineTo(canvas.width, canvas.height - 30);
+    pen.moveTo(0, HEIGHT - 30);
+    pen.lineTo(WIDTH, HEIGHT - 30);
     pen.stroke();
   };
 
   try {
     const motions = await Promise.all(canvases.map((canvas) => load(String(canvas.dataset.side))));
     const begun = performance.now();
-    const show = () => canvases.forEach((canvas, i) => draw(canvas, motions[i]));
+    const show = () => {
+      canvases.forEach((canvas, i) => draw(canvas, motions[i], clocks.strides(i) % 1));
+      const percent = 100 * clocks.place;
+      scrub.value = String(percent);
+      scrub.setAttribute("aria-valuetext", `${percent.toFixed(0)} %`);
+    };
     /** @param {number} now */
     const step = (now) => {
       // The first frame may be of a moment before the motion was there.
-      const passed = Math.max(now - last, 0) / STRIDE_MS;
-      if (playing) phase = (phase + passed * Number(speed.value)) % 1;
+      if (playing) clocks.at += (Math.max(now - last, 0) / 1000) * Number(speed.value);
       last = now;
       show();
       requestAnimationFrame(step);
@@ -90,16 +105,15 @@ if (box) {
       playing = !playing;
       label();
     });
+    scrub.addEventListener("input", () => {
+      playing = false;
+      label();
+      clocks.place = Number(scrub.value) / 100;
+    });
+    pace.addEventListener("change", () => clocks.keep(/** @type {import("./two_clocks.mjs").Pace} */ (pace.value)));
     const took = /** @type {HTMLInputElement} */ (form.elements.namedItem("response_ms"));
     // Before the form is read to be sent.
     form.addEventListener("submit", () => (took.value = String(Math.round(performance.now() - begun))), { capture: true });
-    document.addEventListener("keydown", (event) => {
-      const place = ["1", "2", "3"].indexOf(event.key);
-      if (place < 0 || /** @type {Element} */ (event.target).closest("textarea")) return;
-      const choice = /** @type {HTMLInputElement} */ (form.querySelectorAll(".verdict input")[place]);
-      choice.click();
-      choice.focus();
-    });
     save.disabled = false;
     state.textContent = "";
   } catch (error) {

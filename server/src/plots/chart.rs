@@ -76,7 +76,7 @@ pub struct Chart {
     pub bands: Vec<Band>,
     /// The lines.
     pub series: Vec<Series>,
-    /// Vertical lines with names along them: where something begins.
+    /// Vertical lines where something begins: numbered above the axis, named in the legend.
     pub marks: Vec<(f64, String)>,
     /// Parts of the x axis, with names above them.
     pub spans: Vec<Span>,
@@ -98,9 +98,8 @@ const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 60.0;
-/// Names of marks nearer to each other than this would touch: every other one is written this much lower.
-const MARK_DISTANCE: f64 = 24.0;
-const MARK_DROP: f64 = 56.0;
+/// What is kept free between the numbers of two marks.
+const MARK_GAP: f64 = 6.0;
 /// What a character of a name above the axis takes where the style sheet writes it largest.
 const NAME_CHARACTER: f64 = 16.0;
 /// What a logarithmic axis takes for nothing.
@@ -197,12 +196,13 @@ impl Chart {
     }
 
     /// The names of the lines that have a point to be seen, for a legend in HTML: class, label.
-    pub fn legend(&self) -> Vec<(String, &str)> {
+    pub fn legend(&self) -> Vec<(String, String)> {
         let seen = |s: &&Series| s.points.iter().any(|(x, y)| x.is_finite() && y.is_finite());
         let lines = self.series.iter().filter(seen);
-        let lines = lines.map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.as_str()));
-        let bands = self.bands.iter().map(|b| (format!("key c{} band", b.colour % 10), b.label.as_str()));
-        lines.chain(bands).collect()
+        let lines = lines.map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.clone()));
+        let bands = self.bands.iter().map(|b| (format!("key c{} band", b.colour % 10), b.label.clone()));
+        let marks = self.marks.iter().zip(1..).map(|((_, name), n)| ("key begins".to_owned(), format!("{n} {name}")));
+        lines.chain(bands).chain(marks).collect()
     }
 
     fn draw(&self, svg: &mut String, x: &Axis, y: &Axis) -> std::fmt::Result {
@@ -242,25 +242,15 @@ impl Chart {
 }
 
 impl Chart {
-    /// Over the lines: they often begin where a mark has its name.
+    /// Names would lie on the lines, which often begin where a mark is: in the drawing a mark has its number, above them.
     fn draw_marks(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
         let bottom = HEIGHT - BOTTOM;
-        let (mut last, mut drop) = (f64::NEG_INFINITY, 0.0);
-        for (value, name) in &self.marks {
-            let at = px(*value);
+        let places: Vec<f64> = self.marks.iter().map(|(value, _)| px(*value)).collect();
+        for at in &places {
             write!(svg, "<path class=\"mark\" d=\"M{at:.1} {TOP}V{bottom}\"/>")?;
-            if name.is_empty() {
-                continue;
-            }
-            // Down along its line: neighbouring lines may be near.
-            drop = if at - last < MARK_DISTANCE && drop == 0.0 { MARK_DROP } else { 0.0 };
-            last = at;
-            let (x, y) = (at + 4.0, TOP + 4.0 + drop);
-            write!(
-                svg,
-                "<text class=\"mark\" transform=\"translate({x:.1} {y:.1}) rotate(90)\">{}</text>",
-                escape(name)
-            )?;
+        }
+        for (x, text) in numbers(&places) {
+            write!(svg, "<text class=\"label\" x=\"{x:.1}\" y=\"{}\">{text}</text>", TOP - 6.0)?;
         }
         Ok(())
     }
@@ -282,6 +272,30 @@ impl Chart {
         }
         Ok(())
     }
+}
+
+/// The numbers of marks at these places: middle and text. Those that would touch are written as one, `2\u{2013}4`.
+fn numbers(places: &[f64]) -> Vec<(f64, String)> {
+    let text = |from: usize, to: usize| {
+        if from == to { format!("{}", from + 1) } else { format!("{}\u{2013}{}", from + 1, to + 1) }
+    };
+    let middle = |from: usize, to: usize| f64::midpoint(places[from], places[to]);
+    let half = |from: usize, to: usize| NAME_CHARACTER * text(from, to).chars().count() as f64 / 2.0;
+    let mut groups: Vec<(usize, usize)> = Vec::new();
+    for mark in 0..places.len() {
+        let mut group = (mark, mark);
+        // What became wider may touch the one before.
+        while let Some(&(from, to)) = groups.last() {
+            let free = middle(group.0, group.1) - half(group.0, group.1) - middle(from, to) - half(from, to);
+            if free >= MARK_GAP {
+                break;
+            }
+            groups.pop();
+            group.0 = from;
+        }
+        groups.push(group);
+    }
+    groups.into_iter().map(|(from, to)| (middle(from, to), text(from, to))).collect()
 }
 
 impl Stroke {
@@ -380,10 +394,13 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_carries_its_name() {
+    fn a_mark_is_numbered_in_the_drawing_and_named_in_the_legend() {
         let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (9.0, 2.0)]);
-        chart.marks = vec![(3.0, "DS2_R".to_owned())];
-        assert!(chart.svg().contains(">DS2_R</text>"));
+        chart.marks = vec![(0.0, "tracking".to_owned()), (3.0, "cost".to_owned())];
+        let svg = chart.svg();
+        assert!(svg.contains(">1</text>") && svg.contains(">2</text>") && !svg.contains("cost"), "{svg}");
+        assert!(!svg.contains("rotate"), "nothing is written along a line");
+        assert_eq!(chart.legend()[2], ("key begins".to_owned(), "2 cost".to_owned()));
     }
 
     #[test]
@@ -405,17 +422,16 @@ mod tests {
     }
 
     #[test]
-    fn names_of_near_marks_are_at_different_heights() {
-        let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (100.0, 2.0)]);
-        chart.marks = [1.0, 3.0, 5.0, 50.0].map(|at| (at, format!("at {at}"))).to_vec();
-        let svg = chart.svg();
-        let height = |name: &str| {
-            let before = &svg[..svg.find(name).unwrap()];
-            let text = &before[before.rfind("translate(").unwrap()..];
-            text[..text.find(')').unwrap()].split(' ').nth(1).unwrap().parse::<f64>().unwrap()
-        };
-        assert_ne!(height("at 1<"), height("at 3<"));
-        assert_ne!(height("at 3<"), height("at 5<"));
-        assert_eq!(height("at 5<"), height("at 50<"));
+    fn numbers_of_near_marks_are_written_as_one_and_none_touch() {
+        let texts = |places: &[f64]| numbers(places).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
+        assert_eq!(texts(&[74.0, 200.0, 300.0]), ["1", "2", "3"]);
+        assert_eq!(texts(&[74.0, 76.0, 78.0, 300.0]), ["1\u{2013}3", "4"]);
+        // However near they are: what is written keeps its distance.
+        let many: Vec<f64> = (0..24).map(|i| 74.0 + 15.0 * f64::from(i) + f64::from(i * i % 7)).collect();
+        let written = numbers(&many);
+        let half = |text: &str| NAME_CHARACTER * text.chars().count() as f64 / 2.0;
+        for pair in written.windows(2) {
+            assert!(pair[1].0 - half(&pair[1].1) - pair[0].0 - half(&pair[0].1) >= MARK_GAP, "{written:?}");
+        }
     }
 }

@@ -84,12 +84,8 @@ impl Figure {
     pub fn svg(&self) -> String {
         match &self.drawing {
             Drawing::Chart(chart) => {
-                let legend: Vec<(String, &str)> = chart.legend();
-                standalone::svg(
-                    self.title(),
-                    &Inside { class: "chart", size: Chart::SIZE, body: chart.body() },
-                    &legend,
-                )
+                let inside = Inside { class: "chart", size: Chart::SIZE, body: chart.body() };
+                standalone::svg(self.title(), &inside, &chart.legend())
             }
             Drawing::Tiles(title, figures) => {
                 let inside = Inside { class: "tiles", size: gait_tiles::SIZE, body: gait_tiles::body(figures) };

@@ -26,14 +26,14 @@ pub(super) struct Inside {
 }
 
 /// A whole SVG document.
-pub(super) fn svg(title: &str, inside: &Inside, legend: &[(String, &str)]) -> String {
+pub(super) fn svg(title: &str, inside: &Inside, legend: &[(String, String)]) -> String {
     let mut svg = String::with_capacity(inside.body.len() + 8 * 1024);
     // Writing to a String cannot fail.
     let _ = draw(&mut svg, title, inside, legend);
     svg
 }
 
-fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, &str)]) -> std::fmt::Result {
+fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, String)]) -> std::fmt::Result {
     let width = inside.size.0 + 2.0 * MARGIN;
     let places = places(legend, width);
     let rows = places.last().map_or(0.0, |(_, row)| row + 1.0);
@@ -59,6 +59,8 @@ fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, &str)
             write!(svg, "<circle class=\"dot {class}\" cx=\"13\" cy=\"8\" r=\"4\"/>")?;
         } else if class.ends_with("band") {
             write!(svg, "<rect class=\"{class}\" y=\"2\" width=\"26\" height=\"12\"/>")?;
+        } else if class == "begins" {
+            write!(svg, "<path class=\"mark\" d=\"M13 0V16\"/>")?;
         } else {
             write!(svg, "<path class=\"line {class}\" d=\"M0 8H26\"/>")?;
         }
@@ -68,9 +70,9 @@ fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, &str)
 }
 
 /// Where each entry of a legend begins, and in which row.
-fn places(legend: &[(String, &str)], width: f64) -> Vec<(f64, f64)> {
+fn places(legend: &[(String, String)], width: f64) -> Vec<(f64, f64)> {
     let (mut x, mut row) = (MARGIN, 0.0);
-    let place = |(_, label): &(String, &str)| {
+    let place = |(_, label): &(String, String)| {
         let needed = KEY + CHARACTER * label.chars().count() as f64 + 2.0 * MARGIN;
         if x > MARGIN && x + needed > width {
             (x, row) = (MARGIN, row + 1.0);
@@ -134,7 +136,7 @@ mod tests {
     #[test]
     fn a_long_legend_goes_on_in_the_next_row() {
         let label = "x".repeat(30);
-        let legend: Vec<(String, &str)> = (0..4).map(|_| ("key c0 solid".to_owned(), label.as_str())).collect();
+        let legend: Vec<(String, String)> = (0..4).map(|_| ("key c0 solid".to_owned(), label.clone())).collect();
         let rows: Vec<f64> = places(&legend, 660.0).into_iter().map(|(_, row)| row).collect();
         assert_eq!(rows, [0.0, 0.0, 1.0, 1.0]);
     }

@@ -70,10 +70,10 @@ async fn withdrawn(site: &Site) -> (String, StudyId) {
 
 /// Every page with something on it: name and address.
 async fn pages(site: &Site) -> Vec<(&'static str, String)> {
-    let study =
-        site.service.study(|new| (new.trial_budget, new.name) = (24, Some("S01, first tuning".to_owned()))).await;
+    let study = site.service.study(|new| (new.trial_budget, new.name) = (24, Some(LONG_WORD.to_owned()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let other = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let human = (4, FeedbackMode::Human, Some(LONG_NAME.to_owned()));
+    let other = site.service.study(|new| (new.trial_budget, new.feedback_mode, new.name) = human).await;
     site.service.wait_for(other, &[StudyState::Waiting]).await;
     let trials = site.service.trials(study).await;
     let of = |state| trials.iter().find(|trial| trial.state == state).map(|trial| trial.id);
@@ -184,6 +184,9 @@ async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
     [trials[0].id, trials[1].id, *id]
 }
 
+/// Names as long as people make them: one word of 60 letters, and 86 characters.
+const LONG_WORD: &str = "Prothesengangoptimierungsverlaufsbeobachtungswiederholungen1";
+const LONG_NAME: &str = "A second tuning of the person with the powered prosthesis, treadmill at 1.1 m/s, shoes";
 const WIDTHS: [i64; 3] = [1280, 768, 320];
 /// What A4 is wide between margins of 1 cm, in pixels of a style sheet.
 const PAPER: i64 = 718;
@@ -211,6 +214,9 @@ async fn browser_every_page_fits_and_is_for_everybody() {
                     page.picture(&folder.join(format!("{name}-{width}-{scheme}.png"))).await;
                 }
             }
+            for complaint in too_small(&page).await {
+                wrong.push(format!("{name}: {complaint}"));
+            }
             page.resize(1280, 900).await;
         }
         page.be_paper().await;
@@ -225,6 +231,14 @@ async fn browser_every_page_fits_and_is_for_everybody() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     browser.close().await;
+}
+
+/// Text of maps and of strides that is smaller than 9 points of the screen: drawings are scaled with their place.
+async fn too_small(page: &Tab) -> Vec<String> {
+    let small = "JSON.stringify([...document.querySelectorAll('svg.map text, svg.tiles text')].flatMap(t => { \
+        const svg = t.ownerSVGElement; const size = parseFloat(getComputedStyle(t).fontSize) * svg.getScreenCTM().a; \
+        return size < 9 ? [`${t.textContent} is ${size.toFixed(1)} px high`] : []; }).slice(0, 2))";
+    serde_json::from_str(&page.value(small).await).unwrap()
 }
 
 async fn own_checks(page: &Tab) -> Vec<String> {

@@ -36,8 +36,10 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     page.resize(768, 1024).await;
     for walk in 1..=3 {
         page.wait_until(&format!("document.querySelector('h1').innerText.startsWith('Walk {walk}')")).await;
+        // A slip of the finger records nothing.
+        page.run("document.querySelector('main button').click()").await;
         // Clicked twice it is recorded once, and the page goes on.
-        page.run("const b = document.querySelector('main button'); b.click(); b.click()").await;
+        page.run("document.querySelector('main [type=checkbox]').checked = true; const b = document.querySelector('main button'); b.click(); b.click()").await;
     }
     page.wait_until("document.querySelector('h1').innerText === 'Which walk was better?'").await;
     assert_eq!(page.count("[role=alert]").await, 0);
@@ -79,6 +81,31 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     assert!(page.text(".answers").await.contains("the subject, "));
     page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_in_the_lab_keeps_the_note_over_a_reload_and_while_the_service_is_gone() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let (_, session) = planned(&site).await;
+    let page = browser.open(&site.at(&format!("/lab/{session}"))).await;
+    page.fill("#note", "slow at first").await;
+    page.reload().await;
+    page.wait_until("document.querySelector('#note')?.value === 'slow at first'").await;
+    let send =
+        "document.querySelector('main [type=checkbox]').checked = true; document.querySelector('main button').click()";
+    let site = site
+        .restart(Analytic::default(), async |_| {
+            page.run(send).await;
+            page.wait_for("[data-unsent]:not([hidden])").await;
+        })
+        .await;
+    page.run(send).await;
+    page.wait_until("document.querySelector('h1').innerText.startsWith('Walk 2')").await;
+    assert_eq!(page.value("document.querySelector('#note').value").await, "", "another walk, another note");
+    let walked = site.service.fetch(&format!("/api/v1/lab-sessions/{session}")).await.json();
+    assert_eq!(walked["walks"][0]["recorded"]["note"], "slow at first", "{walked}");
     browser.close().await;
 }
 

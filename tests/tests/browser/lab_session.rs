@@ -44,6 +44,7 @@ async fn browser_clicks_through_a_lab_session_from_the_plan_to_the_order() {
         page.wait_until(&format!("document.querySelector('h1').innerText.startsWith('Walk {walk}')")).await;
         is_for_everybody(axe, &page, "a walk").await;
         page.fill("#note", &format!("note of walk {walk}")).await;
+        page.click("main [type=checkbox]").await;
         page.click("main form button").await;
     }
     page.wait_until("document.querySelector('h1').innerText === 'Which walk was better?'").await;

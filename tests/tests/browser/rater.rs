@@ -103,6 +103,8 @@ async fn browser_rater_answers_without_scripts() {
     page.click_plainly("main form button").await;
     page.wait_for("svg.tiles").await;
     assert_eq!(page.count("svg.tiles").await, 2);
+    let seen = "[...document.querySelectorAll('canvas, [data-key], [data-keys]')].filter(e => e.getClientRects().length).length";
+    assert_eq!(page.value(seen).await, "0", "no empty frames, no keys that do nothing");
     page.resize(1280, 2400).await;
     page.click_plainly("input[value=first]").await;
     page.click_plainly("[data-answer] [type=submit]").await;
@@ -161,6 +163,9 @@ async fn browser_rater_with_two_tabs_answers_once() {
     }
     let told = other.text("main").await;
     assert!(told.contains("was answered already") && told.contains("“first” counts"), "{told}");
+    assert_eq!(other.text("h1").await, "This was not taken");
+    other.click("main a.button[href='/rate']").await;
+    other.wait_until("location.pathname === '/rate'").await;
     assert_eq!(answers(&site, study).await.len(), 1);
     browser.close().await;
 }
@@ -227,6 +232,79 @@ async fn browser_rater_keeps_choice_and_note_over_a_reload() {
     page.wait_for(".notice.good").await;
     assert!(answers(&site, study).await.is_empty(), "no preference");
     assert_eq!(page.value("sessionStorage.length").await, "0", "what is saved is not kept here");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_takes_the_newest_answer_back_also_later() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    let pair = page.address().await;
+    page.click("input[value=second]").await;
+    page.click("[data-answer] [type=submit]").await;
+    page.wait_for(".notice.good").await;
+    // The page of the pair offers it, and so does the first page without a word in its address.
+    page.goto(&pair).await;
+    assert!(page.text(".notice").await.contains("This pair was answered: second"));
+    assert_eq!(page.count("form[action$='/take-back']").await, 1);
+    page.goto(&site.at("/rate")).await;
+    page.click("form[action$='/take-back'] button").await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('taken back') ?? false").await;
+    assert!(answers(&site, study).await[0].retraction.is_some());
+    page.goto(&site.at("/rate")).await;
+    assert_eq!(page.count("form[action$='/take-back']").await, 0, "once");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_turns_keys_off_and_keys_leave_other_fields_alone() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    let chosen = "document.querySelector('[name=answer]:checked')?.value ?? 'nothing'";
+    page.run("document.querySelector('[data-speed]').focus()").await;
+    page.press("1").await;
+    assert_eq!(page.value(chosen).await, "nothing", "the key belongs to the field");
+    page.run("document.activeElement.blur()").await;
+    page.run("document.body.dispatchEvent(new KeyboardEvent('keydown', { key: '2', ctrlKey: true, bubbles: true }))")
+        .await;
+    assert_eq!(page.value(chosen).await, "nothing", "the key belongs to the browser");
+    page.click("[data-keys] input").await;
+    page.reload().await;
+    page.wait_until("document.querySelector('[data-keys]')?.hidden === false").await;
+    page.press("3").await;
+    assert_eq!(page.value(chosen).await, "nothing", "turned off, also later");
+    assert_eq!(page.value("document.querySelector('[data-key]').hidden").await, "true");
+    page.click("[data-keys] input").await;
+    page.run("document.activeElement.blur()").await;
+    page.press("3").await;
+    assert_eq!(page.value(chosen).await, "second");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_rater_moves_through_the_stride_by_hand() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    waiting(&site).await;
+    let page = at_the_pair(&browser, &site).await;
+    let scrub = "const s = document.querySelector('[data-scrub]'); s.value = 50; s.dispatchEvent(new Event('input'))";
+    page.run(scrub).await;
+    assert_eq!(page.text("[data-play]").await, "Play", "it stands still");
+    let pictures = "[...document.querySelectorAll('canvas')].map(c => c.toDataURL()).join()";
+    page.wait_until("document.querySelector('[data-scrub]').value === '50'").await;
+    let before = page.value(pictures).await;
+    page.run(&scrub.replace("50", "25")).await;
+    page.wait_until(&format!("{pictures} !== {before:?}")).await;
+    // As many points as the screen has.
+    let points = "[...document.querySelectorAll('canvas')].every(c => Math.abs(c.width - c.clientWidth * devicePixelRatio) <= 1)";
+    assert_eq!(page.value(points).await, "true");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

@@ -54,6 +54,34 @@ async fn browser_follows_a_running_solve() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn browser_leaves_alone_what_is_typed_while_the_study_goes_on() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::slow(Duration::from_millis(40))).await;
+    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.wait_for("#more").await;
+    page.run("document.querySelector('#more').closest('details').open = true").await;
+    page.fill("#more", "17").await;
+    page.run("window.field = document.querySelector('#more')").await;
+    let done = "document.querySelector('[data-part=state] progress').value";
+    let typed = "`${document.querySelector('#more').value} ${document.querySelector('#more') === window.field}`";
+    let begun: u32 = page.value(done).await.parse().unwrap();
+    page.wait_until(&format!("{done} > {begun}")).await;
+    assert_eq!(page.value(typed).await, "17 true");
+    assert_eq!(page.value("document.activeElement === window.field").await, "true");
+    // Also without the focus, as long as it was changed.
+    page.run("window.field.blur()").await;
+    let begun: u32 = page.value(done).await.parse().unwrap();
+    page.wait_until(&format!("{done} > {begun}")).await;
+    assert_eq!(page.value(typed).await, "17 true");
+    // Everything around it was brought anew, once.
+    assert_eq!(page.count("[data-part=state] details").await, 2);
+    assert_eq!(page.count("[data-part=state] progress").await, 1);
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
@@ -108,6 +136,8 @@ async fn browser_shows_what_the_learner_believes_and_where_gaits_grew() {
     let shares = "[...document.querySelectorAll('#best meter')].reduce((sum, m) => sum + m.value, 0)";
     let total: f64 = page.value(shares).await.parse().unwrap();
     assert!((total - 1.0).abs() < 1e-9, "{total}");
+    let recommended = site.service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
+    assert_eq!(page.text("#best tr.best a").await, recommended["number"].to_string(), "{recommended}");
     assert!(page.count("#answers tbody tr").await > 0);
     page.is_clean(&site.origin).await;
     let wrong = site.service.fetch(&format!("/studies/{study}/belief?right=a5&down=a5")).await;
@@ -285,7 +315,8 @@ async fn browser_says_that_the_service_is_gone_and_that_it_is_back() {
     let site = site
         .restart(Analytic::default(), async |_| {
             page.wait_for("[data-connection]:not([hidden])").await;
-            assert!(page.text("[data-connection]").await.contains("trying again"));
+            let told = page.text("[data-connection]").await;
+            assert!(told.contains("trying again") && told.contains(" UTC"), "{told}");
             page.wait_for("#live.stale").await;
         })
         .await;
@@ -299,5 +330,79 @@ async fn browser_says_that_the_service_is_gone_and_that_it_is_back() {
     page.click("[data-part=state] button[value=stop]").await;
     page.wait_for("[data-part=state] .state.stopped").await;
     assert_eq!(page.count("[data-part=state] button[value=extend]").await, 1);
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_two_gaits_by_time_and_as_pictures() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    let at = site.at(&format!("/studies/{study}/compare"));
+    let page = browser.open(&at).await;
+    page.wait_for("[data-pace]").await;
+    assert_eq!(page.count("svg.tiles").await, 0);
+    page.click("[data-play]").await;
+    page.run("const p = document.querySelector('[data-pace]'); p.value = 'time'; p.dispatchEvent(new Event('change'))")
+        .await;
+    assert!(page.text("[data-phase]").await.ends_with(" s"));
+    // Half a second is half a stride of one second and a quarter of one of two; side by side both are equally far.
+    let places = "import('/static/two_clocks.mjs').then(({ Clocks }) => { const c = new Clocks([1, 2], 1.5); c.at = 0.5; \
+                  const both = () => [c.strides(0), c.strides(1)].map(n => n.toFixed(2)); const share = both(); c.pace = 'time'; \
+                  return [...share, ...both(), c.round].join(' ') })";
+    assert_eq!(page.value(places).await, "0.33 0.33 0.50 0.25 2");
+    page.is_clean(&site.origin).await;
+
+    let still = browser.open(&site.origin).await;
+    still.prefer("prefers-reduced-motion", "reduce").await;
+    still.goto(&at).await;
+    still.wait_until("document.querySelector('[data-play]')?.textContent === 'Play'").await;
+    assert_eq!(still.count("svg.tiles").await, 2);
+    let plain = browser.open_without_scripts(&at).await;
+    assert_eq!(plain.count("svg.tiles").await, 2);
+    assert!(!plain.text("main").await.contains("key 1"));
+    let seen = "[...document.querySelectorAll('canvas')].filter(c => c.getClientRects().length).length";
+    assert_eq!(plain.value(seen).await, "0", "no empty frames");
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_does_not_say_that_an_answered_comparison_is_the_next_one() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    site.service.wait_for(study, &[StudyState::Waiting]).await;
+    let at = site.at(&format!("/studies/{study}/compare"));
+    let (one, other) = (browser.open(&at).await, browser.open(&at).await);
+    for page in [&one, &other] {
+        page.fill("#author", "K1").await;
+        page.run("document.querySelector('input[value=a]').checked = true").await;
+        page.click("form[data-answer] [type=submit]").await;
+        page.wait_for(".notice.good").await;
+        site.service.wait_for(study, &[StudyState::Waiting]).await;
+    }
+    other.wait_for(".notice.bad[role=alert]").await;
+    assert!(!other.text("main").await.contains("stands below"));
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_prints_trials_without_breaking_headings() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.trial_budget = 12).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.be_paper().await;
+    // A4 between margins of 1 cm.
+    page.resize(718, 1000).await;
+    let broken = "[...document.querySelectorAll('.trials thead th')].flatMap(th => { \
+        const walker = document.createTreeWalker(th, NodeFilter.SHOW_TEXT); const broken = []; \
+        for (let t = walker.nextNode(); t; t = walker.nextNode()) for (const word of t.data.matchAll(/[^ ]+/g)) { \
+          const range = document.createRange(); range.setStart(t, word.index); range.setEnd(t, word.index + word[0].length); \
+          if (range.getClientRects().length > 1) broken.push(word[0]); } return broken; }).join()";
+    assert_eq!(page.value(broken).await, "");
+    assert_eq!(page.beyond().await, "0");
     browser.close().await;
 }

@@ -96,8 +96,7 @@ fn pair(verdict: &Verdict, outcomes: &[Outcome]) -> Result<Pair, Error> {
 }
 
 fn drawn(chart: &Chart) -> Drawn {
-    let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-    Drawn { title: chart.title.clone(), svg: chart.svg(), legend }
+    Drawn { title: chart.title.clone(), svg: chart.svg(), legend: chart.legend() }
 }
 
 fn label(outcome: &Outcome) -> &'static str {

@@ -15,7 +15,7 @@ use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{StudyId, TrialId, studies, trials};
 use crate::studies::belief::{Belief, Comparison, MOST_ANSWERS};
-use crate::studies::choice::MANY;
+use crate::studies::choice::{MANY, ranking_to_show};
 use crate::studies::standing::Standing;
 use askama::Template;
 use axum::extract::State;
@@ -49,6 +49,8 @@ struct Everything {
     /// The maps as shown.
     charts: Vec<Drawn>,
     best: Vec<BestRow>,
+    /// So many trials are not in that list.
+    others: usize,
     answers: Vec<AnswerRow>,
     more_answers: usize,
 }
@@ -73,6 +75,8 @@ struct BestRow {
     percent: String,
     probability: f64,
     utility: String,
+    /// Whether it is the one that the study recommends.
+    recommended: bool,
 }
 
 struct AnswerRow {
@@ -93,9 +97,16 @@ pub(super) async fn get(
     page(&match believed(&app, id).await? {
         Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
         Believed::There(standing, belief) => {
-            let shown = tokio::task::spawn_blocking(move || show(id, &standing, &belief, &choice))
-                .await
-                .map_err(|e| Error::Internal(e.to_string()))??;
+            let beliefs = Arc::clone(&app.beliefs);
+            let draw = move || {
+                // As on the page of the study: nothing before people have answered.
+                let silent = standing.waits_for_first_answer();
+                let ranking =
+                    if silent { Vec::new() } else { ranking_to_show(&standing, &beliefs).map_err(Error::Learner)? };
+                let recommended = ranking.first().copied();
+                show(id, &standing, &belief, recommended, &choice)
+            };
+            let shown = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))??;
             BeliefPage { study, absent: None, shown: Some(shown) }
         }
     })
@@ -147,7 +158,13 @@ async fn believed(app: &AppState, id: StudyId) -> Result<Believed, Error> {
     found.map_err(Error::Learner)
 }
 
-fn show(id: StudyId, standing: &Standing, belief: &Belief, choice: &Choice) -> Result<Everything, Error> {
+fn show(
+    id: StudyId,
+    standing: &Standing,
+    belief: &Belief,
+    recommended: Option<TrialId>,
+    choice: &Choice,
+) -> Result<Everything, Error> {
     let chosen = chosen(belief.posterior.space(), choice)?;
     let files = format!("/api/v1/studies/{id}/belief/figures");
     let maps = maps(belief, standing, chosen).map_err(Error::Learner)?;
@@ -158,12 +175,14 @@ fn show(id: StudyId, standing: &Standing, belief: &Belief, choice: &Choice) -> R
         _ => String::new(),
     };
     let charts = maps.figures.iter().zip(MAP_NOTES);
+    let (best, others) = best(belief, standing, recommended).map_err(Error::Learner)?;
     Ok(Everything {
         agreement: belief.agreement,
         marginals: marginals(belief).iter().map(|figure| Drawn::of(figure, &files, "")).collect(),
         charts: charts.map(|(figure, note)| Drawn { note, ..Drawn::of(figure, &files, &query) }).collect(),
         maps,
-        best: best(belief, standing).map_err(Error::Learner)?,
+        best,
+        others,
         answers: belief.comparisons.iter().take(LISTED).filter_map(|c| answer_row(c, standing)).collect(),
         more_answers: belief.comparisons.len().saturating_sub(LISTED),
     })
@@ -286,20 +305,35 @@ fn tried(standing: &Standing, space: &SearchSpace, levels: [(usize, usize); 2]) 
     }
 }
 
-fn best(belief: &Belief, standing: &Standing) -> Result<Vec<BestRow>, LearnerError> {
-    let mut rows = Vec::new();
-    for entry in belief.best.iter().take(LISTED) {
-        let Some(trial) = standing.trial_of(entry.action) else { continue };
+/// The trials that are most likely the best, the recommended one always among them; and how many others there are.
+fn best(
+    belief: &Belief,
+    standing: &Standing,
+    recommended: Option<TrialId>,
+) -> Result<(Vec<BestRow>, usize), LearnerError> {
+    let tried: Vec<_> =
+        belief.best.iter().filter_map(|entry| Some((entry, standing.trial_of(entry.action)?))).collect();
+    let marked = tried.iter().position(|(_, trial)| recommended == Some(trial.id));
+    let row = |place: usize| {
+        let (entry, trial) = tried[place];
         let prediction = belief.posterior.predict(entry.action)?;
-        rows.push(BestRow {
+        Ok(BestRow {
             id: trial.id,
             number: trial.number,
             percent: percent(entry.probability),
             probability: entry.probability,
             utility: format!("{} ± {:.2}", signed(prediction.mean), prediction.standard_deviation),
-        });
-    }
-    Ok(rows)
+            recommended: marked == Some(place),
+        })
+    };
+    let places = listed(tried.len(), marked);
+    let rows = places.iter().map(|&place| row(place)).collect::<Result<Vec<_>, _>>()?;
+    Ok((rows, tried.len() - places.len()))
+}
+
+/// The places of a long list that are shown: the first ones, and the one that must not be missing.
+fn listed(length: usize, always: Option<usize>) -> Vec<usize> {
+    (0..length.min(LISTED)).chain(always.filter(|&place| place >= LISTED)).collect()
 }
 
 fn answer_row(comparison: &Comparison, standing: &Standing) -> Option<AnswerRow> {
@@ -309,4 +343,17 @@ fn answer_row(comparison: &Comparison, standing: &Standing) -> Option<AnswerRow>
         percent: percent(comparison.probability),
         agrees: comparison.probability > 0.5,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LISTED, listed};
+
+    #[test]
+    fn the_recommended_trial_is_always_listed() {
+        assert_eq!(listed(3, Some(1)), [0, 1, 2]);
+        assert_eq!(listed(LISTED + 5, Some(0)).len(), LISTED);
+        let long = listed(LISTED + 5, Some(LISTED + 2));
+        assert_eq!((long.len(), long.last()), (LISTED + 1, Some(&(LISTED + 2))));
+    }
 }

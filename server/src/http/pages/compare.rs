@@ -11,7 +11,7 @@ use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::http::shown::Shown;
-use crate::plots::Figure;
+use crate::plots::{Figure, gait_tiles};
 use crate::printable;
 use crate::store::feedback::{FeedbackRow, Source, Whose};
 use crate::store::idempotency::{self, Kept, fingerprint};
@@ -30,6 +30,8 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::Gait;
+use gait_optimizer::walking::stick_figure::stick_figures;
 use serde::Deserialize;
 use std::fmt;
 use std::str::FromStr;
@@ -81,6 +83,8 @@ struct ComparePage {
     a: Option<(TrialId, u32)>,
     b: Option<(TrialId, u32)>,
     charts: Vec<Drawn>,
+    /// Both strides as pictures, for those without scripts and without motion; empty: they cannot be drawn.
+    strides: Vec<String>,
     key: FeedbackId,
     saved: Option<Saved>,
     /// The learner asks for a comparison.
@@ -192,18 +196,21 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
     };
     drop(reader);
     let draw = move || {
-        let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return Vec::new() };
+        let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return (Vec::new(), Vec::new()) };
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
         let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
-        figures::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect()
+        let charts = figures::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
+        let stride = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
+        (charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect())
     };
-    let charts = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
+    let (charts, strides) = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
     page(&ComparePage {
         study: standing.study,
         trials,
         a,
         b,
         charts,
+        strides,
         key: FeedbackId::fresh(),
         saved,
         waits,

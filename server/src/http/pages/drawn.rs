@@ -8,6 +8,8 @@ pub(super) struct Drawn {
     pub(super) title: String,
     pub(super) note: &'static str,
     pub(super) svg: String,
+    /// Whether it scrolls in its place on a narrow screen, as its text would be too small otherwise.
+    pub(super) is_wide: bool,
     pub(super) legend: Vec<(String, String)>,
     /// Where it is as a file: form and address.
     pub(super) files: Vec<(&'static str, String)>,
@@ -15,8 +17,14 @@ pub(super) struct Drawn {
 
 impl Drawn {
     pub(super) fn new(chart: &Chart) -> Self {
-        let legend = chart.legend().into_iter().map(|(class, label)| (class, label.to_owned())).collect();
-        Self { title: chart.title.clone(), note: "", svg: chart.svg(), legend, files: Vec::new() }
+        Self {
+            title: chart.title.clone(),
+            note: "",
+            svg: chart.svg(),
+            is_wide: false,
+            legend: chart.legend(),
+            files: Vec::new(),
+        }
     }
 
     /// A figure with its files, which are in a folder, with a query.
@@ -29,6 +37,7 @@ impl Drawn {
             Drawing::Map(map) => (map.svg(), Vec::new()),
             Drawing::Tree(tree) => (tree.svg(), Vec::new()),
         };
-        Self { title: figure.title().to_owned(), note: "", svg, legend, files }
+        let is_wide = matches!(figure.drawing, Drawing::Tiles(..) | Drawing::Map(_));
+        Self { title: figure.title().to_owned(), note: "", svg, is_wide, legend, files }
     }
 }

@@ -32,6 +32,8 @@ struct WalkPage {
     said: &'static str,
     seen: InTheLab,
     refused: Option<String>,
+    /// The note of a form that was refused.
+    typed: String,
 }
 
 /// `GET /lab`.
@@ -52,13 +54,13 @@ pub(super) async fn list(_: May<Rate>, State(app): State<AppState>) -> Page {
 
 /// `GET /lab/{id}`.
 pub(super) async fn get(_: May<Rate>, State(app): State<AppState>, Id(id): Id<LabSessionId>) -> Page {
-    show(&app, id, None).await
+    show(&app, id, None, String::new()).await
 }
 
-async fn show(app: &AppState, id: LabSessionId, refused: Option<String>) -> Page {
+async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> Page {
     let seen = lab::in_the_lab(&mut *app.read().await?, id).await?;
     let said = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
-    page(&WalkPage { name: id.short(), said, seen, refused })
+    page(&WalkPage { name: id.short(), said, seen, refused, typed })
 }
 
 /// `POST /lab/{id}`.
@@ -76,7 +78,7 @@ pub(super) async fn record(
         }
         Ok(())
     };
-    read_back(&app, id, recorded.await).await
+    read_back(&app, id, recorded.await, walked.note).await
 }
 
 /// `POST /lab/{id}/answer`.
@@ -93,7 +95,7 @@ pub(super) async fn answer(
         app.director.changed();
         Ok(())
     };
-    read_back(&app, id, answered.await).await
+    read_back(&app, id, answered.await, new.note).await
 }
 
 /// `POST /lab/{id}/take-back`.
@@ -107,15 +109,20 @@ pub(super) async fn take_back(
         lab::take_back(&mut writer, &may.caller, id).await?;
         Ok(commit(writer).await?)
     };
-    read_back(&app, id, taken_back.await).await
+    read_back(&app, id, taken_back.await, String::new()).await
 }
 
-/// What the record says now; what was refused, with the reason.
-async fn read_back(app: &AppState, id: LabSessionId, done: Result<(), Error>) -> Result<Response, PageError> {
+/// What the record says now; what was refused, with the reason and the note that was typed.
+async fn read_back(
+    app: &AppState,
+    id: LabSessionId,
+    done: Result<(), Error>,
+    typed: String,
+) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/lab/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, Some(error.to_string())).await?;
+            let shown = show(app, id, Some(error.to_string()), typed).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

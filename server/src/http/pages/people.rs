@@ -4,7 +4,7 @@ use super::error::{Page, PageError, page};
 use crate::access::people::{self, NewUser};
 use crate::access::tokens::{self as making, NewToken};
 use crate::access::{Administer, Caller, Right, Role};
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::extract::Form;
 use crate::http::may::May;
@@ -17,6 +17,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
+use serde_json::Value;
 use std::str::FromStr;
 
 /// What a token may be allowed: people administer, programs do not.
@@ -35,10 +36,87 @@ struct PeoplePage {
     roles: [Role; 3],
     scopes: [(Right, &'static str); 4],
     outcome: Outcome,
-    refused: Option<String>,
+    refused: Option<Refused>,
+    /// A refused form as it was typed. There is no secret in it.
+    typed: Asked,
+}
+
+/// Why a form was refused.
+struct Refused {
+    /// Which form.
+    act: String,
+    /// Which field; none: not because of one.
+    field: Option<&'static str>,
+    message: String,
+}
+
+/// The fields of both forms: name in the record, form, and what people read beside it.
+const FIELDS: [(&str, &str, &str); 5] = [
+    ("name", "add_user", "Name or code"),
+    ("role", "add_user", "Role"),
+    ("name", "make_token", "What it is for"),
+    ("days", "make_token", "Ends after, days"),
+    ("scopes", "make_token", "What it allows"),
+];
+
+impl Refused {
+    fn of(error: &Error, act: &str) -> Self {
+        let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == act);
+        let (field, message) = match error {
+            Error::Invalid(fault) => match find(&fault.field) {
+                Some((field, _, label)) => (Some(*field), in_words(label, fault)),
+                None => (None, error.to_string()),
+            },
+            // A name that is taken is all that the present state has against these two.
+            Error::Conflict(reason) => (find("name").map(|(field, _, _)| *field), reason.clone()),
+            _ => (None, error.to_string()),
+        };
+        Self { act: act.to_owned(), field, message }
+    }
+}
+
+/// What is wrong with a field, under the name that people read.
+fn in_words(label: &str, fault: &FieldError) -> String {
+    let allowed = fault.allowed.as_deref().unwrap_or_default();
+    match fault.value.as_ref() {
+        Some(Value::String(text)) if !text.is_empty() => {
+            format!("{label}: \u{201c}{text}\u{201d} is not accepted; accepted: {allowed}")
+        }
+        Some(Value::Number(number)) => format!("{label}: {number} is not accepted; accepted: {allowed}"),
+        _ => format!("{label}: needed is {allowed}"),
+    }
 }
 
 impl PeoplePage {
+    /// Why this field of this form was refused.
+    fn fault(&self, act: &str, field: &str) -> Option<&str> {
+        let refused = self.refused.as_ref()?;
+        (refused.act == act && refused.field == Some(field)).then_some(refused.message.as_str())
+    }
+
+    /// What marks a refused field.
+    fn invalid(&self, act: &str, field: &str) -> &'static str {
+        if self.fault(act, field).is_some() {
+            " aria-invalid=\"true\" aria-describedby=\"fault\" autofocus"
+        } else {
+            ""
+        }
+    }
+
+    /// What was typed into a form, if it was that one.
+    fn typed<'a>(&self, act: &str, text: &'a str) -> &'a str {
+        if self.typed.act == act { text } else { "" }
+    }
+
+    fn is_role(&self, role: &Role) -> bool {
+        let chosen = self.typed("add_user", &self.typed.role);
+        role.as_str() == if chosen.is_empty() { "rater" } else { chosen }
+    }
+
+    fn is_scope(&self, right: &Right) -> bool {
+        if self.typed.act == "make_token" { self.typed.scopes().contains(right) } else { *right == Right::Read }
+    }
+
     fn scopes_of(token: &Token) -> String {
         token.scopes.iter().map(|scope| scope.as_str()).collect::<Vec<_>>().join(", ")
     }
@@ -53,7 +131,7 @@ struct Outcome {
 }
 
 /// What a form asks for.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 pub(super) struct Asked {
     act: String,
     #[serde(default)]
@@ -83,13 +161,13 @@ impl Asked {
 
 /// `GET /people`.
 pub(super) async fn get(_: May<Administer>, State(app): State<AppState>) -> Page {
-    show(&app, Outcome::default(), None).await
+    show(&app, Outcome::default(), None, Asked::default()).await
 }
 
-async fn show(app: &AppState, outcome: Outcome, refused: Option<String>) -> Page {
+async fn show(app: &AppState, outcome: Outcome, refused: Option<Refused>, typed: Asked) -> Page {
     let mut reader = app.read().await?;
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
-    page(&PeoplePage { users, tokens, roles: Role::ALL, scopes: SCOPES, outcome, refused })
+    page(&PeoplePage { users, tokens, roles: Role::ALL, scopes: SCOPES, outcome, refused, typed })
 }
 
 /// `POST /people`. A link or token is in the answer itself: it is not stored, and a reload does not make another one
@@ -105,12 +183,13 @@ pub(super) async fn post(
     match act(&mut writer, &may.caller, &origin, &asked).await {
         Ok(outcome) => {
             commit(writer).await?;
-            Ok(show(&app, outcome, None).await?.into_response())
+            Ok(show(&app, outcome, None, Asked::default()).await?.into_response())
         }
         Err(error) if error.is_input() => {
             drop(writer);
             let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
-            Ok((status, show(&app, Outcome::default(), Some(error.to_string())).await?).into_response())
+            let refused = Refused::of(&error, &asked.act);
+            Ok((status, show(&app, Outcome::default(), Some(refused), asked).await?).into_response())
         }
         Err(error) => Err(error.into()),
     }

@@ -2,28 +2,33 @@
 
 use super::error::{Page, PageError, page};
 use super::format::words;
-use crate::access::{Rate, sign_in};
+use crate::access::{Caller, Rate, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Id, Params};
 use crate::http::may::May;
+use crate::http::problem::Problem;
 use crate::plots::gait_tiles;
-use crate::store::presentations::{Presentation, Said};
+use crate::store::presentations::{self, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
-use crate::store::{Connection, StudyId, commit, gaits, studies};
+use crate::store::{Connection, StudyId, commit, consents, gaits, studies};
 use crate::studies::blind::{self, RaterAnswer};
 use askama::Template;
 use axum::extract::{Path, State};
-use axum::response::Redirect;
+use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
 use serde::Deserialize;
+
+/// So many of the newest studies are searched for a rater's newest answer.
+const SEARCHED: u32 = 200;
 
 #[derive(Template)]
 #[template(path = "rate.html")]
 struct RatePage {
     studies: Vec<(StudyId, String)>,
     nothing: bool,
+    /// What was just answered or, without that, the newest answer as long as it can be taken back.
     saved: Option<Saved>,
     /// Whoever asks came by a link that works once, and has no other way in.
     no_password: bool,
@@ -38,14 +43,46 @@ struct Saved {
     can_be_taken_back: bool,
 }
 
+impl Saved {
+    /// Whether it was taken back, or the program took it away.
+    fn is_withdrawn(&self) -> bool {
+        self.words == Said::Withdrawn.as_str()
+    }
+}
+
 #[derive(Template)]
 #[template(path = "rate_pair.html")]
 struct PairPage {
     token: String,
     number: u32,
-    answered: bool,
-    /// Both strides as pictures, for those without scripts.
-    pictures: Option<[String; 2]>,
+    /// The answer, if it was given.
+    saved: Option<Saved>,
+    /// Why what was sent now was not taken.
+    refused: Option<String>,
+    /// Both strides, unless they cannot be drawn.
+    strides: Option<[Stride; 2]>,
+}
+
+impl PairPage {
+    /// How long the stride of a side takes, s; nothing where it cannot be told.
+    fn seconds(&self, side: usize) -> &str {
+        self.strides.as_ref().and_then(|strides| strides.get(side)).map_or("", |stride| stride.seconds.as_str())
+    }
+}
+
+/// One of the two gaits.
+struct Stride {
+    /// How long the stride takes, s: to the hundredth, as more would be a fingerprint.
+    seconds: String,
+    /// The stride as pictures, for those without scripts.
+    picture: String,
+}
+
+impl Stride {
+    fn of(figures: &[StickFigure]) -> Option<Self> {
+        let seconds = figures.last()?.time_s - figures.first()?.time_s;
+        Some(Self { seconds: format!("{seconds:.2}"), picture: gait_tiles(figures) })
+    }
 }
 
 /// What was done before this page.
@@ -65,7 +102,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
             let shown = blind::own(&mut reader, &may.caller, &token).await?;
             read_back(&mut reader, shown).await?
         }
-        None => None,
+        None => newest(&mut reader, &may.caller).await?,
     };
     let active = studies::active(&mut reader).await?;
     let studies = active
@@ -79,6 +116,22 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         .collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
     page(&RatePage { studies, nothing: before.nothing, saved, no_password })
+}
+
+/// A rater's newest answer, if it can be taken back.
+async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, Error> {
+    let mut newest: Option<Presentation> = None;
+    for study in studies::page(db, None, SEARCHED).await? {
+        if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
+            continue;
+        }
+        let own = presentations::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);
+        newest = newest.into_iter().chain(own).max_by_key(|shown| shown.answered_at);
+    }
+    match newest {
+        Some(shown) => Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_taken_back)),
+        None => Ok(None),
+    }
 }
 
 async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Saved>, Error> {
@@ -108,24 +161,33 @@ pub(super) async fn next(
 
 /// `GET /rate/pair/{token}`.
 pub(super) async fn pair(may: May<Rate>, State(app): State<AppState>, Path(token): Path<String>) -> Page {
+    show(&app, &may.caller, &token, None).await
+}
+
+async fn show(app: &AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
-    let shown = blind::own(&mut reader, &may.caller, &token).await?;
+    let shown = blind::own(&mut reader, caller, token).await?;
+    let (token, number) = (shown.token.clone(), shown.number);
+    if shown.answer.is_some() {
+        let saved = read_back(&mut reader, shown).await?;
+        return page(&PairPage { token, number, saved, refused, strides: None });
+    }
     let mut pair = Vec::new();
     for trial in [shown.shown_first, shown.shown_second] {
         // What is missing here is said by the animation, without a word that could tell which gait it was.
         pair.extend(gaits::get(&mut reader, trial).await.ok());
     }
     drop(reader);
-    let pictures = tokio::task::spawn_blocking(move || {
-        let tiles = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
+    let strides = tokio::task::spawn_blocking(move || {
+        let stride = |gait: &Gait| stick_figures(gait).ok().and_then(|figures| Stride::of(&figures));
         match &pair[..] {
-            [first, second] => tiles(first).zip(tiles(second)).map(|(first, second)| [first, second]),
+            [first, second] => stride(first).zip(stride(second)).map(|(first, second)| [first, second]),
             _ => None,
         }
     })
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
-    page(&PairPage { token: shown.token, number: shown.number, answered: shown.answer.is_some(), pictures })
+    page(&PairPage { token, number, saved: None, refused, strides })
 }
 
 /// The form of a pair.
@@ -144,17 +206,20 @@ pub(super) async fn answer(
     State(app): State<AppState>,
     Path(token): Path<String>,
     Form(form): Form<Submitted>,
-) -> Result<Redirect, PageError> {
+) -> Result<Response, PageError> {
     let given = RaterAnswer { answer: form.answer, response_ms: form.response_ms.trim().parse().ok(), note: form.note };
-    let mut writer = app.write().await?;
-    // The same form sent twice, by a double click or after a lost answer, is one answer.
-    let before = blind::own(&mut writer, &may.caller, &token).await?.answer;
-    if before != Some(form.answer) {
-        blind::answer(&mut writer, &may.caller, &token, &given).await?;
-        commit(writer).await?;
-        app.director.changed();
-    }
-    Ok(Redirect::to(&format!("/rate?saved={token}")))
+    let answered = async {
+        let mut writer = app.write().await?;
+        // The same form sent twice, by a double click or after a lost answer, is one answer.
+        let before = blind::own(&mut writer, &may.caller, &token).await?.answer;
+        if before != Some(given.answer) {
+            blind::answer(&mut writer, &may.caller, &token, &given).await?;
+            commit(writer).await?;
+            app.director.changed();
+        }
+        Ok(())
+    };
+    told(&app, &may.caller, &token, answered.await).await
 }
 
 /// `POST /rate/pair/{token}/take-back`.
@@ -162,10 +227,25 @@ pub(super) async fn take_back(
     may: May<Rate>,
     State(app): State<AppState>,
     Path(token): Path<String>,
-) -> Result<Redirect, PageError> {
-    let mut writer = app.write().await?;
-    blind::take_back(&mut writer, &may.caller, &token).await?;
-    commit(writer).await?;
-    app.director.changed();
-    Ok(Redirect::to(&format!("/rate?saved={token}")))
+) -> Result<Response, PageError> {
+    let taken_back = async {
+        let mut writer = app.write().await?;
+        blind::take_back(&mut writer, &may.caller, &token).await?;
+        commit(writer).await?;
+        app.director.changed();
+        Ok(())
+    };
+    told(&app, &may.caller, &token, taken_back.await).await
+}
+
+/// What was done; what was refused because of what was done before, on the page of the pair.
+async fn told(app: &AppState, caller: &Caller, token: &str, done: Result<(), Error>) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/rate?saved={token}")).into_response()),
+        Err(error @ Error::Conflict(_)) => {
+            let shown = show(app, caller, token, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
 }

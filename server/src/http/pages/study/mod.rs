@@ -386,7 +386,9 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
         || "starting".to_owned(),
         |r| {
             let violation = format::number(r.constraint_violation);
-            format!("iteration {}, objective {:.4}, violation {violation}", r.iteration, r.objective)
+            // All of them, as the chart counts.
+            let iteration = records.len() - 1;
+            format!("iteration {iteration}, objective {:.4}, violation {violation}", r.objective)
         },
     );
     RunningRow {

@@ -1,0 +1,18 @@
+// @ts-check
+// What somebody is typing is never overwritten by what a page brings anew.
+
+const FIELDS = "input:not([type=hidden]), select, textarea";
+
+/** @type {(field: Element) => boolean} Whether a field has the focus or another value than it came with. */
+function isEdited(field) {
+  if (field === document.activeElement) return true;
+  if (field instanceof HTMLSelectElement) {
+    return field.selectedIndex !== Math.max([...field.options].findIndex((option) => option.defaultSelected), 0);
+  }
+  if (field instanceof HTMLInputElement && /^(checkbox|radio)$/.test(field.type)) return field.checked !== field.defaultChecked;
+  const { value, defaultValue } = /** @type {HTMLInputElement | HTMLTextAreaElement} */ (field);
+  return value !== defaultValue;
+}
+
+/** @type {(part: Element) => boolean} Whether something in it is being edited. */
+export const holdsEdits = (part) => [...part.querySelectorAll(FIELDS)].some(isEdited);

@@ -1,0 +1,12 @@
+// @ts-check
+// Who wants no motion sees strides as pictures, like those without scripts, and starts the motion when it is wanted.
+
+/** Whether things may move by themselves. */
+export const mayMove = () => !matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+/** @param {ParentNode} place Puts the pictures for those without scripts into a page that has scripts. */
+export function showStrips(place) {
+  const strips = place.querySelector("noscript[data-strips]");
+  const pictures = new DOMParser().parseFromString(strips?.textContent ?? "", "text/html").body;
+  strips?.replaceWith(...pictures.childNodes);
+}
