@@ -66,7 +66,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 61] = [
+const PAGES: [(&str, Option<Right>); 62] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -346,7 +346,7 @@ async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
     let right = "name=Ada&password=correct+horse";
     let waits = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, right).await;
     assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
-    let rows = audit::page(&mut service.store.read().await.unwrap(), None, 100).await.unwrap();
+    let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 100).await.unwrap();
     assert_eq!(rows.iter().filter(|row| row.action == "session.refuse").count(), 4);
     service.stop().await;
 }

@@ -209,7 +209,7 @@ async fn unblinding_needs_a_reason_is_an_act_and_marks_what_follows() {
     assert_eq!(told.status, StatusCode::OK);
     assert_eq!(told.json()[0]["shown_first"], json!(shown(&service, study).await[0].shown_first));
     assert!(!told.text.contains(pair["token"].as_str().unwrap()));
-    let rows = audit::page(&mut service.store.read().await.unwrap(), None, 1).await.unwrap();
+    let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
     assert_eq!((rows[0].action.as_str(), &rows[0].detail["reason"]), ("study.unblind", &json!("adverse event")));
     loop {
         service.wait_for(study, &[StudyState::Waiting]).await;

@@ -22,7 +22,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 async fn rows(service: &Service) -> usize {
-    audit::page(&mut service.store.read().await.unwrap(), None, 10_000).await.unwrap().len()
+    audit::page(&mut service.store.read().await.unwrap(), "", None, 10_000).await.unwrap().len()
 }
 
 /// Everything that the requests below need.

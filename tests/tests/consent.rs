@@ -50,11 +50,11 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let remark = json!({"first": converged[0].id, "second": converged[1].id, "answer": "cannot_tell"});
     let remark = service.post(&format!("/api/v1/studies/{finished}/remarks"), &remark).await.json();
     let remark = remark["id"].as_str().unwrap().to_owned();
-    let before = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap().len();
+    let before = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap().len();
     let withdraw = json!({"reason": "moved away"});
     let withdrawn = service.post(&format!("{of_subject}/withdraw"), &withdraw).await;
     assert_eq!(withdrawn.status, StatusCode::OK, "{}", withdrawn.text);
-    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
     assert_eq!((trail.len(), trail[0].action.as_str()), (before + 1, "subject.withdraw"));
     assert_eq!(trail[0].detail["stopped"].as_array().unwrap().len(), 4);
     assert_eq!(service.post(&format!("{of_subject}/withdraw"), &withdraw).await.status, StatusCode::CONFLICT);
@@ -201,7 +201,7 @@ async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
     assert!(shown.contains("This subject withdrew") && shown.contains("moved away"), "{shown}");
     assert!(!shown.contains("/withdraw\""), "it cannot be done twice");
     assert_eq!(send("withdraw", "reason=again").await.status, StatusCode::CONFLICT);
-    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 10).await.unwrap();
+    let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 10).await.unwrap();
     let acts: Vec<_> = trail.iter().map(|row| row.action.as_str()).take(2).collect();
     assert_eq!(acts, ["subject.withdraw", "subject.consent"]);
     service.stop().await;

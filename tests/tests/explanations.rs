@@ -54,7 +54,7 @@ async fn explained(service: &Service, trial: TrialId) -> Value {
 
 /// The trials that the service explained, in order.
 async fn explained_in_order(service: &Service) -> Vec<String> {
-    let mut trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
     trail.retain(|row| row.action == "trial.explain" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }
@@ -121,7 +121,7 @@ async fn an_explanation_is_made_once_for_whoever_asks() {
     assert_eq!((again.status, again.json()), (StatusCode::OK, found));
     assert_eq!(keyed().await.status, StatusCode::ACCEPTED, "the same request has the same answer");
     assert_eq!(counts.begun.load(Ordering::SeqCst), 1);
-    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
     assert_eq!(trail.iter().filter(|row| row.action == "trial.ask_explanation").count(), 1);
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();

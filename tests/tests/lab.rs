@@ -86,7 +86,7 @@ async fn a_session_is_walked_in_order_closed_and_told_by_an_act() {
     assert_eq!(service.post(&format!("{api}/close"), &json!({"note": "done"})).await.json()["state"], "closed");
     assert_eq!(service.post(&format!("{api}/close"), &json!({})).await.status, StatusCode::CONFLICT);
     assert!(service.fetch(&lab).await.json()["walk"].is_null());
-    let trail = audit::page(&mut service.store.read().await.unwrap(), None, 6).await.unwrap();
+    let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 6).await.unwrap();
     let acts: Vec<_> = trail.iter().map(|row| row.action.trim_start_matches("lab_session.")).collect();
     assert_eq!(acts, ["close", "walk", "unblind", "walk", "walk", "plan"]);
     service.stop().await;

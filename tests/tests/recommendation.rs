@@ -142,7 +142,7 @@ async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
 
 /// The trials whose gaits the service examined by itself, in order.
 async fn examined_by_service(service: &Service) -> Vec<String> {
-    let mut trail = audit::page(&mut service.store.read().await.unwrap(), None, 1000).await.unwrap();
+    let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
     trail.retain(|row| row.action == "trial.certify" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }

@@ -30,7 +30,7 @@ async fn post_with_key(service: &Service, path: &str, key: &str, body: &Value) -
 }
 
 async fn audit_rows(service: &Service) -> usize {
-    audit::page(&mut service.store.read().await.unwrap(), None, 10_000).await.unwrap().len()
+    audit::page(&mut service.store.read().await.unwrap(), "", None, 10_000).await.unwrap().len()
 }
 
 /// Another program that opens the file and does what it likes.

@@ -71,7 +71,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     // The rater's answer stands as it was given; that the other gait is better was never said.
     let mut reader = service.store.read().await.unwrap();
     assert_eq!(presentations::of_study(&mut reader, study).await.unwrap()[0].answer, Some(Said::UnsafeSecond));
-    let trail = audit::page(&mut reader, None, 100).await.unwrap();
+    let trail = audit::page(&mut reader, "", None, 100).await.unwrap();
     drop(reader);
     let reviews: Vec<_> = trail.iter().filter(|row| row.action == "gait.review").collect();
     assert_eq!(reviews.len(), 2);

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::gait_table::gait_csv;
 use crate::plots::Figure;
 use clap::{Args, ValueEnum};
+use gait_optimizer::SolveStatus;
 use gait_optimizer::export::{ControllerFile, motion_file};
 use gait_optimizer::walking::stick_figure::stick_figures;
 use std::path::PathBuf;
