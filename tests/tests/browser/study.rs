@@ -56,24 +56,24 @@ async fn browser_follows_a_running_solve() {
 #[tokio::test(flavor = "multi_thread")]
 async fn browser_leaves_alone_what_is_typed_while_the_study_goes_on() {
     let Some(browser) = Chromium::launch().await else { return };
-    let site = Site::start(Analytic::slow(Duration::from_millis(40))).await;
-    let study = site.service.study(|new| new.trial_budget = 16).await;
+    let site = Site::start(Analytic::slow(Duration::from_millis(150))).await;
+    let study = site.service.study(|new| new.trial_budget = 60).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.wait_for("#more").await;
     page.run("document.querySelector('#more').closest('details').open = true").await;
-    page.fill("#more", "27").await;
+    page.fill("#more", "67").await;
     page.run("window.field = document.querySelector('#more')").await;
     let done = "document.querySelector('[data-part=state] progress').value";
     let typed = "`${document.querySelector('#more').value} ${document.querySelector('#more') === window.field}`";
     let begun: u32 = page.value(done).await.parse().unwrap();
     page.wait_until(&format!("{done} > {begun}")).await;
-    assert_eq!(page.value(typed).await, "27 true");
+    assert_eq!(page.value(typed).await, "67 true");
     assert_eq!(page.value("document.activeElement === window.field").await, "true");
     // Also without the focus, as long as it was changed.
     page.run("window.field.blur()").await;
     let begun: u32 = page.value(done).await.parse().unwrap();
     page.wait_until(&format!("{done} > {begun}")).await;
-    assert_eq!(page.value(typed).await, "27 true");
+    assert_eq!(page.value(typed).await, "67 true");
     // Everything around it was brought anew, once.
     assert_eq!(page.count("[data-part=state] details").await, 2);
     assert_eq!(page.count("[data-part=state] progress").await, 1);
