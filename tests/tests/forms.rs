@@ -284,7 +284,7 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
     for holds in [format!("href=\"/trials/{a}\""), format!("href=\"/trials/{b}\""), "gait A".into(), "gait B".into()] {
         assert!(page.text.contains(&holds), "{holds}");
     }
-    assert_eq!(page.text.matches("<svg").count(), 5, "the five human joint angles");
+    assert_eq!(page.text.matches("<svg class=\"chart\"").count(), 5, "the five human joint angles");
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     let nobody = format!("a={a}&b={b}&answer=b&source=clinician&author=+&note=both+limp&key={UNKNOWN}");
     let refused = service.post_text(&path, FORM, &nobody).await;
@@ -386,7 +386,7 @@ async fn a_gait_page_explains_its_lines() {
     }
     // Phases of an eighth of the stride each have no room for their names: shades and lines say where they begin.
     assert!(page.contains("class=\"span\"") && page.contains("class=\"mark\""));
-    assert!(page.contains(">cost</text>"), "the phases of the solve are marked");
+    assert!(page.contains("</i>1 cost</span>"), "the phases of the solve are marked");
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("reference gait: ") && page.contains("paper-1</a> (1.727 m"));
     service.stop().await;

@@ -98,6 +98,7 @@ if (box) {
       requestAnimationFrame(step);
     };
     last = begun;
+    show();
     requestAnimationFrame(step);
     const label = () => (play.textContent = playing ? "Pause" : "Play");
     label();

@@ -25,7 +25,12 @@ async fn answers(site: &Site, study: StudyId) -> Vec<FeedbackRow> {
 async fn at_the_pair(browser: &Chromium, site: &Site) -> Tab {
     let page = browser.open(&site.at("/rate")).await;
     page.click("main form button").await;
-    page.wait_until("document.querySelector('[data-answer] [type=submit]')?.disabled === false").await;
+    // Its scripts have run, and both motions are there.
+    page.wait_until(
+        "document.querySelector('[data-controls]')?.hidden === false && \
+         document.querySelector('[data-answer] [type=submit]')?.disabled === false",
+    )
+    .await;
     page
 }
 
