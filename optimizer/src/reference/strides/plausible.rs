@@ -16,8 +16,8 @@ const SMALLEST_KNEE_PEAK_DEG: f64 = 20.0;
 const LARGEST_LEAST_FLEXION_DEG: f64 = 40.0;
 /// An ankle is no more bent over a stride, either way, degrees.
 const LARGEST_ANKLE_MEAN_DEG: f64 = 30.0;
-/// An ankle that walks moves at least over this, degrees: one in radians that is read as degrees moves over half of it.
-const SMALLEST_ANKLE_RANGE_DEG: f64 = 1.0;
+/// An ankle that walks moves at least over this, degrees: one in radians that is read as degrees does over about half.
+const SMALLEST_ANKLE_RANGE_DEG: f64 = 2.0;
 /// Curves that are held against the built-in reference, in words. The trunk's has no shape that all walkers share.
 const COMPARED: [(usize, &str); 4] = [(1, "left hip"), (KNEE, "left knee"), (ANKLE, "left ankle"), (4, "right hip")];
 /// Curves of walkers correlate more with the built-in ones: those of 24 young adults by .88 and more, ankles of single
