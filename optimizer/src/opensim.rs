@@ -47,26 +47,13 @@ impl StorageFile {
             .iter()
             .position(|line| line.trim().eq_ignore_ascii_case("endheader"))
             .ok_or_else(|| malformed(what, lines.len().max(1), None, "there is no line \"endheader\"".to_owned()))?;
-        let setting = |name: &str| {
-            lines[..end].iter().enumerate().find_map(|(index, line)| {
-                // `nRows=220`, and `datarows 220` as SIMM wrote it.
-                let (key, value) = line.split_once('=').or_else(|| line.trim().split_once(char::is_whitespace))?;
-                key.trim().eq_ignore_ascii_case(name).then(|| (index + 1, value.trim().to_owned()))
-            })
-        };
-        let unit = match setting("inDegrees") {
-            Some((_, word)) if word.eq_ignore_ascii_case("yes") => Some(AngleUnit::Degrees),
-            Some((_, word)) if word.eq_ignore_ascii_case("no") => Some(AngleUnit::Radians),
-            Some((line, word)) => {
-                return Err(malformed(what, line, None, format!("inDegrees={word}: expected yes or no")));
-            }
-            None => None,
-        };
+        let header = &lines[..end];
+        let unit = unit_said(what, header)?;
         let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, Clock::Column("time"))?
             .with_names(coordinate_name);
         let (rows, columns) = (table.len(), table.width());
         for (name, found) in [("nRows", rows), ("nColumns", columns), ("datarows", rows), ("datacolumns", columns)] {
-            if let Some((line, value)) = setting(name)
+            if let Some((line, value)) = settings(header, name).next()
                 && value.parse::<usize>() != Ok(found)
             {
                 let reason = format!("{name}={value}, but there are {found}: the file is not whole");
@@ -88,6 +75,36 @@ impl StorageFile {
             (said, told) => said.or(told).ok_or_else(silent),
         }
     }
+}
+
+/// Every line of a header that sets `name`, with its number and the value: `nRows=220`, and `datarows 220` as SIMM
+/// wrote it.
+fn settings<'a>(header: &'a [&'a str], name: &'a str) -> impl Iterator<Item = (usize, &'a str)> {
+    header.iter().enumerate().filter_map(move |(index, line)| {
+        let (key, value) = line.split_once('=').or_else(|| line.trim().split_once(char::is_whitespace))?;
+        key.trim().eq_ignore_ascii_case(name).then(|| (index + 1, value.trim()))
+    })
+}
+
+/// What a header says of the unit of angles; said twice, it must be the same.
+fn unit_said(what: &str, header: &[&str]) -> Result<Option<AngleUnit>, ModelError> {
+    let mut said: Option<(usize, AngleUnit)> = None;
+    for (line, word) in settings(header, "inDegrees") {
+        let unit = match word {
+            word if word.eq_ignore_ascii_case("yes") => AngleUnit::Degrees,
+            word if word.eq_ignore_ascii_case("no") => AngleUnit::Radians,
+            _ => return Err(malformed(what, line, None, format!("inDegrees={word}: expected yes or no"))),
+        };
+        match said {
+            Some((before, other)) if other != unit => {
+                let (unit, other) = (unit.in_words(), other.in_words());
+                let reason = format!("inDegrees says that angles are in {unit}, but in {other} in line {before}");
+                return Err(malformed(what, line, None, reason));
+            }
+            _ => said = Some((line, unit)),
+        }
+    }
+    Ok(said.map(|(_, unit)| unit))
 }
 
 /// OpenSim 4 writes states by their paths: `/jointset/hip_r/hip_flexion_r/value` is the coordinate `hip_flexion_r`.

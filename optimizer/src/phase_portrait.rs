@@ -5,7 +5,7 @@
 
 use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
-use crate::reference::LARGEST_ANGLE_RAD;
+use crate::reference::{LARGEST_ANGLE_RAD, Recording};
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table, lines_of};
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,10 @@ const ORDER: usize = 4;
 const LONGEST_GAP_S: f64 = 0.05;
 /// Shortest recording, s: one stride and its way back; the paper shows ten seconds.
 const SHORTEST_S: f64 = 2.0;
+/// What differences of times may be off by rounding, s.
+const ROUNDING_S: f64 = 1e-9;
+/// A joint that moves over no more than this does not walk, rad.
+const STILL_RAD: f64 = 0.05;
 
 /// The joints of the walker, as columns of our own table. Forward lean, flexion and dorsiflexion are positive, hips are
 /// measured from the trunk.
@@ -101,7 +105,7 @@ impl JointRecording {
             }
         }
         let times = table.times();
-        if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S) {
+        if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S + ROUNDING_S) {
             let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
             return Err(table.malformed_row(row + 1, Some(1), reason));
         }
@@ -110,18 +114,49 @@ impl JointRecording {
         Ok(Self { rate_hz, joints })
     }
 
-    /// Checks that enough was recorded for a limit cycle.
+    /// Checks that a limit cycle was recorded: long enough, and joints that walk.
     ///
     /// # Errors
     /// [`ModelError::Malformed`], of the file named `what`.
-    pub fn check_duration(&self, what: &str) -> Result<(), ModelError> {
+    pub fn check_walking(&self, what: &str) -> Result<(), ModelError> {
+        let refused = self.too_short().or_else(|| self.still()).or_else(|| {
+            self.joints.iter().find_map(|(joint, angles)| {
+                let knee = if joint.starts_with("knee") { Recording::no_knee(angles) } else { None };
+                knee.or_else(|| self.jump(angles)).map(|reason| format!("{joint} {reason}"))
+            })
+        });
+        refused.map_or(Ok(()), |reason| Err(ModelError::Malformed { what: what.to_owned(), reason }))
+    }
+
+    fn too_short(&self) -> Option<String> {
         let samples = self.joints.first().map_or(0, |(_, angles)| angles.len());
         let lasts = samples.saturating_sub(1) as f64 / self.rate_hz;
-        if lasts < SHORTEST_S {
-            let reason = format!("{lasts:.3} s are recorded, a limit cycle needs at least {SHORTEST_S} s");
-            return Err(ModelError::Malformed { what: what.to_owned(), reason });
-        }
-        Ok(())
+        (lasts < SHORTEST_S - ROUNDING_S)
+            .then(|| format!("{lasts:.3} s are recorded, a limit cycle needs at least {SHORTEST_S} s"))
+    }
+
+    fn still(&self) -> Option<String> {
+        let range = |angles: &[f64]| {
+            let (lowest, highest) = Recording::extremes(angles);
+            highest - lowest
+        };
+        let most = self.joints.iter().map(|(_, angles)| range(angles)).fold(0.0, f64::max);
+        (most <= STILL_RAD).then(|| {
+            format!(
+                "no joint moves over more than {STILL_RAD} rad, the farthest over {most:.3} rad; is the unit right?"
+            )
+        })
+    }
+
+    /// Why no joint turns like this, the rows being evenly spaced.
+    fn jump(&self, angles: &[f64]) -> Option<String> {
+        let times: Vec<f64> = (0..angles.len()).map(|row| row as f64 / self.rate_hz).collect();
+        let (row, jump_rad) = Recording::jump(&times, angles)?;
+        Some(format!(
+            "jumps by {jump_rad:.2} rad in {:.4} s, {:.3} s after the first row",
+            1.0 / self.rate_hz,
+            times[row]
+        ))
     }
 
     /// The phase portrait of every joint; `cutoff_hz` is the edge of the low-pass.

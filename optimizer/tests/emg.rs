@@ -69,6 +69,54 @@ fn channels_that_are_no_muscles_are_refused() {
     assert!(artefact.starts_with("channel TA: 1000000 at 0.7000 s is more than 100 times as far"), "{artefact}");
 }
 
+/// Normal noise of standard deviation 1, always the same: sums of twelve numbers of a linear congruential generator.
+fn noise(samples: usize) -> Vec<f64> {
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1_u64 << 24) as f64
+    };
+    (0..samples).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+/// Bursts of noise of 0 to 1 twice a second, 4 s at 1000 Hz.
+fn bursts() -> Vec<f64> {
+    let burst = |k: usize| (TAU * 2.0 * k as f64 / 1000.0).sin().max(0.0) + 0.02;
+    noise(4000).into_iter().enumerate().map(|(k, sample)| burst(k) * sample).collect()
+}
+
+#[test]
+fn rectified_signals_and_envelopes_are_refused_and_raw_ones_are_not() {
+    let of =
+        |samples: Vec<f64>| EmgRecording { start_s: 0.0, rate_hz: 1000.0, channels: vec![("TA".to_owned(), samples)] };
+    let checked = |samples: Vec<f64>| of(samples).check_channels().map_err(|error| error.to_string());
+    let scaled = |factor: f64, offset: f64| bursts().into_iter().map(|sample| factor * sample + offset).collect();
+    assert_eq!(checked(bursts()), Ok(()));
+    assert_eq!(checked(scaled(1e-6, 2e-3)), Ok(()), "a microvolt signal with an offset of amplifiers");
+    let lowest = bursts().into_iter().fold(0.0, f64::min);
+    assert_eq!(checked(scaled(1.0, -lowest)), Ok(()), "an offset that lifts all of it above zero, and no more");
+    let moved = bursts().into_iter().enumerate().map(|(k, s)| s + 2.0 * (TAU * 1.8 * k as f64 / 1000.0).sin());
+    assert_eq!(checked(moved.collect()), Ok(()), "movement five times as strong as the muscle");
+    let rectified: Vec<f64> = bursts().into_iter().map(f64::abs).collect();
+    let reason = checked(rectified.clone()).unwrap_err();
+    assert!(reason.starts_with("channel TA: it is never below zero and often at it ("), "{reason}");
+    println!("{reason}");
+    // Of this program's own chain, a running mean over 100 ms, and an envelope that keeps its mean of zero.
+    let own = of(bursts()).envelopes(&EmgSettings::default()).unwrap().remove(0).values;
+    let running: Vec<f64> = rectified.windows(100).map(|near| near.iter().sum::<f64>() / 100.0).collect();
+    let about_zero = own.iter().map(|value| value - 0.3).collect();
+    for (name, envelope) in [("own", own), ("running mean", running), ("about zero", about_zero)] {
+        let reason = checked(envelope).unwrap_err();
+        println!("{name}: {reason}");
+        assert!(
+            reason.contains("% of the signal (RMS) is within 20 to 450 Hz, less than 10 %: an envelope"),
+            "{reason}"
+        );
+    }
+    // Too short to be filtered: that is told where it is.
+    assert_eq!(checked(bursts()[..25].to_vec()), Ok(()));
+}
+
 fn ramp() -> Envelope {
     let values = (0..=200).map(|k| f64::from(k) / 100.0).collect();
     Envelope { channel: "TA".to_owned(), start_s: 0.0, rate_hz: 100.0, values }
@@ -106,6 +154,12 @@ fn emg_rmse_is_what_the_hand_computes() {
     assert!((emg_rmse(&gait, &normal).unwrap().total - by_hand).abs() < 1e-12);
     let parts = emg_rmse(&gait, &normal).unwrap().parts;
     assert!((parts[0] - (51.0 / 101.0_f64).sqrt() * 0.2).abs() < 1e-12 && (parts[1] - 0.3).abs() < 1e-12);
+    // Ten times the peak of normal walking may be, more is doubted.
+    gait[0].mean[7] = 2.5;
+    assert_eq!(emg_rmse(&gait, &normal).unwrap().remarks, [""; 0]);
+    gait[0].mean[7] = 2.75;
+    let doubted = ["BF peaks at 11.0 times the peak of normal walking: are both recorded in one unit?"];
+    assert_eq!(emg_rmse(&gait, &normal).unwrap().remarks, doubted);
     assert!(matches!(emg_rmse(&gait[..1], &normal), Err(ModelError::Unknown { value, .. }) if value == "TA"));
 
     let walked = flat("TA", 0.6).normalised_by(&normal[0]).unwrap();

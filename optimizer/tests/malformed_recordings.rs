@@ -78,6 +78,11 @@ fn motion_files_of_opensim() {
         ("no unit", change("inDegrees=yes\n", ""), "walk.mot, line 5: the header has no inDegrees=yes or no"),
         ("odd unit", change("inDegrees=yes", "inDegrees=grad"), "walk.mot, line 5: inDegrees=grad: expected yes or no"),
         (
+            "two units",
+            change("inDegrees=yes\n", "inDegrees=yes\ninDegrees = no\n"),
+            "walk.mot, line 6: inDegrees says that angles are in radians, but in degrees in line 5",
+        ),
+        (
             "wrong unit",
             change("inDegrees=yes", "inDegrees=no"),
             "walk.mot, line 8: torso_rad is 7.0 rad, beyond 3.14 rad; is the unit right?",
@@ -258,6 +263,8 @@ fn electromyograms() {
     let recording = EmgRecording::from_csv("emg.csv", &whole, None).unwrap();
     let refused = [
         recording.select("emg.csv", [("RF_L", "EMG 1")]).unwrap_err(),
+        recording.select("emg.csv", [("RF_L", "BF_L"), ("TA_L", "TA_L"), ("GAS_L", "BF_L")]).unwrap_err(),
+        EmgRecording::from_csv("emg.csv", &whole, Some(1000.0)).unwrap_err(),
         recording.strikes_of_column("emg.csv", "toe", 0.5).unwrap_err(),
         recording.strikes_of_column("emg.csv", "heel", 2.0).unwrap_err(),
         recording.check_strikes("emg.csv", &[0.1, 9.0]).unwrap_err(),
@@ -266,6 +273,8 @@ fn electromyograms() {
     ];
     let expected = [
         "emg.csv: column \"EMG 1\" is missing; there are TA_L, BF_L, heel",
+        "emg.csv: column \"BF_L\" is wanted for RF_L and for GAS_L: each muscle has its own",
+        "emg.csv, line 1: the column \"time_s\" has the time: rate_hz is for files without one",
         "emg.csv: column \"toe\" is missing; there are TA_L, BF_L, heel",
         "emg.csv: column \"heel\" rises 0 times above 2, two make a stride",
         "heel strike (s) = 9 is outside the allowed range [0, 0.999]",

@@ -12,9 +12,13 @@ fn csv() -> String {
     let mut text = "# site A\ntime_s,knee_R_rad\n".to_owned();
     for k in 0..1000 {
         let time = f64::from(k) / 100.0;
-        writeln!(text, "{time},{}", 0.5 * (TAU * 0.9 * time).sin()).unwrap();
+        writeln!(text, "{time},{}", knee_at(time)).unwrap();
     }
     text
+}
+
+fn knee_at(time: f64) -> f64 {
+    0.5 + 0.5 * (TAU * 0.9 * time).sin()
 }
 
 #[test]
@@ -25,7 +29,7 @@ fn the_velocity_is_that_of_the_motion() {
     // Away from the ends, where the filter knows nothing beyond them: samples 1, 2, ... of the recording.
     for k in 100..900 {
         let time = (k + 1) as f64 / 100.0;
-        let (angle, velocity) = (0.5 * (TAU * 0.9 * time).sin(), 0.5 * TAU * 0.9 * (TAU * 0.9 * time).cos());
+        let (angle, velocity) = (knee_at(time), 0.5 * TAU * 0.9 * (TAU * 0.9 * time).cos());
         assert!((knee.angle_rad[k] - angle).abs() < 1e-4, "{k}");
         assert!((knee.velocity_rad_s[k] - velocity).abs() < 2e-3, "{k}: {} {velocity}", knee.velocity_rad_s[k]);
     }
@@ -42,7 +46,7 @@ fn rows_that_are_not_evenly_spaced_are_put_on_an_even_grid() {
     let knee = &recording.joints[0].1;
     let time = 700.0 / recording.rate_hz;
     // Linear between samples 10 ms apart: off by at most h^2/8 of the second derivative.
-    assert!((knee[700] - 0.5 * (TAU * 0.9 * time).sin()).abs() < 0.5 * (TAU * 0.9 * 0.01).powi(2) / 8.0 + 1e-12);
+    assert!((knee[700] - knee_at(time)).abs() < 0.5 * (TAU * 0.9 * 0.01).powi(2) / 8.0 + 1e-12);
     assert!((knee[1001] - 0.5).abs() < 1e-12);
 }
 
@@ -78,10 +82,55 @@ fn what_is_not_whole_is_refused_with_its_place() {
         "0.49 s, then 0.6 s"
     );
     let short: Vec<String> = csv().lines().take(62).map(str::to_owned).collect();
-    let short = JointRecording::from_csv("walk.csv", &short.join("\n")).unwrap().check_duration("walk.csv");
+    let short = JointRecording::from_csv("walk.csv", &short.join("\n")).unwrap().check_walking("walk.csv");
     let reason = "walk.csv: 0.590 s are recorded, a limit cycle needs at least 2 s";
     assert_eq!(short.unwrap_err().to_string(), reason);
     let recording = JointRecording::from_csv("walk.csv", &csv()).unwrap();
-    assert_eq!(recording.check_duration("walk.csv"), Ok(()));
+    assert_eq!(recording.check_walking("walk.csv"), Ok(()));
     assert!(recording.portraits(60.0).unwrap_err().to_string().starts_with("cutoff_hz = 60 is outside"));
+}
+
+/// A table of joints over time, rows so many seconds apart.
+fn table(names: &str, rows: usize, step_s: f64, at: impl Fn(f64) -> Vec<f64>) -> String {
+    let mut text = format!("time_s,{names}\n");
+    for k in 0..rows {
+        let time = step_s * k as f64;
+        let cells: Vec<String> = at(time).iter().map(ToString::to_string).collect();
+        writeln!(text, "{time},{}", cells.join(",")).unwrap();
+    }
+    text
+}
+
+#[test]
+fn what_does_not_walk_has_no_limit_cycle() {
+    let swing = |time: f64| (TAU * 0.9 * time).sin();
+    let check = |text: &str| JointRecording::from_csv("walk.csv", text).unwrap().check_walking("walk.csv");
+    let refused = |text: &str| check(text).unwrap_err().to_string();
+    let still = refused(&table("torso_rad,ankle_R_rad", 300, 0.01, |time| vec![0.1, 0.024 * swing(time)]));
+    let expected = "walk.csv: no joint moves over more than 0.05 rad, the farthest over 0.048 rad; is the unit right?";
+    assert_eq!(still, expected);
+    let backward = refused(&table("hip_R_rad,knee_R_rad", 300, 0.01, |time| vec![swing(time), -knee_at(time)]));
+    assert_eq!(
+        backward,
+        "walk.csv: knee_R is from -1.00 to -0.00 rad with flexion positive: the file's knee angle has the other sign"
+    );
+    let stiff = refused(&table("hip_R_rad,knee_L_rad", 300, 0.01, |time| vec![swing(time), 0.04 * knee_at(time)]));
+    assert_eq!(stiff, "walk.csv: knee_L moves over 0.040 rad only, less than 0.1 rad; is the unit right?");
+    let jump = |time: f64| if time > 1.5005 { 0.9 } else { 0.0 };
+    let jumps = refused(&table("hip_R_rad,ankle_R_rad", 300, 0.01, |time| vec![swing(time), jump(time)]));
+    assert_eq!(jumps, "walk.csv: ankle_R jumps by 0.90 rad in 0.0100 s, 1.510 s after the first row");
+    // A trunk or an ankle may hardly move where other joints walk.
+    assert_eq!(check(&table("torso_rad,hip_R_rad", 300, 0.01, |time| vec![0.1, swing(time)])), Ok(()));
+}
+
+#[test]
+fn twenty_rows_per_second_for_two_seconds_are_enough() {
+    let text = table("knee_R_rad", 41, 0.05, |time| vec![knee_at(time)]);
+    let recording = JointRecording::from_csv("walk.csv", &text).unwrap();
+    assert_eq!(recording.check_walking("walk.csv"), Ok(()));
+    assert!(recording.portraits(6.0).is_ok());
+    let later = table("knee_R_rad", 400, 0.05, |time| vec![knee_at(time)]);
+    assert!(JointRecording::from_csv("walk.csv", &later).is_ok());
+    let slower = JointRecording::from_csv("walk.csv", &table("knee_R_rad", 41, 0.0501, |time| vec![knee_at(time)]));
+    assert!(slower.unwrap_err().to_string().contains("0.050 s without a row, at most 0.05 s"));
 }

@@ -366,3 +366,204 @@ fn recordings_without_a_stride_are_refused_with_the_reason() {
     let error = recording.reference("x", &HeelStrikes::Given(vec![0.0, 1.1]), short).unwrap_err();
     assert!(error.to_string().contains("height_m = 0.5"));
 }
+
+/// Five strides of 1.1 s of the built-in reference as a recording of our own, its seven angles changed by `change`, and
+/// `late` of a stride after the heel strikes at 0 s, 1.1 s, ...
+fn walk(late: f64, change: impl Fn([f64; 7]) -> [f64; 7]) -> Recording {
+    let builtin = ReferenceGait::builtin().unwrap();
+    of_fractions(|fraction| change(builtin.seven_angles(fraction + late)))
+}
+
+fn of_fractions(angles_at: impl Fn(f64) -> [f64; 7]) -> Recording {
+    let mut text = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
+    for k in 0..=550 {
+        let time_s = f64::from(k) / 100.0;
+        let angles = angles_at(time_s / 1.1).map(|angle| format!("{angle:.6}"));
+        writeln!(text, "{time_s},{}", angles[..6].join(",")).unwrap();
+    }
+    Recording::from_csv("walk.csv", &text).unwrap()
+}
+
+/// What is said of a recording that is cut at 0 s, 1.1 s, ...: the refusal, else the remark, else nothing.
+fn said_of(recording: &Recording) -> String {
+    let given = HeelStrikes::Given((0..5).map(|k| 1.1 * f64::from(k)).collect());
+    match recording.reference("walk", &given, Walker::default()) {
+        Ok(reference) => remark(&reference),
+        Err(refused) => format!("refused: {refused}"),
+    }
+}
+
+fn remark(reference: &ReferenceGait) -> String {
+    let said = reference.provenance.lines().find(|line| line.starts_with("unlike the built-in reference"));
+    said.unwrap_or_default().to_owned()
+}
+
+#[test]
+fn what_no_walker_does_is_refused() {
+    let unaltered = walk(0.0, |angles| angles);
+    assert_eq!(said_of(&unaltered), "", "the walk as it is");
+    // The right heel is farthest ahead a little before it strikes.
+    let found = unaltered.reference("walk", &HeelStrikes::Kinematics, Walker::default()).unwrap();
+    assert_eq!(remark(&found), "", "{}", found.provenance);
+    let cases: [(fn([f64; 7]) -> [f64; 7], &str); 6] = [
+        (
+            |[torso, rest @ ..]| with_trunk(torso + 0.8, rest),
+            "torso_rad is 52° on average over the stride, beyond 45° either way: are sign and upright right?",
+        ),
+        (
+            |[torso, rest @ ..]| with_trunk(torso - 1.0, rest),
+            "torso_rad is -51° on average over the stride, beyond 45° either way: are sign and upright right?",
+        ),
+        (
+            |angles| with_knee(angles, 0.25 * angles[2]),
+            "knee_L_rad never bends beyond 20° in the stride, at most to 16.5°: are sign and unit right?",
+        ),
+        (
+            |angles| with_knee(angles, angles[2] + 0.8),
+            "knee_L_rad is never less bent than 57°, a knee that walks is below 40° once in a stride",
+        ),
+        (
+            |angles| with_ankle(angles, angles[3] + std::f64::consts::FRAC_PI_2),
+            "ankle_L_rad is 92° on average over the stride, beyond 30° either way: is it 0° where foot and shank are at right \
+             angles?",
+        ),
+        (
+            |angles| with_ankle(angles, angles[3].to_radians()),
+            "ankle_L_rad moves over 0.54° only in the stride, less than 2°; is the unit right?",
+        ),
+    ];
+    for (change, expected) in cases {
+        let said = said_of(&walk(0.0, change));
+        assert!(said == format!("refused: walk.csv: {expected}"), "{expected}: {said}");
+    }
+}
+
+fn with_trunk(torso: f64, rest: [f64; 6]) -> [f64; 7] {
+    let [hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r] = rest;
+    [torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]
+}
+
+fn with_knee(angles: [f64; 7], knee_l: f64) -> [f64; 7] {
+    let [torso, hip_l, _, rest @ ..] = angles;
+    let [ankle_l, hip_r, knee_r, ankle_r] = rest;
+    [torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]
+}
+
+fn with_ankle(angles: [f64; 7], ankle_l: f64) -> [f64; 7] {
+    let [torso, hip_l, knee_l, _, rest @ ..] = angles;
+    let [hip_r, knee_r, ankle_r] = rest;
+    [torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]
+}
+
+#[test]
+fn what_is_unlike_the_built_in_reference_is_said() {
+    let swapped = |pairs: &'static [(usize, usize)]| {
+        move |mut angles: [f64; 7]| {
+            for &(left, right) in pairs {
+                angles.swap(left, right);
+            }
+            angles
+        }
+    };
+    let builtin = ReferenceGait::builtin().unwrap();
+    // The lumbar joint's sign: the trunk leans as far to the other side of a pelvis that leans by 0.2 rad.
+    let lumbar = |[torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]: [f64; 7]| {
+        let twice = 2.0 * (torso - 0.2);
+        [torso - twice, hip_l - twice, knee_l, ankle_l, hip_r - twice, knee_r, ankle_r]
+    };
+    let cases = [
+        ("ankle sign", said_of(&walk(0.0, |a| with_ankle(a, -a[3]))), "left ankle (correlation -1.00)"),
+        (
+            "knees swapped",
+            said_of(&walk(0.0, swapped(&[(2, 5)]))),
+            "the left knee bends to 66° in the second half of the stride from right heel strike and to 28° in the first",
+        ),
+        ("ankles swapped", said_of(&walk(0.0, swapped(&[(3, 6)]))), "left ankle (correlation 0.00)"),
+        (
+            "legs swapped",
+            said_of(&walk(0.0, swapped(&[(1, 4), (2, 5), (3, 6)]))),
+            "at right heel strike the right thigh is 44° behind the left one",
+        ),
+        (
+            "strikes of the left foot",
+            said_of(&walk(0.5, |a| a)),
+            "at right heel strike the right thigh is 44° behind the left one",
+        ),
+        (
+            "strikes 0.3 s late",
+            said_of(&walk(0.3 / 1.1, |a| a)),
+            "at right heel strike the right thigh is 8° behind the left one",
+        ),
+        (
+            "strikes 0.15 s late",
+            said_of(&walk(0.15 / 1.1, |a| a)),
+            "left knee (correlation 0.24), left ankle (correlation 0.09)",
+        ),
+        (
+            "reversed in time",
+            said_of(&of_fractions(|fraction| builtin.seven_angles(-fraction))),
+            "the left knee bends to 66° in the second half of the stride from right heel strike and to 28° in the first",
+        ),
+        // Nothing tells it: the trunk's lean is possible, and the hips keep their shape.
+        ("lumbar sign", said_of(&walk(0.0, lumbar)), ""),
+    ];
+    let mut other = Vec::new();
+    for (name, said, expected) in cases {
+        println!("| {name} | {said} |");
+        if !said.contains(expected) || said.is_empty() != expected.is_empty() {
+            other.push((name, said));
+        }
+    }
+    assert!(other.is_empty(), "{other:#?}");
+}
+
+#[test]
+fn gaits_of_this_program_become_references() {
+    for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
+        let (_, gait) = golden_gait(subject, muscles);
+        let recording = Recording::from_opensim("gait.mot", &motion_file(&gait, 200.0).unwrap(), None, None).unwrap();
+        let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
+        println!("| subject {subject}, muscles {muscles} | {} |", remark(&reference));
+    }
+}
+
+/// Normal noise of standard deviation 1, always the same: sums of twelve numbers of a linear congruential generator.
+fn noise(samples: usize) -> Vec<f64> {
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1_u64 << 24) as f64
+    };
+    (0..samples).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+/// Forces at 1000 Hz under the strides of [`opensim`]: 700 N for 0.66 s of each 1.1 s, within 20 ms, and what else the
+/// plate says.
+fn plate(disturbance: impl Fn(usize) -> f64) -> VerticalForce {
+    let time_s: Vec<f64> = (0..5500).map(|k| f64::from(k) / 1000.0).collect();
+    let force = |time: f64| {
+        let since = (time + 0.3).rem_euclid(1.1) - 0.3;
+        700.0 * (since / 0.02).clamp(0.0, 1.0) * ((0.66 - since) / 0.02).clamp(0.0, 1.0)
+    };
+    let force_n = time_s.iter().enumerate().map(|(k, time)| force(*time) + disturbance(k)).collect();
+    VerticalForce { time_s, force_n }
+}
+
+#[test]
+fn noise_and_offsets_of_a_plate_are_no_heel_strikes() {
+    let normal = noise(5500);
+    for (offset_n, noise_n) in [(0.0, 0.0), (0.0, 8.0), (0.0, 10.0), (15.0, 4.0)] {
+        let force = plate(|k| offset_n + noise_n * normal[k]);
+        let recording = Recording { right_force: Some(force), ..read(&opensim(5)).unwrap() };
+        let strikes = recording.heel_strikes(&HeelStrikes::Force).unwrap();
+        assert_eq!(strikes.len(), 4, "{offset_n} N, noise of {noise_n} N: {strikes:?}");
+        for (k, strike) in strikes.iter().enumerate() {
+            let off = strike - 1.1 * (k + 1) as f64;
+            assert!(off.abs() < 0.003, "{offset_n} N, noise of {noise_n} N: {off}");
+        }
+    }
+    // An offset above the threshold never lets go.
+    let lifted = Recording { right_force: Some(plate(|_| 25.0)), ..read(&opensim(5)).unwrap() };
+    let refused = lifted.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string();
+    assert!(refused.starts_with("walk.mot: 0 right heel strikes"), "{refused}");
+}

@@ -95,6 +95,21 @@ pub struct EmgRmse {
     pub total: f64,
     /// RMS difference of each channel of normal walking, in its order.
     pub parts: Vec<f64>,
+    /// What makes the comparison doubtful, for people.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+}
+
+/// No gait is so many times as active as normal walking.
+const LARGEST_PEAK: f64 = 10.0;
+
+/// What is said of a channel that is far more active than in normal walking.
+fn doubt(activity: &CycleActivity, normal: &CycleActivity) -> Option<String> {
+    let times = activity.peak() / normal.peak();
+    (times > LARGEST_PEAK).then(|| {
+        let name = &activity.channel;
+        format!("{name} peaks at {times:.1} times the peak of normal walking: are both recorded in one unit?")
+    })
 }
 
 /// EMG RMSE of a gait against normal walking: `sum_i sqrt(mean((s_i - n_i)^2))` over the channels of normal walking.
@@ -103,13 +118,12 @@ pub struct EmgRmse {
 /// # Errors
 /// [`ModelError::Unknown`] for a channel that the gait lacks.
 pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<EmgRmse, ModelError> {
-    let parts: Vec<f64> = normal_walking
-        .iter()
-        .map(|normal| {
-            let activity = normal.same_channel(gait)?;
-            let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
-            Ok((squares / normal.mean.len() as f64).sqrt())
-        })
-        .collect::<Result<_, ModelError>>()?;
-    Ok(EmgRmse { total: parts.iter().sum(), parts })
+    let (mut parts, mut remarks) = (Vec::new(), Vec::new());
+    for normal in normal_walking {
+        let activity = normal.same_channel(gait)?;
+        let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
+        parts.push((squares / normal.mean.len() as f64).sqrt());
+        remarks.extend(doubt(activity, normal));
+    }
+    Ok(EmgRmse { total: parts.iter().sum(), parts, remarks })
 }

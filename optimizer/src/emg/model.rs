@@ -3,6 +3,7 @@
 use super::{CYCLE_POINTS, CycleActivity};
 use crate::gait::Gait;
 use crate::muscle::MUSCLES;
+use crate::reference::ReferenceGait;
 use serde::{Deserialize, Serialize};
 
 /// Channel and muscle that belong together. Rectus femoris has no muscle of its own in the model: it is part of hip
@@ -39,17 +40,7 @@ pub fn model_activity(gait: &Gait, measured: &CycleActivity) -> Option<ModelActi
         channel: measured.channel.clone(),
         muscle: muscle.to_owned(),
         rms_difference: (squares / CYCLE_POINTS as f64).sqrt(),
-        correlation: correlation(&activation, &measured.mean),
+        correlation: ReferenceGait::correlation(&activation, &measured.mean),
         activation,
     })
-}
-
-/// Pearson's correlation.
-fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (mean_a, mean_b) = (mean(a), mean(b));
-    let product: f64 = a.iter().zip(b).map(|(x, y)| (x - mean_a) * (y - mean_b)).sum();
-    let spread = |values: &[f64], mean: f64| values.iter().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt();
-    let both = spread(a, mean_a) * spread(b, mean_b);
-    (both > 0.0).then(|| product / both)
 }

@@ -12,6 +12,13 @@ const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
 /// A sample farther from the median than so many times what 99 of 100 samples keep within is no muscle's: those of bursts
 /// of activity reach about 10.
 const FARTHEST_SAMPLE: f64 = 100.0;
+/// A rectified signal is within this share of its RMS of zero ...
+const NEAR_ZERO: f64 = 0.1;
+/// ... for this share of its samples or more: 8 of 100 for noise. One that an offset lifts above zero is hardly there.
+const OFTEN: f64 = 0.02;
+/// Of a raw signal more than this share of its RMS about the mean is within the band: nine tenths of white noise, some
+/// hundredths of an envelope of 6 to 10 Hz.
+const LEAST_IN_BAND: f64 = 0.1;
 
 /// Raw signals of several channels over the same time.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +45,12 @@ impl EmgRecording {
         let lines = lines_of(text);
         let comments = lines.iter().take_while(|line| line.starts_with('#')).count();
         let table = Table::read(what, &lines[comments..], comments + 1, Separator::Comma, clock)?;
+        if rate_hz.is_some()
+            && let Some(time) = table.names().iter().find(|name| name.to_ascii_lowercase().starts_with("time"))
+        {
+            let reason = format!("the column {time:?} has the time: rate_hz is for files without one");
+            return Err(table.malformed_names(reason));
+        }
         Self::from_table(&table)
     }
 
@@ -77,19 +90,26 @@ impl EmgRecording {
         })
     }
 
-    /// The channels under the names that are wanted, each from its column.
+    /// The channels under the names that are wanted, each from a column of its own.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] for a column that is missing.
+    /// [`ModelError::Malformed`] for a column that is missing or wanted twice.
     pub fn select<'a>(
         &self,
         what: &str,
         wanted: impl IntoIterator<Item = (&'a str, &'a str)>,
     ) -> Result<Self, ModelError> {
-        let channels = wanted
-            .into_iter()
-            .map(|(channel, column)| Ok((channel.to_owned(), self.column(what, column)?.to_vec())))
-            .collect::<Result<_, ModelError>>()?;
+        let mut channels = Vec::new();
+        let mut taken: Vec<(&str, &str)> = Vec::new();
+        for (channel, column) in wanted {
+            if let Some((other, _)) = taken.iter().find(|(_, known)| *known == column) {
+                let reason =
+                    format!("column {column:?} is wanted for {other} and for {channel}: each muscle has its own");
+                return Err(ModelError::Malformed { what: what.to_owned(), reason });
+            }
+            channels.push((channel.to_owned(), self.column(what, column)?.to_vec()));
+            taken.push((channel, column));
+        }
         Ok(Self { start_s: self.start_s, rate_hz: self.rate_hz, channels })
     }
 
@@ -117,7 +137,8 @@ impl EmgRecording {
         given(what, heel_strikes_s, self.start_s, self.end_s())
     }
 
-    /// Checks that every channel is the signal of a muscle: it changes, and no sample stands far out of all others.
+    /// Checks that every channel is the raw signal of a muscle: it changes, no sample stands far out of all others, and
+    /// it was neither rectified nor smoothed.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] naming the channel and the reason.
@@ -130,12 +151,17 @@ impl EmgRecording {
         Ok(())
     }
 
-    /// Why this is no signal of a muscle: nothing was connected, or one sample stands out of all others.
+    /// Why this is no raw signal of a muscle.
     fn no_muscle(&self, samples: &[f64]) -> Option<String> {
         let first = samples.first()?;
         if samples.iter().all(|sample| sample == first) {
             return Some(format!("every sample is {first}: nothing was connected"));
         }
+        self.artefact(samples).or_else(|| self.smoothed(samples)).or_else(|| rectified(samples))
+    }
+
+    /// Why a channel would pass for active: one sample stands out of all others.
+    fn artefact(&self, samples: &[f64]) -> Option<String> {
         let median = quantile(samples.to_vec(), 0.5);
         let kept_within = quantile(samples.iter().map(|sample| (sample - median).abs()).collect(), 0.99);
         let place = samples.iter().position(|sample| (sample - median).abs() > FARTHEST_SAMPLE * kept_within)?;
@@ -145,6 +171,31 @@ impl EmgRecording {
              ({kept_within:.3e}): an artefact that would pass for activity",
             samples[place]
         ))
+    }
+
+    /// Why a channel is an envelope: hardly anything of it is where the signals of muscles are.
+    fn smoothed(&self, samples: &[f64]) -> Option<String> {
+        let EmgSettings { band_low_hz, band_high_hz, order, .. } = EmgSettings::default();
+        let half = 0.5 * self.rate_hz;
+        let band_high_hz = band_high_hz.min(0.9 * half);
+        if band_low_hz >= 0.9 * band_high_hz {
+            return None; // too slow for this band: the settings of the filters are refused then
+        }
+        let band = band_pass(order, band_low_hz / half, band_high_hz / half);
+        if samples.len() <= filter::extension(&band) {
+            return None;
+        }
+        let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+        let about_mean: Vec<f64> = samples.iter().map(|sample| sample - mean).collect();
+        let share = rms(&filter::filter(&band, &about_mean)) / rms(&about_mean);
+        (share < LEAST_IN_BAND).then(|| {
+            format!(
+                "{:.1} % of the signal (RMS) is within {band_low_hz} to {band_high_hz} Hz, less than {:.0} %: an envelope \
+                 or movement, where the raw signal is needed",
+                100.0 * share,
+                100.0 * LEAST_IN_BAND
+            )
+        })
     }
 
     /// The mean cycle of every channel, cut at heel strikes (s).
@@ -178,6 +229,26 @@ impl EmgRecording {
             })
             .collect()
     }
+}
+
+/// Why a channel is no raw signal: it was rectified.
+fn rectified(samples: &[f64]) -> Option<String> {
+    if samples.iter().any(|sample| *sample < 0.0) {
+        return None;
+    }
+    let near = NEAR_ZERO * rms(samples);
+    let share = samples.iter().filter(|sample| **sample <= near).count() as f64 / samples.len() as f64;
+    (share >= OFTEN).then(|| {
+        format!(
+            "it is never below zero and often at it ({:.0} of 100 samples): a rectified signal, where the raw one is \
+             needed",
+            100.0 * share
+        )
+    })
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value.powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 /// The value below which a share of the values lies.

@@ -171,12 +171,12 @@ impl Recording {
                 return Err(table.malformed_row(row, None, reason));
             }
         }
-        if let Some(reason) = still_knee(&angles[KNEE]).or_else(|| backward_knee(&angles[KNEE])) {
+        if let Some(reason) = Self::no_knee(&angles[KNEE]) {
             return Err(table.malformed_row(0, None, format!("{} {reason}", super::REFERENCE_COLUMNS[KNEE])));
         }
         let time_s = table.times();
         for (column, name) in angles.iter().zip(super::REFERENCE_COLUMNS) {
-            if let Some((row, jump_rad)) = jump(&time_s, column) {
+            if let Some((row, jump_rad)) = Self::jump(&time_s, column) {
                 let reason = format!("{name} jumps by {jump_rad:.2} rad in {:.4} s", time_s[row] - time_s[row - 1]);
                 return Err(table.malformed_row(row, None, reason));
             }
@@ -184,31 +184,36 @@ impl Recording {
         let angles_rad = (0..table.len()).map(|k| std::array::from_fn(|i| angles[i][k])).collect();
         Ok(Self { what: what.to_owned(), time_s, angles_rad, knee_r_rad, right_force, steps })
     }
-}
 
-/// The lowest and the highest value.
-fn extremes(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    /// The lowest and the highest value.
+    pub(crate) fn extremes(values: &[f64]) -> (f64, f64) {
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    }
+
+    /// Why this is no knee that walks, flexion positive.
+    pub(crate) fn no_knee(flexion_rad: &[f64]) -> Option<String> {
+        still_knee(flexion_rad).or_else(|| backward_knee(flexion_rad))
+    }
+
+    /// The first row to which an angle turns faster than any joint does, and by how much, rad.
+    pub(crate) fn jump(time_s: &[f64], angle_rad: &[f64]) -> Option<(usize, f64)> {
+        (1..angle_rad.len())
+            .map(|row| (row, angle_rad[row] - angle_rad[row - 1]))
+            .find(|&(row, jump_rad)| jump_rad.abs() > LARGEST_SPEED_RAD_S * (time_s[row] - time_s[row - 1]))
+    }
 }
 
 /// Why this is no knee that walks: it hardly bends.
 fn still_knee(flexion_rad: &[f64]) -> Option<String> {
-    let (lowest, highest) = extremes(flexion_rad);
+    let (lowest, highest) = Recording::extremes(flexion_rad);
     let range = highest - lowest;
     (range < SMALLEST_KNEE_RANGE_RAD)
         .then(|| format!("moves over {range:.3} rad only, less than {SMALLEST_KNEE_RANGE_RAD} rad; is the unit right?"))
 }
 
-/// The first row to which an angle turns faster than any joint does, and by how much, rad.
-fn jump(time_s: &[f64], angle_rad: &[f64]) -> Option<(usize, f64)> {
-    (1..angle_rad.len())
-        .map(|row| (row, angle_rad[row] - angle_rad[row - 1]))
-        .find(|&(row, jump_rad)| jump_rad.abs() > LARGEST_SPEED_RAD_S * (time_s[row] - time_s[row - 1]))
-}
-
 /// Why this is no knee that walks, flexion positive: it is bent backwards, as where a file has the other sign.
 fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
-    let (lowest, highest) = extremes(flexion_rad);
+    let (lowest, highest) = Recording::extremes(flexion_rad);
     (lowest + highest < 0.0).then(|| {
         format!(
             "is from {lowest:.2} to {highest:.2} rad with flexion positive: the file's knee angle has the other sign"

@@ -3,6 +3,10 @@
 use super::recording::Recording;
 use super::{REFERENCE_ROWS, ReferenceGait};
 use crate::subject::{ModelError, Subject};
+use plausible::{no_walker, unlike_builtin};
+use std::ops::Range;
+
+mod plausible;
 
 /// Durations of strides that are kept, s.
 pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
@@ -15,6 +19,10 @@ const LONGEST_GAP_S: f64 = 0.1;
 const CONTACT_FORCE_N: f64 = 20.0;
 /// A heel strike by force comes after at least so long without contact, s.
 const SHORTEST_SWING_S: f64 = 0.1;
+/// A contact lasts at least so long, s: what noise or vibration makes of an unloaded plate is shorter.
+const SHORTEST_CONTACT_S: f64 = 0.05;
+/// What differences of times may be off by rounding, s.
+const ROUNDING_S: f64 = 1e-9;
 /// A heel strike by kinematics is the farthest forward heel within so long before and after, s.
 const NEIGHBOURHOOD_S: f64 = 0.3;
 /// Place of the left knee among the reference's angles.
@@ -33,7 +41,7 @@ const LEG: [f64; 2] = [0.245, 0.246];
 pub enum HeelStrikes {
     /// At these times, s.
     Given(Vec<f64>),
-    /// Where the vertical force under the right foot rises above 20 N.
+    /// Where the vertical force under the right foot rises above 20 N, to stay there for 50 ms.
     Force,
     /// Where the right heel is farthest ahead of the pelvis (Zeni et al. 2008, Gait & Posture 27:710).
     Kinematics,
@@ -64,23 +72,37 @@ impl Walker {
     }
 }
 
-/// When a foot comes to the ground: where a signal that tells contact rises above a threshold, having been below it for
-/// a swing. Linear between samples.
+/// When a foot comes to the ground: where a signal that tells contact rises above a threshold for a contact, having had
+/// none for a swing. Linear between samples.
 pub(crate) fn contacts(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<f64> {
-    let mut unloaded_since: Option<f64> = None;
+    let mut unloaded_since = time_s.first().copied();
     let mut strikes = Vec::new();
-    for (k, (&time, &value)) in time_s.iter().zip(signal).enumerate() {
-        if value < threshold {
-            unloaded_since.get_or_insert(time);
-        } else if let Some(since) = unloaded_since.take()
+    for contact in loaded(time_s, signal, threshold) {
+        let k = contact.start;
+        if let Some(since) = unloaded_since
             && k > 0
-            && time - since >= SHORTEST_SWING_S
+            && time_s[k] - since >= SHORTEST_SWING_S - ROUNDING_S
         {
             let (before, earlier) = (signal[k - 1], time_s[k - 1]);
-            strikes.push(earlier + (time - earlier) * (threshold - before) / (value - before));
+            strikes.push(earlier + (time_s[k] - earlier) * (threshold - before) / (signal[k] - before));
         }
+        unloaded_since = time_s.get(contact.end).copied();
     }
     strikes
+}
+
+/// The samples of each contact: all above the threshold, for as long as a contact lasts.
+fn loaded(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<Range<usize>> {
+    let mut contacts = Vec::new();
+    let mut start = 0;
+    for samples in signal.chunk_by(|a, b| (*a < threshold) == (*b < threshold)) {
+        let end = start + samples.len();
+        if samples[0] >= threshold && time_s[end - 1] - time_s[start] >= SHORTEST_CONTACT_S - ROUNDING_S {
+            contacts.push(start..end);
+        }
+        start = end;
+    }
+    contacts
 }
 
 /// Heel strikes that were told: in order, within the recording, at least two.
@@ -202,7 +224,9 @@ impl Recording {
 
     /// Whether no row is missing between two times.
     fn is_whole(&self, start: f64, end: f64) -> bool {
-        self.time_s.windows(2).all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S)
+        self.time_s
+            .windows(2)
+            .all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S + ROUNDING_S)
     }
 
     /// The mean stride with its standard deviation, as a reference.
@@ -235,13 +259,13 @@ impl Recording {
                 deviation[row][i] = if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
             }
         }
-        if let Some(reason) = not_from_right_heel_strike(&mean) {
+        if let Some(reason) = no_walker(&mean).or_else(|| not_from_right_heel_strike(&mean)) {
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let found = match how {
             HeelStrikes::Given(_) => "given",
             HeelStrikes::Ends => "at the ends of the recording",
-            HeelStrikes::Force => "by the force under the right foot (20 N)",
+            HeelStrikes::Force => "by the force under the right foot (above 20 N for 50 ms)",
             HeelStrikes::Kinematics => "by the farthest forward right heel (Zeni et al. 2008)",
         };
         let mut steps = self.steps.clone();
@@ -251,6 +275,7 @@ impl Recording {
             strides.len(),
             strikes.len() - 1 - strides.len()
         ));
+        steps.extend(unlike_builtin(&mean)?);
         let reference = ReferenceGait {
             name: name.to_owned(),
             provenance: steps.join("\n"),

@@ -105,6 +105,10 @@ impl Emg {
         let activity = match &self.normal {
             Some(path) => {
                 let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
+                if normal == recording {
+                    let allowed = "another recording than the one that is measured by it: no two walks are alike";
+                    return Err(Error::invalid("normal", path.display().to_string(), allowed));
+                }
                 Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?
             }
             None => Activity::of_normal_walking(&measured)?,
@@ -156,6 +160,7 @@ fn for_people(found: &Found) -> String {
         lines.push(format!("{name}: average {average:.4}, peak {peak:.4}{distance} ({strides} strides)"));
     }
     lines.extend(emg_rmse.as_ref().map(|rmse| format!("EMG RMSE in all: {:.4}", rmse.total)));
+    lines.extend(emg_rmse.iter().flat_map(|rmse| rmse.remarks.iter().cloned()));
     lines.join("\n")
 }
 

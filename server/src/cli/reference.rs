@@ -61,7 +61,8 @@ impl Reference {
             height_m: self.height_m,
             body_mass_kg: self.mass_kg,
         };
-        let reference = new.definition(&self.recording.display().to_string())?;
+        let forces = self.forces.as_ref().map_or_else(String::new, |path| path.display().to_string());
+        let reference = new.definition(&self.recording.display().to_string(), &forces)?;
         let inputs: Vec<&Path> =
             [Some(&self.recording), self.forces.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
         let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;

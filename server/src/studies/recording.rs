@@ -103,11 +103,12 @@ pub struct NewReferenceGait {
 }
 
 impl NewReferenceGait {
-    /// Cuts the recording at heel strikes and averages its strides; `what` names the recording in errors.
+    /// Cuts the recording at heel strikes and averages its strides; in errors and provenance `what` names the recording,
+    /// `forces` the file of the forces.
     ///
     /// # Errors
     /// [`Error::Invalid`] with field, or line and column, and the reason.
-    pub fn definition(&self, what: &str) -> Result<Definition, Error> {
+    pub fn definition(&self, what: &str, forces: &str) -> Result<Definition, Error> {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
         let recording = match self.form {
             Form::Opensim => {
@@ -120,13 +121,13 @@ impl NewReferenceGait {
         };
         let recording = match &self.forces {
             Some(text) => {
-                let (what, column) = (format!("{what}: forces"), self.force_column.as_deref());
+                let column = self.force_column.as_deref();
                 match self.form {
                     Form::Camargo => {
-                        recording.with_camargo_forces(&what, text, column.unwrap_or(CAMARGO_FORCE_COLUMN))?
+                        recording.with_camargo_forces(forces, text, column.unwrap_or(CAMARGO_FORCE_COLUMN))?
                     }
                     Form::Opensim | Form::Csv => {
-                        recording.with_force_file(&what, text, column.unwrap_or(FORCE_COLUMN))?
+                        recording.with_force_file(forces, text, column.unwrap_or(FORCE_COLUMN))?
                     }
                 }
             }
@@ -152,7 +153,7 @@ impl NewReferenceGait {
     /// # Errors
     /// As [`Self::definition`].
     pub async fn definition_aside(self) -> Result<Definition, Error> {
-        tokio::task::spawn_blocking(move || self.definition("recording"))
+        tokio::task::spawn_blocking(move || self.definition("recording", "forces"))
             .await
             .map_err(|e| Error::Internal(e.to_string()))?
     }

@@ -163,7 +163,7 @@ impl MotionReading {
 
     /// Checks that a file has a limit cycle, and portraits with these settings.
     fn check(&self, text: &str) -> Result<(), Error> {
-        self.joints(text)?.check_duration(WHAT)?;
+        self.joints(text)?.check_walking(WHAT)?;
         self.portraits(text).map(|_| ())
     }
 }
