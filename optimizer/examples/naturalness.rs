@@ -100,8 +100,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for Wish { name, settings, basin_choice, cold_guesses, finer } in wishes() {
         let mut problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
         let options = SolveOptions { threads: 2, basin_choice, cold_guesses, ..SolveOptions::default() };
-        let solve_from =
-            |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
+        let solve_from = |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
         let mut outcome = solve_from(&problem, None)?;
         let (mut iterations, mut seconds) = (outcome.report.iterations, outcome.report.seconds_total);
         if finer {
