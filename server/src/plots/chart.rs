@@ -390,7 +390,7 @@ mod tests {
             .with("seen", 0, Stroke::Points, vec![(0.0, 1.0)])
             .with("empty", 1, Stroke::Steps, vec![])
             .with("nowhere", 2, Stroke::Solid, vec![(0.0, f64::NAN)]);
-        assert_eq!(chart.legend(), [("key c0 points".to_owned(), "seen")]);
+        assert_eq!(chart.legend(), [("key c0 points".to_owned(), "seen".to_owned())]);
     }
 
     #[test]
