@@ -429,7 +429,7 @@ fn what_no_walker_does_is_refused() {
         ),
         (
             |angles| with_ankle(angles, angles[3].to_radians()),
-            "ankle_L_rad moves over 0.54° only in the stride, less than 2°; is the unit right?",
+            "ankle_L_rad moves over 0.57° only in the stride, less than 2°; is the unit right?",
         ),
     ];
     for (change, expected) in cases {
