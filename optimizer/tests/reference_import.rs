@@ -398,6 +398,8 @@ fn remark(reference: &ReferenceGait) -> String {
     said.unwrap_or_default().to_owned()
 }
 
+type Angles = fn([f64; 7]) -> [f64; 7];
+
 #[test]
 fn what_no_walker_does_is_refused() {
     let unaltered = walk(0.0, |angles| angles);
@@ -405,7 +407,7 @@ fn what_no_walker_does_is_refused() {
     // The right heel is farthest ahead a little before it strikes.
     let found = unaltered.reference("walk", &HeelStrikes::Kinematics, Walker::default()).unwrap();
     assert_eq!(remark(&found), "", "{}", found.provenance);
-    let cases: [(fn([f64; 7]) -> [f64; 7], &str); 6] = [
+    let cases: [(Angles, &str); 6] = [
         (
             |[torso, rest @ ..]| with_trunk(torso + 0.8, rest),
             "torso_rad is 52° on average over the stride, beyond 45° either way: are sign and upright right?",

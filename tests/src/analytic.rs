@@ -165,7 +165,7 @@ fn gait(assignment: &Assignment, rmse: f64) -> Gait {
                 0.1,
                 wave(i, std::f64::consts::PI),
                 knee(i, std::f64::consts::PI),
-                0.1,
+                wave(i, 2.0),
                 wave(i, 0.0),
                 knee(i, 0.0),
                 0.1,

@@ -38,7 +38,8 @@ pub fn four_strides(per_second: u32) -> String {
         let phase = TAU * time / 1.1;
         let swing = phase.cos();
         let (hip, knee) = (0.2 + 0.4 * swing, 0.4 - 0.35 * swing);
-        let (left_hip, left_knee, ankle) = (0.2 - 0.4 * swing, 0.4 + 0.35 * swing, 0.05 + 0.02 * time);
+        let (left_hip, left_knee, ankle) =
+            (0.2 - 0.4 * swing, 0.4 + 0.35 * swing, 0.05 + 0.1 * phase.sin() + 0.02 * time);
         writeln!(text, "{time},0.1,{left_hip:.6},{left_knee:.6},{ankle:.6},{hip:.6},{knee:.6}").unwrap();
     }
     text

@@ -164,7 +164,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let row = |k: u32| {
         let (time, swing) = (f64::from(k) / 100.0, (std::f64::consts::TAU * f64::from(k) / 110.0).cos());
         let (left, right) = (0.4 + 0.35 * swing, 0.4 - 0.35 * swing);
-        format!("{time},0.1,{},{left},0.05,{},{right}", 0.2 - 0.4 * swing, 0.2 + 0.4 * swing)
+        format!("{time},0.1,{},{left},{},{},{right}", 0.2 - 0.4 * swing, 0.05 + 0.1 * swing, 0.2 + 0.4 * swing)
     };
     let header = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad".to_owned();
     let recording = std::iter::once(header).chain((0..440).map(row)).collect::<Vec<_>>().join("\n");

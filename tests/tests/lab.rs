@@ -259,7 +259,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     for (two, expected) in [
         (foreign, "a converged trial of this study"),
         (no_gait, "a converged trial of this study"),
-        (gaits[0].id, "another gait than gait_one"),
+        (gaits[0].id, "another gait than gait one"),
     ] {
         let refused = service.post(&path, &json!({"gait_one": gaits[0].id, "gait_two": two})).await;
         assert_eq!(refused.json()["field"], "gait_two");

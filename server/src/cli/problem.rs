@@ -131,7 +131,7 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
     let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))?;
     String::from_utf8(bytes).map_err(|error| {
         let readable = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + readable.iter().filter(|&&byte| byte == b'\n').count();
+        let line = readable.split(|byte| *byte == b'\n').count();
         Error::Malformed(format!("{}, line {line}: this is no UTF-8 text; save the file as UTF-8", path.display()))
     })
 }

@@ -51,6 +51,7 @@ impl AuditPage {
     }
 
     /// The rows before one, with the same words.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn before(&self, row: &i64) -> String {
         let query = serde_urlencoded::to_string([("contains", self.contains.as_str())]).unwrap_or_default();
         format!("/audit?before={row}&{query}")

@@ -160,6 +160,8 @@ struct Measured {
     rows: Vec<(String, Vec<String>, Vec<String>)>,
     /// Walk, muscle as measured, muscle of the model, RMS difference, correlation.
     model: Vec<[String; 5]>,
+    /// What makes a comparison doubtful, with the walk.
+    remarks: Vec<String>,
     charts: Vec<Drawn>,
 }
 
@@ -201,6 +203,10 @@ impl Measured {
                 counts.join(", ")
             ),
             compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
+            remarks: compared
+                .iter()
+                .flat_map(|(walk, rmse)| rmse.remarks.iter().map(|remark| format!("{}: {remark}", name(walk))))
+                .collect(),
             walks: walks().map(name).collect(),
             rows,
             model: model.collect(),

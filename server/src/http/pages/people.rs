@@ -108,11 +108,13 @@ impl PeoplePage {
         if self.typed.act == act { text } else { "" }
     }
 
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn is_role(&self, role: &Role) -> bool {
         let chosen = self.typed("add_user", &self.typed.role);
         role.as_str() == if chosen.is_empty() { "rater" } else { chosen }
     }
 
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn is_scope(&self, right: &Right) -> bool {
         if self.typed.act == "make_token" { self.typed.scopes().contains(right) } else { *right == Right::Read }
     }

@@ -33,6 +33,7 @@ struct SystemPage {
 }
 
 impl SystemPage {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
     fn megabytes(bytes: &i64) -> String {
         format!("{:.1}", *bytes as f64 / 1e6)
     }
