@@ -122,8 +122,12 @@ async fn a_reference_of_several_strides_has_its_band_and_one_without_says_so() {
     assert_eq!(imported.status, StatusCode::CREATED, "{}", imported.text);
     let deviation = imported.json()["definition"]["standard_deviation_rad"][50][3].as_f64().unwrap();
     let imported = imported.json()["id"].as_str().unwrap().parse().unwrap();
-    for (reference, band) in [(None, false), (Some(imported), true)] {
-        let study = service.study(|new| (new.trial_budget, new.reference_gait_id) = (2, reference)).await;
+    let mut one_stride = recording;
+    one_stride["heel_strikes_s"] = json!([1.1, 2.2]);
+    let one_stride = service.post("/api/v1/reference-gaits", &one_stride).await.json();
+    let one_stride = one_stride["id"].as_str().unwrap().parse().unwrap();
+    for (reference, band) in [(one_stride, false), (imported, true)] {
+        let study = service.study(|new| (new.trial_budget, new.reference_gait_id) = (2, Some(reference))).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trial = service.trials(study).await.into_iter().find(|t| t.state == TrialState::Converged).unwrap().id;
         for page in [format!("/studies/{study}/figures"), format!("/trials/{trial}")] {

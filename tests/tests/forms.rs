@@ -296,7 +296,11 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
     is_page(&service.post_text(&path, FORM, &none).await, unprocessable, "choose one");
     let itself = format!("a={a}&b={a}&answer=b&source=clinician&author=K&note=&key={UNKNOWN}");
     is_page(&service.post_text(&path, FORM, &itself).await, unprocessable, "compared with itself");
-    is_page(&service.fetch(&format!("{path}?a={a}&b={a}")).await, unprocessable, "another trial than a");
+    is_page(
+        &service.fetch(&format!("{path}?a={a}&b={a}")).await,
+        StatusCode::OK,
+        "were the same: choose two different",
+    );
     is_page(&service.fetch(&format!("{path}?a={a}&b={UNKNOWN}")).await, StatusCode::NOT_FOUND, UNKNOWN);
     let (_, other, _) = finished(&service).await;
     is_page(&service.fetch(&format!("{path}?a={other}&b={b}")).await, unprocessable, "a trial of this study");

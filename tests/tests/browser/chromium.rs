@@ -23,6 +23,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::task::JoinHandle;
 
+/// So often an element is clicked that goes away meanwhile.
+const CLICKS: u32 = 20;
 /// Where a Chromium may be.
 const PLACES: [&str; 4] =
     ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome", "/snap/bin/chromium"];
@@ -219,8 +221,16 @@ impl Tab {
 
     /// Clicks an element with the mouse.
     pub(crate) async fn click(&self, selector: &str) {
-        self.wait_for(selector).await;
-        self.page.find_element(selector).await.unwrap().click().await.unwrap();
+        // What a live update replaces between finding and clicking is found again.
+        for _ in 0..CLICKS {
+            self.wait_for(selector).await;
+            if let Ok(element) = self.page.find_element(selector).await
+                && element.click().await.is_ok()
+            {
+                return;
+            }
+        }
+        panic!("{selector} cannot be clicked on {:?}", self.page.url().await);
     }
 
     /// Clicks an element that is in view, without running any script in the page.
