@@ -47,8 +47,7 @@ pub(super) fn note(
     worst.note(point, &RANGE, excess);
 }
 
-/// Puts the fibre lengths that are written at a mesh point in place of those that the cubic through the interval's ends has
-/// there, and notes how far they are apart.
+/// How far the fibre lengths that are written at a mesh point are from those of the cubic through the interval's ends.
 pub(super) fn note_written(
     point: &GridPoint<'_>,
     written: &[f64; MUSCLE_COUNT],
