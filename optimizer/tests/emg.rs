@@ -3,10 +3,12 @@
 #![allow(clippy::unwrap_used)]
 
 mod golden_gaits;
+mod noise;
 
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::{CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope, emg_rmse, model_activity};
 use golden_gaits::golden_gait;
+use noise::noise;
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -67,16 +69,6 @@ fn channels_that_are_no_muscles_are_refused() {
     assert_eq!(refused(|samples| samples.fill(0.25)), "channel TA: every sample is 0.25: nothing was connected");
     let artefact = refused(|samples| samples[700] = 1e6);
     assert!(artefact.starts_with("channel TA: 1000000 at 0.7000 s is more than 100 times as far"), "{artefact}");
-}
-
-/// Normal noise of standard deviation 1, always the same: sums of twelve numbers of a linear congruential generator.
-fn noise(samples: usize) -> Vec<f64> {
-    let mut state = 1_u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f64 / (1_u64 << 24) as f64
-    };
-    (0..samples).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
 }
 
 /// Bursts of noise of 0 to 1 twice a second, 4 s at 1000 Hz.

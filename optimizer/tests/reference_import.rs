@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used)]
 
 mod golden_gaits;
+mod noise;
 mod synthetic_recordings;
 
 use gait_optimizer::export::motion_file;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, VerticalForce, Walker, distance, nearest};
 use gait_optimizer::{ModelError, ReferenceGait, Subject};
 use golden_gaits::golden_gait;
+use noise::noise;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use synthetic_recordings::{opensim, opensim_rows};
@@ -527,16 +529,6 @@ fn gaits_of_this_program_become_references() {
         let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
         println!("| subject {subject}, muscles {muscles} | {} |", remark(&reference));
     }
-}
-
-/// Normal noise of standard deviation 1, always the same: sums of twelve numbers of a linear congruential generator.
-fn noise(samples: usize) -> Vec<f64> {
-    let mut state = 1_u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f64 / (1_u64 << 24) as f64
-    };
-    (0..samples).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
 }
 
 /// Forces at 1000 Hz under the strides of [`opensim`]: 700 N for 0.66 s of each 1.1 s, within 20 ms, and what else the

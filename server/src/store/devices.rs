@@ -26,12 +26,11 @@ pub struct Device {
 /// # Errors
 /// What the database reports.
 pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(Device, bool)> {
+    if let Some(found) = find(db, definition).await? {
+        return Ok((found, false));
+    }
     let text = json::to_text("device", definition)?;
     let hash = json::sha256(text.as_bytes());
-    let found = sqlx::query("select * from devices where sha256 = ?").bind(&hash).fetch_optional(&mut *db).await?;
-    if let Some(row) = found {
-        return Ok((from_row(&row)?, false));
-    }
     let added = Device {
         id: DeviceId::fresh(),
         name: definition.name.clone(),
@@ -67,13 +66,14 @@ pub async fn has_name(db: &mut Connection, name: &str) -> StoreResult<bool> {
     Ok(found.fetch_optional(db).await?.is_some())
 }
 
-/// Whether this very definition is there.
+/// The row with this very definition.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn is_there(db: &mut Connection, definition: &Definition) -> StoreResult<bool> {
+pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<Option<Device>> {
     let hash = json::sha256(json::to_text("device", definition)?.as_bytes());
-    Ok(sqlx::query("select 1 from devices where sha256 = ?").bind(hash).fetch_optional(db).await?.is_some())
+    let row = sqlx::query("select * from devices where sha256 = ?").bind(hash).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
 }
 
 /// Every device, newest first.

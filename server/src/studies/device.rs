@@ -25,7 +25,7 @@ pub fn check(definition: &Definition) -> Result<(), Error> {
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<Device, Error> {
     check(definition)?;
     let name = definition.name.as_str();
-    if !devices::is_there(writer, definition).await? && devices::has_name(writer, name).await? {
+    if devices::find(writer, definition).await?.is_none() && devices::has_name(writer, name).await? {
         return Err(Error::invalid("device.name", name, "a name that no other device has"));
     }
     let (device, added) = devices::ensure(writer, definition).await?;
