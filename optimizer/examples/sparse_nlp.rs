@@ -23,6 +23,7 @@ fn main() {
         (LinearSolver::Multifrontal, 1),
         (LinearSolver::Multifrontal, 2),
         (LinearSolver::Auto, 1),
+        (LinearSolver::DelayedPivots, 1),
     ] {
         let limit = std::env::args().nth(3).and_then(|a| a.parse().ok()).unwrap_or(5);
         let settings = NlpSettings {

@@ -5,12 +5,13 @@
 //!
 //! `solve` -> `formulation` (slacks, fixed variables, scaling) -> `interior_point` { `optimality`, `barrier`,
 //! `inertia_correction`, `newton` (assembly in `kkt`, factorisation behind `kkt_solver`: `multifrontal` (`front`,
-//! `null_space`, `bunch_kaufman`, `dense_kernels`) or `supernodal`, chosen in `linear_solver`), `line_search` with
-//! `filter`, and `feasibility` when the line search fails } -> `status::NlpResult`.
+//! `null_space`, `bunch_kaufman`, `dense_kernels`), `supernodal` or `delayed_pivots`, chosen in `linear_solver`),
+//! `line_search` with `filter`, and `feasibility` when the line search fails } -> `status::NlpResult`.
 
 mod barrier;
 mod block_columns;
 mod bunch_kaufman;
+mod delayed_pivots;
 mod dense_kernels;
 mod feasibility;
 mod filter;

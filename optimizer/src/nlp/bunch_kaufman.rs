@@ -169,7 +169,7 @@ fn bring_up_to_date<S: Simd>(
 
 /// Exchanges rows and columns p < s, the rows in the finished columns included.
 #[inline(always)]
-fn exchange(a: &mut [f64], pivots: Pivots, p: usize, s: usize) {
+pub(super) fn exchange(a: &mut [f64], pivots: Pivots, p: usize, s: usize) {
     let Pivots { first, size, stride, .. } = pivots;
     for c in first..p {
         a.swap(c * stride + p, c * stride + s);

@@ -295,6 +295,7 @@ impl<'p> Run<'p> {
         }
         self.correction.begin(settings, self.mu);
         let mut change = Change::Any;
+        let mut trusts_refusals = false;
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, (dw, dc), change);
@@ -303,7 +304,7 @@ impl<'p> Run<'p> {
             }
             let go_on = match inertia {
                 Some(i) if i.zero == 0 && i.negative == self.form.m => {
-                    let ratio = session.newton.solve(
+                    let solved = session.newton.solve(
                         &self.form,
                         settings,
                         &self.point,
@@ -311,13 +312,27 @@ impl<'p> Run<'p> {
                         &self.rhs,
                         &mut self.direction,
                     );
-                    if ratio <= settings.residual_limit {
+                    let distrusts = solved.unrefined > settings.residual_limit && session.newton.distrust();
+                    if !distrusts && solved.refined <= settings.residual_limit {
                         self.correction.accept(settings);
                         return true;
                     }
-                    session.newton.distrust() || self.correction.singular(settings, self.mu)
+                    distrusts || self.correction.singular(settings, self.mu)
                 }
-                Some(i) if i.zero == 0 && i.negative > self.form.m => self.correction.increase(settings),
+                Some(i) if i.zero == 0 && i.negative > self.form.m => {
+                    // Growth that spoils solutions spoils the count as well. More regularisation only makes it smaller.
+                    let distrusts = !trusts_refusals
+                        && session.newton.unrefined_residual(
+                            &self.form,
+                            &self.point,
+                            &self.at,
+                            &self.rhs,
+                            &mut self.direction,
+                        ) > settings.residual_limit
+                        && session.newton.distrust();
+                    trusts_refusals = !distrusts;
+                    distrusts || self.correction.increase(settings)
+                }
                 _ => self.correction.singular(settings, self.mu),
             };
             if !go_on {

@@ -273,7 +273,7 @@ impl Run<'_> {
                 *rhs = -c;
             }
             std::mem::swap(&mut self.rhs.y, &mut self.search.corrected_rhs);
-            let ratio = session.newton.solve(
+            let solved = session.newton.solve(
                 &self.form,
                 settings,
                 &self.point,
@@ -282,7 +282,7 @@ impl Run<'_> {
                 &mut self.search.correction,
             );
             std::mem::swap(&mut self.rhs.y, &mut self.search.corrected_rhs);
-            if ratio > settings.residual_limit {
+            if solved.refined > settings.residual_limit {
                 return None;
             }
             step = barrier::fraction_to_boundary(

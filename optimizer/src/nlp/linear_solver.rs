@@ -1,5 +1,6 @@
 //! Choice of the factorisation, and the way back from a failed one.
 
+use super::delayed_pivots::DelayedPivots;
 use super::formulation::{Formulation, RowKind};
 use super::front::PivotKind;
 use super::kkt::KktMatrix;
@@ -23,8 +24,8 @@ pub(super) fn choose(
     matrix: &KktMatrix,
     settings: &NlpSettings,
 ) -> Result<Box<dyn KktSolver>, NlpError> {
-    let blocks = form.program.elimination_blocks();
     let supernodal = |order| Supernodal::new(&matrix.column_starts, &matrix.row_indices, order);
+    let delayed = |front_of: &[usize]| DelayedPivots::new(&matrix.column_starts, &matrix.row_indices, front_of);
     let multifrontal = |front_of: &[usize], kinds: &[PivotKind], threads| {
         Multifrontal::new(&matrix.column_starts, &matrix.row_indices, front_of, kinds, threads)
     };
@@ -34,20 +35,23 @@ pub(super) fn choose(
         let front_of = if diagonal { (0..matrix.order).collect() } else { vec![0; matrix.order] };
         return Ok(Box::new(multifrontal(&front_of, &alike, 1)?));
     }
-    let Some(blocks) = blocks else {
-        return Ok(match settings.linear_solver {
-            LinearSolver::Multifrontal => Box::new(multifrontal(&vec![0; matrix.order], &alike, settings.threads)?),
-            LinearSolver::Auto | LinearSolver::Supernodal => Box::new(supernodal(None)?),
-        });
+    let Some(blocks) = form.program.elimination_blocks() else {
+        if settings.linear_solver == LinearSolver::Multifrontal {
+            return Ok(Box::new(multifrontal(&vec![0; matrix.order], &alike, settings.threads)?));
+        }
+        let minimum_degree = supernodal(None)?;
+        let trusted = delayed(&minimum_degree.supernode_of_index());
+        return Ok(alone_or_trusted(settings.linear_solver, minimum_degree, trusted));
     };
-    let other = supernodal(Some(ordering::block_order(form, blocks)))?;
-    if settings.linear_solver == LinearSolver::Supernodal {
-        return Ok(Box::new(other));
-    }
     let front_of = ordering::block_of_index_raised(form, blocks);
+    let trusted = delayed(&front_of);
+    let other = supernodal(Some(ordering::block_order(form, blocks)))?;
+    if matches!(settings.linear_solver, LinearSolver::Supernodal | LinearSolver::DelayedPivots) {
+        return Ok(alone_or_trusted(settings.linear_solver, other, trusted));
+    }
     let plain = multifrontal(&front_of, &alike, settings.threads)?;
     if settings.linear_solver == LinearSolver::Auto && plain.flops() > WORTHWHILE * other.flops() {
-        return Ok(Box::new(other));
+        return Ok(alone_or_trusted(settings.linear_solver, other, trusted));
     }
     let variables = std::iter::repeat_n(PivotKind::Variable, form.n);
     let rows = form.rows.iter().map(|row| match row {
@@ -57,30 +61,49 @@ pub(super) fn choose(
     let two_stages = multifrontal(&front_of, &variables.chain(rows).collect::<Vec<_>>(), settings.threads)?;
     let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), Box::new(plain)];
     if settings.linear_solver == LinearSolver::Auto {
-        methods.push(Box::new(other));
+        methods.push(Box::new(trusted));
     }
-    Ok(Box::new(Ladder { up_to_date: vec![false; methods.len()], methods, first: 0, in_use: 0, fallbacks: 0 }))
+    Ok(Box::new(Ladder::new(methods)))
 }
 
-/// Several methods, the fastest first: a matrix on which one breaks down or gives a bad residual goes to the next.
+/// The supernodal factorisation, the one with delayed pivots, or (auto) the second after the first.
+fn alone_or_trusted(setting: LinearSolver, supernodal: Supernodal, trusted: DelayedPivots) -> Box<dyn KktSolver> {
+    match setting {
+        LinearSolver::Supernodal => Box::new(supernodal),
+        LinearSolver::DelayedPivots => Box::new(trusted),
+        LinearSolver::Auto | LinearSolver::Multifrontal => {
+            Box::new(Ladder::new(vec![Box::new(supernodal), Box::new(trusted)]))
+        }
+    }
+}
+
+/// Several methods, the fastest first, the most trusted last: a matrix on which one breaks down goes to the next, one that it
+/// solves badly to the last.
 struct Ladder {
     methods: Vec<Box<dyn KktSolver>>,
     /// Which have factorised the last matrix, or one that differs from it on the diagonal only.
     up_to_date: Vec<bool>,
-    /// Where the next matrix begins.
+    /// Where the next factorisation begins.
     first: usize,
     /// Which holds the present factor.
     in_use: usize,
     fallbacks: usize,
 }
 
+impl Ladder {
+    fn new(methods: Vec<Box<dyn KktSolver>>) -> Self {
+        Self { up_to_date: vec![false; methods.len()], methods, first: 0, in_use: 0, fallbacks: 0 }
+    }
+}
+
 impl KktSolver for Ladder {
     fn factor(&mut self, values: &[f64], change: Change) -> Option<Inertia> {
+        // What was distrusted stays so while only the diagonal changes.
         if change == Change::Any {
             self.up_to_date.fill(false);
+            self.first = 0;
         }
-        let first = std::mem::take(&mut self.first);
-        for (k, method) in self.methods.iter_mut().enumerate().skip(first) {
+        for (k, method) in self.methods.iter_mut().enumerate().skip(self.first) {
             if !method.suits(values) {
                 continue;
             }
@@ -115,7 +138,7 @@ impl KktSolver for Ladder {
         if self.in_use + 1 >= self.methods.len() {
             return false;
         }
-        self.first = self.in_use + 1;
+        self.first = self.methods.len() - 1;
         self.fallbacks += 1;
         true
     }

@@ -1,5 +1,6 @@
 //! Factorisations against matrices of known inertia, and the promise that no wrong answer is silent.
 
+use super::delayed_pivots::DelayedPivots;
 use super::front::PivotKind;
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::multifrontal::Multifrontal;
@@ -51,7 +52,7 @@ impl Matrix {
         y
     }
 
-    /// Both factorisations; fronts of `width` indices in a chain.
+    /// Every factorisation; fronts of `width` indices in a chain.
     fn solvers(&self, width: usize) -> Vec<(&'static str, Box<dyn KktSolver>)> {
         let order = self.starts.len() - 1;
         let front_of: Vec<usize> = (0..order).map(|i| i / width).collect();
@@ -66,6 +67,8 @@ impl Matrix {
         solvers.push(("multifrontal", Box::new(frontal)));
         let dense = Multifrontal::new(&self.starts, &self.rows, &vec![0; order], &kinds, 1).unwrap();
         solvers.push(("one front", Box::new(dense)));
+        let delayed = DelayedPivots::new(&self.starts, &self.rows, &front_of);
+        solvers.push(("delayed pivots", Box::new(delayed)));
         solvers
     }
 
@@ -388,4 +391,53 @@ fn nlp_another_diagonal_gives_the_same_bits_as_a_fresh_start() {
     used.solve(&mut x);
     fresh.solve(&mut y);
     assert_eq!(x, y);
+}
+
+/// A chain of fronts, each a saddle of two variables and two rows whose Jacobian is regular by `regular` alone.
+fn ill_conditioned_fronts(count: usize, regular: f64) -> (Matrix, Vec<usize>) {
+    let order = 5 * count + 2;
+    let mut random = Random(3);
+    let mut a = vec![vec![0.0; order]; order];
+    for k in 0..count {
+        let (at, next) = (5 * k, 5 * (k + 1));
+        for i in 0..2 {
+            a[at + i][at + i] = 1.0 + random.next();
+            for r in 2..4 {
+                a[at + r][at + i] = 1.0 + if i + 2 == r { regular } else { 0.0 };
+            }
+            for border in [next, next + 1] {
+                a[border][at + 2 + i] = random.next();
+                a[border][at + i] = random.next();
+            }
+        }
+        a[at + 4][at + 4] = -1.0;
+        a[next][at + 4] = random.next();
+    }
+    for i in order - 2..order {
+        a[i][i] = 2.0 + random.next();
+    }
+    (Matrix::from_dense(&a), (0..order).map(|i| i / 5).collect())
+}
+
+#[test]
+fn nlp_delayed_pivots_count_right_where_static_ones_do_not() {
+    let mut wrong = 0;
+    for regular in [1e-3, 1e-6, 1e-9, 1e-11] {
+        let (matrix, front_of) = ill_conditioned_fronts(8, regular);
+        let order = front_of.len();
+        let kinds = vec![PivotKind::Other; order];
+        let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &vec![0; order], &kinds, 1).unwrap();
+        let mut fronts = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+        let mut delayed = DelayedPivots::new(&matrix.starts, &matrix.rows, &front_of);
+        let right = one.factor(&matrix.values, Change::Any).unwrap();
+        assert_eq!(delayed.factor(&matrix.values, Change::Any), Some(right), "{regular}");
+        let residual = matrix.residual(&mut delayed, 0);
+        assert!(residual < 1e-11, "{regular}: {residual}");
+        if fronts.factor(&matrix.values, Change::Any) != Some(right) {
+            wrong += 1;
+            let residual = matrix.residual(&mut fronts, 0);
+            assert!(residual > 1e-5, "a wrong count must not go with a small residual, {regular}: {residual}");
+        }
+    }
+    assert!(wrong > 0, "the test is no test");
 }

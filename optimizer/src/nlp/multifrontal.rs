@@ -114,7 +114,7 @@ impl Multifrontal {
 
 /// Members of each front, fronts renumbered so that every subtree of the front forest is contiguous and ends with its
 /// root.
-fn postordered(column_starts: &[usize], row_indices: &[usize], front_of: &[usize]) -> Vec<Vec<usize>> {
+pub(super) fn postordered(column_starts: &[usize], row_indices: &[usize], front_of: &[usize]) -> Vec<Vec<usize>> {
     let count = front_of.iter().max().map_or(0, |f| f + 1);
     // Parent of a front: the first front its border meets, with the borders of its children passed on.
     let mut reach: Vec<Vec<usize>> = vec![Vec::new(); count];

@@ -78,6 +78,14 @@ pub(super) struct Linearisation {
     pub slack_upper: Vec<f64>,
 }
 
+/// Relative residuals of a solution.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Solved {
+    /// Before refinement.
+    pub unrefined: f64,
+    pub refined: f64,
+}
+
 /// Clock of the linear algebra.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LinearTally {
@@ -294,8 +302,42 @@ impl NewtonSystem {
         }
     }
 
-    /// Solves the full system and refines; returns the relative residual
-    /// |r| / (|rhs| + min(|d|, 1e6 |rhs|)), infinite when the solution is not finite.
+    /// Relative residual of the full system, |r| / (|rhs| + min(|d|, 1e6 |rhs|)), solved without refinement: what the
+    /// factorisation is worth. Infinite when the solution is not finite.
+    pub(super) fn unrefined_residual(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+    ) -> f64 {
+        self.full_solve(form, point, at, rhs, out);
+        self.relative_residual(form, point, at, rhs, out)
+    }
+
+    /// Leaves the residual itself in `self.residual`.
+    fn relative_residual(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &PrimalDual,
+    ) -> f64 {
+        self.full_residual(form, point, at, rhs, out);
+        let (size, length) = (rhs.largest(), out.largest());
+        let scale = size + length.min(1e6 * size);
+        if !length.is_finite() {
+            f64::INFINITY
+        } else if scale > 0.0 {
+            self.residual.largest() / scale
+        } else {
+            0.0
+        }
+    }
+
+    /// Solves the full system and refines; returns the relative residual of the solution.
     pub(super) fn solve(
         &mut self,
         form: &Formulation,
@@ -304,22 +346,12 @@ impl NewtonSystem {
         at: &Linearisation,
         rhs: &PrimalDual,
         out: &mut PrimalDual,
-    ) -> f64 {
-        let size = rhs.largest();
-        self.full_solve(form, point, at, rhs, out);
-        let mut best = f64::INFINITY;
+    ) -> Solved {
+        let unrefined = self.unrefined_residual(form, point, at, rhs, out);
+        let solved = |refined| Solved { unrefined, refined };
+        let (mut best, mut ratio) = (f64::INFINITY, unrefined);
         let mut refinements = 0;
         loop {
-            self.full_residual(form, point, at, rhs, out);
-            let length = out.largest();
-            let scale = size + length.min(1e6 * size);
-            let ratio = if !length.is_finite() {
-                f64::INFINITY
-            } else if scale > 0.0 {
-                self.residual.largest() / scale
-            } else {
-                0.0
-            };
             if ratio >= best && refinements > 0 {
                 // The last correction did not help: take it back.
                 for (a, b) in out.parts_mut().into_iter().zip(self.correction.parts()) {
@@ -327,15 +359,15 @@ impl NewtonSystem {
                         *x -= y;
                     }
                 }
-                return best;
+                return solved(best);
             }
             let stagnates = refinements > 0 && ratio > 0.5 * best;
             best = ratio;
             if ratio <= settings.residual_target || !ratio.is_finite() || stagnates {
-                return best;
+                return solved(best);
             }
             if refinements == settings.max_refinements {
-                return best;
+                return solved(best);
             }
             let residual = std::mem::take(&mut self.residual);
             let mut correction = std::mem::take(&mut self.correction);
@@ -344,6 +376,7 @@ impl NewtonSystem {
             self.correction = correction;
             out.add(&self.correction);
             refinements += 1;
+            ratio = self.relative_residual(form, point, at, rhs, out);
         }
     }
 }

@@ -46,13 +46,16 @@ pub enum DualRegularisation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum LinearSolver {
-    /// The multifrontal factorisation, with the supernodal one as its fallback.
+    /// The multifrontal factorisation over elimination blocks, the supernodal one without them; where its solutions are
+    /// inaccurate before refinement, the one with delayed pivots.
     #[default]
     Auto,
     /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes (a matrix of order up to 120: one dense front).
     Supernodal,
     /// Static multifrontal LBL^T over the elimination blocks, with Bunch-Kaufman pivoting inside fronts.
     Multifrontal,
+    /// Multifrontal LBL^T with threshold pivoting, pivots delayed to the parent front: slow, and to be trusted.
+    DelayedPivots,
 }
 
 /// Settings of [`solve`](super::solve). `NlpSettings::default()` is a good general choice. Numbers for which no range is
@@ -140,8 +143,8 @@ pub struct NlpSettings {
     /// Relative residual of the full KKT system that ends iterative refinement. Default 1e-7: smaller ones cost substitutions
     /// and save no iterations. 1e-16 to 1.
     pub residual_target: f64,
-    /// Relative residual above which the step is refused and the matrix treated as singular. Default 1e-5.
-    /// From the target to 1.
+    /// Relative residual above which the step is refused and the matrix treated as singular; a residual above it before
+    /// refinement already asks for a factorisation with delayed pivots. Default 1e-5. From the target to 1.
     pub residual_limit: f64,
     /// Refinement steps per system. Default 10.
     pub max_refinements: usize,

@@ -80,6 +80,20 @@ impl Supernodal {
 }
 
 impl Supernodal {
+    /// Supernode of each index of the matrix.
+    pub(super) fn supernode_of_index(&self) -> Vec<usize> {
+        let size = self.subdiagonal.len();
+        let mut of = vec![0; size];
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return of };
+        let forward = self.symbolic.perm().map(|permutation| permutation.arrays().0);
+        for s in 0..symbolic.n_supernodes() {
+            for position in symbolic.supernode_begin()[s]..symbolic.supernode_end()[s] {
+                of[forward.map_or(position, |forward| forward[position])] = s;
+            }
+        }
+        of
+    }
+
     /// Multiplications and additions of a factorisation.
     pub(super) fn flops(&self) -> f64 {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return f64::INFINITY };

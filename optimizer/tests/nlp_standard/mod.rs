@@ -4,6 +4,7 @@
 pub mod hock_schittkowski;
 pub mod hyper_dual;
 pub mod sparse;
+pub mod swing_up;
 
 use gait_optimizer::nlp::{NonlinearProgram, SparsityPattern};
 pub use hyper_dual::Dual;
