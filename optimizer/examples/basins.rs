@@ -1,7 +1,8 @@
 //! Which local optima the cold guesses reach: objective, Gait RMSE and iterations of each.
 //!
-//! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--grid off]`: the guesses of the
-//! catalogue, or with `--grid on` a grid of timings, knee flexions, strides and barriers; one CSV row each.
+//! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--guesses 14] [--grid off]`:
+//! so many guesses of a cold start, or with `--grid on` a grid of timings, knee flexions, strides and barriers; one CSV row
+//! each.
 
 mod arguments;
 
@@ -12,7 +13,7 @@ use std::error::Error;
 fn main() -> Result<(), Box<dyn Error>> {
     let threads: usize = argument("--threads", "2").parse()?;
     let muscles = argument("--muscles", "on") == "on";
-    let mut guesses = ColdGuess::CATALOGUE.to_vec();
+    let mut guesses = ColdGuess::first(argument("--guesses", "14").parse()?, muscles);
     if argument("--grid", "off") == "on" {
         guesses.clear();
         for base in [ColdGuess::NATURAL, ColdGuess::EARLY_RISE] {

@@ -1,7 +1,7 @@
 //! What a solve tries: a warm start, then cold guesses side by side; which attempt is the answer; and what becomes of it
 //! between its mesh points.
 
-use super::cold_guesses::{ColdGuess, ColdRoute};
+use super::cold_guesses::ColdGuess;
 use super::run::{Context, Run};
 use super::warm_start::Start;
 use super::{Attempt, BasinChoice, IterationRecord, Phase, SolveError, SolveStatus};
@@ -233,16 +233,17 @@ pub(super) fn try_guesses(
 /// iterations, and bounds that have a gait rarely end there from so many guesses.
 const MOST_INFEASIBLE: usize = 3;
 
-/// Tries the guesses of the catalogue: the first ones side by side, the others while nothing has come of any.
+/// Tries the guesses that are asked for side by side, what is left of the catalogue while nothing has come of any.
 pub(super) fn try_catalogue(
     context: &Context<'_>,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Vec<Tried>, SolveError> {
-    let (first, others) = ColdGuess::CATALOGUE.split_at(context.options.cold_guesses);
+    let muscles = context.problem.muscles;
+    let asked_for = context.options.cold_guesses;
+    let guesses = ColdGuess::first(asked_for.max(ColdGuess::CATALOGUE.len()), muscles);
+    let (first, others) = guesses.split_at(asked_for);
     let mut tried = try_guesses(context, first, 0, observer)?;
-    // Without muscles all routes are one.
-    let differs = |guess: &&ColdGuess| context.problem.muscles || guess.route == ColdRoute::Direct;
-    for guess in others.iter().filter(|_| context.options.retry).filter(differs) {
+    for guess in others.iter().filter(|guess| context.options.retry && ColdGuess::CATALOGUE.contains(guess)) {
         let infeasible = tried.iter().filter(|t| t.choice.status == SolveStatus::Infeasible).count();
         if tried.iter().any(Tried::is_final) || infeasible >= MOST_INFEASIBLE {
             break;

@@ -27,7 +27,7 @@ const WHOLE_HESSIAN: f64 = 1e6;
 const KNEE: usize = 2;
 
 /// Share of the stride that each domain of a cold guess takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum GuessTiming {
     /// Both steps alike.
@@ -35,6 +35,14 @@ pub enum GuessTiming {
     Even,
     /// The step on the prosthesis rises early onto its toe, the other late.
     EarlyRise,
+    /// When each stance foot rises onto its toe: 0, early in its step (at 0.15 of the stride after the first strike), to 1, late
+    /// (at 0.36).
+    Rises {
+        /// Foot of the prosthesis.
+        right: f64,
+        /// The other one.
+        left: f64,
+    },
 }
 
 impl GuessTiming {
@@ -42,6 +50,9 @@ impl GuessTiming {
         match self {
             Self::Even => EVEN_TIMING,
             Self::EarlyRise => [0.0, 0.04, 0.06, 0.15, 0.5, 0.54, 0.56, 0.86, 1.0],
+            Self::Rises { right, left } => {
+                [0.0, 0.04, 0.06, 0.15 + 0.21 * right, 0.5, 0.54, 0.56, 0.65 + 0.21 * left, 1.0]
+            }
         }
     }
 }
@@ -124,11 +135,11 @@ impl ColdGuess {
     /// With muscles mostly the basin with the lowest objective and a stiff swing knee.
     pub const EARLY_RISE: Self = Self { timing: GuessTiming::EarlyRise, curvature_from: 0.3, ..Self::NATURAL };
 
-    /// The guesses of a cold start: the first [`SolveOptions::cold_guesses`](super::SolveOptions) of them are tried, the
-    /// others one after the other only while none has converged.
+    /// What a cold start tries: the first [`SolveOptions::cold_guesses`](super::SolveOptions) in any case, the
+    /// others one after the other while none has converged, [perturbed](Self::perturbed) ones where more are asked for.
     /// The timing decides the basin most (with muscles: natural or stiff swing knee), then when the curvature of the
     /// constraints counts; route, knee flexion, stride and barrier hardly matter (`examples/basins.rs`).
-    pub const CATALOGUE: [Self; 11] = [
+    pub const CATALOGUE: [Self; 14] = [
         Self::NATURAL,
         Self::EARLY_RISE,
         Self { curvature_from: WHOLE_HESSIAN, ..Self::NATURAL },
@@ -140,7 +151,41 @@ impl ColdGuess {
         Self { strategy: CostStrategy::MoreRegularisation, ..Self::NATURAL },
         Self { strategy: CostStrategy::AdaptiveBarrier, ..Self::NATURAL },
         Self { strategy: CostStrategy::EarlyElasticPhase, ..Self::NATURAL },
+        Self { timing: GuessTiming::Rises { right: 0.0, left: 0.0 }, ..Self::NATURAL },
+        Self { timing: GuessTiming::Rises { right: 1.0, left: 0.0 }, ..Self::NATURAL },
+        Self { timing: GuessTiming::Rises { right: 1.0, left: 1.0 }, ..Self::NATURAL },
     ];
+
+    /// The most guesses of one cold start.
+    pub const MOST: usize = 64;
+
+    /// The first guesses of a cold start: the catalogue, then perturbed ones. Without muscles all routes are one, so only
+    /// [`ColdRoute::Direct`] is among them.
+    pub fn first(count: usize, muscles: bool) -> Vec<Self> {
+        let catalogue = Self::CATALOGUE.into_iter().filter(|guess| muscles || guess.route == ColdRoute::Direct);
+        catalogue.chain((0..Self::MOST).map(Self::perturbed)).take(count).collect()
+    }
+
+    /// A guess with another timing, stride, knee and beginning of the constraints' curvature. The numbers fill their ranges
+    /// evenly, whatever their count: multiples of the powers of one irrational number, modulo 1 (Roberts 2018, *The
+    /// unreasonable effectiveness of quasirandom sequences*).
+    pub fn perturbed(number: usize) -> Self {
+        // x^7 = x + 1: six coordinates.
+        const BASE: f64 = 1.112_775_684_278_705_5;
+        let draw = |coordinate: i32, low: f64, high: f64| {
+            let share = (0.5 + (number + 1) as f64 * BASE.powi(-coordinate)).fract();
+            // Three decimals: what a label says is what was tried.
+            (1e3 * (low + share * (high - low))).round() / 1e3
+        };
+        Self {
+            timing: GuessTiming::Rises { right: draw(1, 0.0, 1.0), left: draw(2, 0.0, 1.0) },
+            stride_time_s: draw(3, 1.0, 1.35),
+            stride_length_m: draw(4, 1.0, 1.4),
+            knee_flexion: draw(5, 0.7, 1.2),
+            curvature_from: draw(6, 0.03, 0.5),
+            ..Self::NATURAL
+        }
+    }
 
     /// Checks every field.
     ///
@@ -150,6 +195,10 @@ impl ColdGuess {
         ModelError::check_range("guess.knee_flexion", self.knee_flexion, 0.0, 2.0)?;
         ModelError::check_range("guess.stride_time_s", self.stride_time_s, 0.5, 3.0)?;
         ModelError::check_range("guess.stride_length_m", self.stride_length_m, 0.4, 2.0)?;
+        if let GuessTiming::Rises { right, left } = self.timing {
+            ModelError::check_range("guess.timing.right", right, 0.0, 1.0)?;
+            ModelError::check_range("guess.timing.left", left, 0.0, 1.0)?;
+        }
         ModelError::check_range("guess.barrier", self.barrier, 1e-9, 1.0)?;
         ModelError::check_range("guess.curvature_from", self.curvature_from, 0.0, WHOLE_HESSIAN)?;
         Ok(())
@@ -205,10 +254,15 @@ impl ColdGuess {
             label.push_str(", ");
             label.push_str(strategy);
         }
-        let normal = match self.timing {
-            GuessTiming::Even => Self::NATURAL,
-            GuessTiming::EarlyRise => Self::EARLY_RISE,
-        };
+        if let GuessTiming::Rises { right, left } = self.timing {
+            let when = |rise: f64| match rise {
+                0.0 => "early".to_owned(),
+                1.0 => "late".to_owned(),
+                between => format!("at {between}"),
+            };
+            label.push_str(&format!(", rises {} right, {} left", when(right), when(left)));
+        }
+        let normal = if self.timing == GuessTiming::EarlyRise { Self::EARLY_RISE } else { Self::NATURAL };
         for (name, value, usual, unit) in [
             ("knee flexion x", self.knee_flexion, normal.knee_flexion, ""),
             ("stride time ", self.stride_time_s, normal.stride_time_s, " s"),
@@ -225,5 +279,35 @@ impl ColdGuess {
             }
         }
         label
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn guesses_are_valid_and_differ() {
+        for muscles in [false, true] {
+            let guesses = ColdGuess::first(ColdGuess::MOST, muscles);
+            assert_eq!(guesses.len(), ColdGuess::MOST);
+            guesses.iter().for_each(|guess| guess.validate().unwrap());
+            let labels: HashSet<String> = guesses.iter().map(ColdGuess::label).collect();
+            assert_eq!(labels.len(), ColdGuess::MOST);
+            assert_eq!(guesses[..2], [ColdGuess::NATURAL, ColdGuess::EARLY_RISE]);
+        }
+        assert!(ColdGuess::first(ColdGuess::MOST, false).iter().all(|guess| guess.route == ColdRoute::Direct));
+    }
+
+    #[test]
+    fn a_label_says_what_was_perturbed() {
+        assert_eq!(ColdGuess::CATALOGUE[12].label(), "cold, direct, rises late right, early left");
+        assert_eq!(
+            ColdGuess::perturbed(0).label(),
+            "cold, direct, rises at 0.399 right, at 0.308 left, knee flexion x0.743, stride time 1.079 s, \
+             stride length 1.061 m, curvature from violation 0.518"
+        );
     }
 }

@@ -19,7 +19,7 @@ pub struct SolveOptions {
     /// Threads, 1 to 16: for the cold guesses side by side, then for the linear algebra of each. The result does not
     /// depend on it.
     pub threads: usize,
-    /// How many guesses of [`ColdGuess::CATALOGUE`] a cold start tries, whatever becomes of them.
+    /// How many guesses a cold start tries, whatever becomes of them ([`ColdGuess::first`]). 1 to [`ColdGuess::MOST`].
     pub cold_guesses: usize,
     /// Whether the other guesses follow, one after the other, until one converges.
     pub retry: bool,
@@ -59,7 +59,7 @@ impl SolveOptions {
         ModelError::check_range("tolerance", self.tolerance, 1e-10, 1e-2)?;
         ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
-        ModelError::check_range("cold_guesses", self.cold_guesses as f64, 1.0, ColdGuess::CATALOGUE.len() as f64)?;
+        ModelError::check_range("cold_guesses", self.cold_guesses as f64, 1.0, ColdGuess::MOST as f64)?;
         self.basin_choice.validate()?;
         ModelError::check_range("tightening_rounds", self.tightening_rounds as f64, 0.0, 20.0)?;
         solver_settings::validate(&self.solver)?;

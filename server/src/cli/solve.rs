@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 const MOST_THREADS: usize = 16;
 
 fn cold_guesses(text: &str) -> Result<usize, String> {
-    whole(text, 1, ColdGuess::CATALOGUE.len())
+    whole(text, 1, ColdGuess::MOST)
 }
 
 #[derive(Debug, Args)]
