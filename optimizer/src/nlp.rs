@@ -5,7 +5,8 @@
 //!
 //! `solve` -> `formulation` (slacks, fixed variables, scaling) -> `interior_point` { `optimality`, `barrier`,
 //! `inertia_correction`, `newton` (assembly in `kkt`, factorisation behind `kkt_solver`: `multifrontal` (`front`,
-//! `null_space`, `bunch_kaufman`, `dense_kernels`), `supernodal` or `delayed_pivots`, chosen in `linear_solver`),
+//! `null_space`, `bunch_kaufman`, `dense_kernels`), `supernodal` or `delayed_pivots`, chosen in `linear_solver`,
+//! fallbacks analysed when they are needed (`lazy_solver`)),
 //! `line_search` with `filter`, and `feasibility` when the line search fails } -> `status::NlpResult`.
 
 mod barrier;
@@ -21,6 +22,7 @@ mod inertia_correction;
 mod interior_point;
 mod kkt;
 mod kkt_solver;
+mod lazy_solver;
 mod line_search;
 mod linear_solver;
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::formulation::{Formulation, RowKind};
 use super::front::PivotKind;
 use super::kkt::KktMatrix;
 use super::kkt_solver::{Change, Inertia, KktSolver};
+use super::lazy_solver::LazySolver;
 use super::multifrontal::Multifrontal;
 use super::ordering;
 use super::settings::{LinearSolver, NlpSettings};
@@ -25,7 +26,6 @@ pub(super) fn choose(
     settings: &NlpSettings,
 ) -> Result<Box<dyn KktSolver>, NlpError> {
     let supernodal = |order| Supernodal::new(&matrix.column_starts, &matrix.row_indices, order);
-    let delayed = |front_of: &[usize]| DelayedPivots::new(&matrix.column_starts, &matrix.row_indices, front_of);
     let multifrontal = |front_of: &[usize], kinds: &[PivotKind], threads| {
         Multifrontal::new(&matrix.column_starts, &matrix.row_indices, front_of, kinds, threads)
     };
@@ -40,18 +40,14 @@ pub(super) fn choose(
             return Ok(Box::new(multifrontal(&vec![0; matrix.order], &alike, settings.threads)?));
         }
         let minimum_degree = supernodal(None)?;
-        let trusted = delayed(&minimum_degree.supernode_of_index());
-        return Ok(alone_or_trusted(settings.linear_solver, minimum_degree, trusted));
+        let front_of = minimum_degree.supernode_of_index();
+        return Ok(with_trusted(settings.linear_solver, minimum_degree, delayed(matrix, front_of)));
     };
     let front_of = ordering::block_of_index_raised(form, blocks);
-    let trusted = delayed(&front_of);
+    let trusted = delayed(matrix, front_of.clone());
     let other = supernodal(Some(ordering::block_order(form, blocks)))?;
     if matches!(settings.linear_solver, LinearSolver::Supernodal | LinearSolver::DelayedPivots) {
-        return Ok(alone_or_trusted(settings.linear_solver, other, trusted));
-    }
-    let plain = multifrontal(&front_of, &alike, settings.threads)?;
-    if settings.linear_solver == LinearSolver::Auto && plain.flops() > WORTHWHILE * other.flops() {
-        return Ok(alone_or_trusted(settings.linear_solver, other, trusted));
+        return Ok(with_trusted(settings.linear_solver, other, trusted));
     }
     let variables = std::iter::repeat_n(PivotKind::Variable, form.n);
     let rows = form.rows.iter().map(|row| match row {
@@ -59,21 +55,30 @@ pub(super) fn choose(
         RowKind::Inequality(_) | RowKind::Free => PivotKind::Other,
     });
     let two_stages = multifrontal(&front_of, &variables.chain(rows).collect::<Vec<_>>(), settings.threads)?;
-    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), Box::new(plain)];
+    if settings.linear_solver == LinearSolver::Auto && two_stages.flops() > WORTHWHILE * other.flops() {
+        return Ok(with_trusted(settings.linear_solver, other, trusted));
+    }
+    let (starts, indices, threads) = (matrix.column_starts.clone(), matrix.row_indices.clone(), settings.threads);
+    let plain =
+        LazySolver::new(move || Ok(Box::new(Multifrontal::new(&starts, &indices, &front_of, &alike, threads)?)));
+    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), plain];
     if settings.linear_solver == LinearSolver::Auto {
-        methods.push(Box::new(trusted));
+        methods.push(trusted);
     }
     Ok(Box::new(Ladder::new(methods)))
 }
 
-/// The supernodal factorisation, the one with delayed pivots, or (auto) the second after the first.
-fn alone_or_trusted(setting: LinearSolver, supernodal: Supernodal, trusted: DelayedPivots) -> Box<dyn KktSolver> {
+fn delayed(matrix: &KktMatrix, front_of: Vec<usize>) -> Box<dyn KktSolver> {
+    let (starts, indices) = (matrix.column_starts.clone(), matrix.row_indices.clone());
+    LazySolver::new(move || Ok(Box::new(DelayedPivots::new(&starts, &indices, &front_of))))
+}
+
+/// The supernodal factorisation, the one to be trusted, or (auto) the second after the first.
+fn with_trusted(setting: LinearSolver, supernodal: Supernodal, trusted: Box<dyn KktSolver>) -> Box<dyn KktSolver> {
     match setting {
         LinearSolver::Supernodal => Box::new(supernodal),
-        LinearSolver::DelayedPivots => Box::new(trusted),
-        LinearSolver::Auto | LinearSolver::Multifrontal => {
-            Box::new(Ladder::new(vec![Box::new(supernodal), Box::new(trusted)]))
-        }
+        LinearSolver::DelayedPivots => trusted,
+        LinearSolver::Auto | LinearSolver::Multifrontal => Box::new(Ladder::new(vec![Box::new(supernodal), trusted])),
     }
 }
 
