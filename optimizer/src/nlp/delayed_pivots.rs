@@ -7,7 +7,7 @@
 //! symmetric linear equations*, ACM TOMS 9, 1983; test for pivots of order two as in their section 4); what finds no
 //! acceptable pivot is delayed to the parent front. The matrix is scaled symmetrically before, by powers of two.
 //!
-//! One thread, plain loops: it is asked only where the faster ones are in doubt.
+//! One thread, plain loops, memory taken when a front first needs it: it is asked only where the faster ones are in doubt.
 
 use super::bunch_kaufman::{Pivots, exchange, inverse_pair};
 use super::dense_kernels::all_finite;
