@@ -13,10 +13,8 @@ pub(super) enum LazySolver {
 }
 
 impl LazySolver {
-    pub(super) fn new(
-        analysis: impl FnOnce() -> Result<Box<dyn KktSolver>, NlpError> + Send + 'static,
-    ) -> Box<dyn KktSolver> {
-        Box::new(Self::Waiting(Box::new(analysis)))
+    pub(super) fn new(analysis: impl FnOnce() -> Result<Box<dyn KktSolver>, NlpError> + Send + 'static) -> Self {
+        Self::Waiting(Box::new(analysis))
     }
 
     fn ready(&self) -> Option<&dyn KktSolver> {

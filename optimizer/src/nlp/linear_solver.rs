@@ -61,7 +61,7 @@ pub(super) fn choose(
     let (starts, indices, threads) = (matrix.column_starts.clone(), matrix.row_indices.clone(), settings.threads);
     let plain =
         LazySolver::new(move || Ok(Box::new(Multifrontal::new(&starts, &indices, &front_of, &alike, threads)?)));
-    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), plain];
+    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), Box::new(plain)];
     if settings.linear_solver == LinearSolver::Auto {
         methods.push(trusted);
     }
@@ -70,7 +70,7 @@ pub(super) fn choose(
 
 fn delayed(matrix: &KktMatrix, front_of: Vec<usize>) -> Box<dyn KktSolver> {
     let (starts, indices) = (matrix.column_starts.clone(), matrix.row_indices.clone());
-    LazySolver::new(move || Ok(Box::new(DelayedPivots::new(&starts, &indices, &front_of))))
+    Box::new(LazySolver::new(move || Ok(Box::new(DelayedPivots::new(&starts, &indices, &front_of)))))
 }
 
 /// The supernodal factorisation, the one to be trusted, or (auto) the second after the first.

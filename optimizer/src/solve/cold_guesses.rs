@@ -260,7 +260,9 @@ impl ColdGuess {
                 1.0 => "late".to_owned(),
                 between => format!("at {between}"),
             };
-            label.push_str(&format!(", rises {} right, {} left", when(right), when(left)));
+            for part in [", rises ", &when(right), " right, ", &when(left), " left"] {
+                label.push_str(part);
+            }
         }
         let normal = if self.timing == GuessTiming::EarlyRise { Self::EARLY_RISE } else { Self::NATURAL };
         for (name, value, usual, unit) in [
@@ -293,7 +295,9 @@ mod tests {
         for muscles in [false, true] {
             let guesses = ColdGuess::first(ColdGuess::MOST, muscles);
             assert_eq!(guesses.len(), ColdGuess::MOST);
-            guesses.iter().for_each(|guess| guess.validate().unwrap());
+            for guess in &guesses {
+                guess.validate().unwrap();
+            }
             let labels: HashSet<String> = guesses.iter().map(ColdGuess::label).collect();
             assert_eq!(labels.len(), ColdGuess::MOST);
             assert_eq!(guesses[..2], [ColdGuess::NATURAL, ColdGuess::EARLY_RISE]);
