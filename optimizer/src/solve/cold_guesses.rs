@@ -311,7 +311,7 @@ mod tests {
         assert_eq!(
             ColdGuess::perturbed(0).label(),
             "cold, direct, rises at 0.399 right, at 0.308 left, knee flexion x0.743, stride time 1.079 s, \
-             stride length 1.061 m, curvature from violation 0.518"
+             stride length 1.061 m, curvature from violation 0.043"
         );
     }
 }
