@@ -126,8 +126,11 @@ fn bounds_that_leave_no_posture_are_tried_all_the_same() {
         "cold, direct, more regularisation",
         "cold, direct, adaptive barrier",
         "cold, direct, early elastic phase",
+        "cold, direct, rises early right, early left",
+        "cold, direct, rises late right, early left",
+        "cold, direct, rises late right, late left",
     ];
-    for (bounds, retry, tried) in [("a6=0,a7=10,a8=10", true, 9), ("a7=5,a8=5", false, 3)] {
+    for (bounds, retry, tried) in [("a6=0,a7=10,a8=10", true, 12), ("a7=5,a8=5", false, 3)] {
         let attempt = |warm: Option<&WarmStart>, retry: bool| {
             let options = SolveOptions { max_iterations: 15, retry, ..SolveOptions::default() };
             solve(&problem(bounds), warm, &options, &mut |_| {}, &CancelToken::new()).unwrap()
