@@ -5,6 +5,7 @@
 //! [--threads 1]`: one CSV row each, counts and medians at the end.
 
 mod arguments;
+mod median;
 mod splitmix;
 mod tuned_actions;
 
@@ -13,9 +14,10 @@ use gait_optimizer::certificate::certify;
 use gait_optimizer::{
     CancelToken, Gait, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
+use median::median;
 use splitmix::SplitMix;
 use std::error::Error;
-use tuned_actions::{LEVELS, median};
+use tuned_actions::LEVELS;
 
 /// Objections in one cell; empty: passed.
 fn objections(gait: &Gait) -> Result<String, Box<dyn Error>> {

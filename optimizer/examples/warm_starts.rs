@@ -5,6 +5,7 @@
 //! (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end.
 
 mod arguments;
+mod median;
 mod splitmix;
 mod tuned_actions;
 
@@ -12,9 +13,10 @@ use arguments::argument;
 use gait_optimizer::{
     CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
+use median::median;
 use splitmix::SplitMix;
 use std::error::Error;
-use tuned_actions::{LEVELS, median};
+use tuned_actions::LEVELS;
 
 fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {
     let options = SolveOptions { threads, ..SolveOptions::default() };

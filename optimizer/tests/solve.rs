@@ -243,3 +243,17 @@ fn one_and_two_threads_give_the_same_bits_in_no_more_iterations_than_before() {
     assert_eq!(one.warm_start, two.warm_start);
     assert_eq!(one.gait, two.gait);
 }
+
+/// The answer is moved back into bounds that the solver widened: by so little that a tight tolerance is still met.
+#[test]
+fn the_tightest_tolerance_that_is_permitted_is_met() {
+    let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
+    for tolerance in [1e-8, 1e-10] {
+        let options = SolveOptions { tolerance, cold_guesses: 1, retry: false, ..SolveOptions::default() };
+        let report = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new()).unwrap().report;
+        assert_eq!(report.status, SolveStatus::Converged, "{tolerance}");
+        assert!(report.max_violation < 1e-7, "{tolerance}: {}", report.max_violation);
+        let optimality = report.optimality.unwrap();
+        assert!(optimality.dual_infeasibility <= tolerance, "{tolerance}: {optimality:?}");
+    }
+}

@@ -1,4 +1,4 @@
-//! The values that are tuned, and medians of what is measured over them.
+//! The values that are tuned.
 
 /// Levels of Table I (Li et al. 2022).
 pub(crate) const LEVELS: [&[f64]; 8] = [
@@ -11,14 +11,3 @@ pub(crate) const LEVELS: [&[f64]; 8] = [
     &[20.0, 35.0, 50.0],
     &[20.0, 30.0, 40.0],
 ];
-
-/// Median; not a number of nothing.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        odd if odd % 2 == 1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
-    }
-}

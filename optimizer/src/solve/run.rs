@@ -169,8 +169,7 @@ impl<'a> Run<'a> {
         if Self::interrupted(&tracked) {
             return Ok(tracked);
         }
-        let tolerance = self.context.options.tolerance;
-        let usual = NlpSettings { tolerance, mu_initial: guess.barrier, ..every_phase };
+        let usual = NlpSettings { mu_initial: guess.barrier, ..self.last_phase(&every_phase) };
         self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), &guess.strategy.applied(&usual))
     }
 
@@ -187,13 +186,19 @@ impl<'a> Run<'a> {
             programme,
             &StartPoint::Warm(point),
             &NlpSettings {
-                tolerance: self.context.options.tolerance,
                 mu_initial: MU_COST,
                 warm_bound_push: 1e-7,
                 warm_bound_fraction: 1e-7,
-                ..self.context.options.solver
+                ..self.last_phase(&self.context.options.solver)
             },
         )
+    }
+
+    /// With the tolerance of the answer. The answer is moved back into its bounds, which rows answer with up to a hundred
+    /// times the way: bounds are widened by little beside the tolerance.
+    fn last_phase(&self, settings: &NlpSettings) -> NlpSettings {
+        let tolerance = self.context.options.tolerance;
+        NlpSettings { tolerance, bound_relaxation: settings.bound_relaxation.min(0.01 * tolerance), ..*settings }
     }
 }
 

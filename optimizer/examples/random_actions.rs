@@ -1,0 +1,31 @@
+//! Random actions of Table I, all different, as `gaitwright sweep --actions` reads them.
+//!
+//! `cargo run --release -p gait-optimizer --example random_actions -- [--count 200] [--seed 1] > actions.csv`
+
+mod arguments;
+mod splitmix;
+mod tuned_actions;
+
+use arguments::argument;
+use splitmix::SplitMix;
+use std::collections::HashSet;
+use std::error::Error;
+use tuned_actions::LEVELS;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let count: usize = argument("--count", "200").parse()?;
+    let mut random = SplitMix(argument("--seed", "1").parse()?);
+    let all: usize = LEVELS.iter().map(|levels| levels.len()).product();
+    if count > all {
+        return Err(format!("--count: Table I has {all} actions").into());
+    }
+    println!("a1,a2,a3,a4,a5,a6,a7,a8");
+    let mut drawn = HashSet::new();
+    while drawn.len() < count {
+        let action = LEVELS.map(|levels| levels[random.below(levels.len())].to_string()).join(",");
+        if drawn.insert(action.clone()) {
+            println!("{action}");
+        }
+    }
+    Ok(())
+}
