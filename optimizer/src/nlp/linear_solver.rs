@@ -93,11 +93,27 @@ struct Ladder {
     /// Which holds the present factor.
     in_use: usize,
     fallbacks: usize,
+    /// Matrices in a row that were distrusted.
+    doubts: usize,
+    /// Matrices that the most trusted method has still to factorise without asking the others.
+    trusted_only: usize,
 }
+
+/// Matrices in a row that are distrusted before the next ones go to the most trusted method at once, and how many do.
+const DOUBTS: usize = 3;
+const TRUSTED_ONLY: usize = 20;
 
 impl Ladder {
     fn new(methods: Vec<Box<dyn KktSolver>>) -> Self {
-        Self { up_to_date: vec![false; methods.len()], methods, first: 0, in_use: 0, fallbacks: 0 }
+        Self {
+            up_to_date: vec![false; methods.len()],
+            methods,
+            first: 0,
+            in_use: 0,
+            fallbacks: 0,
+            doubts: 0,
+            trusted_only: 0,
+        }
     }
 }
 
@@ -106,7 +122,14 @@ impl KktSolver for Ladder {
         // What was distrusted stays so while only the diagonal changes.
         if change == Change::Any {
             self.up_to_date.fill(false);
-            self.first = 0;
+            if self.trusted_only == 0 {
+                self.doubts = if self.first > 0 { self.doubts + 1 } else { 0 };
+                if self.doubts == DOUBTS {
+                    (self.doubts, self.trusted_only) = (0, TRUSTED_ONLY);
+                }
+            }
+            self.first = if self.trusted_only > 0 { self.methods.len() - 1 } else { 0 };
+            self.trusted_only = self.trusted_only.saturating_sub(1);
         }
         for (k, method) in self.methods.iter_mut().enumerate().skip(self.first) {
             if !method.suits(values) {
