@@ -4,11 +4,11 @@
 use std::time::Instant;
 
 use super::barrier::{self, DAMPING};
+use super::factorisation::Change;
 use super::feasibility;
 use super::filter::Filter;
 use super::formulation::{Formulation, Goal, RowKind};
 use super::inertia_correction::InertiaCorrection;
-use super::kkt_solver::Change;
 use super::line_search::Search;
 use super::newton::{Linearisation, NewtonSystem, PrimalDual, largest};
 use super::optimality::Optimality;

@@ -13,10 +13,10 @@
 
 use std::time::Instant;
 
-use super::dense_kernels::{all_finite, largest_magnitude};
+use super::factorisation::{Change, Inertia, KktSolver};
+use super::factorisation::{all_finite, largest_magnitude};
 use super::formulation::Formulation;
 use super::kkt::KktMatrix;
-use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::settings::NlpSettings;
 
 /// A point or a direction: w, row multipliers, bound multipliers.

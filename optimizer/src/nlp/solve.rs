@@ -3,12 +3,11 @@
 use std::time::Instant;
 
 use super::barrier;
+use super::factorisation::{self, check_blocks};
 use super::formulation::{Formulation, RowKind, entries};
 use super::interior_point::{Ending, Run, Session, StepRecord};
 use super::kkt::KktMatrix;
-use super::linear_solver;
 use super::newton::{NewtonSystem, PrimalDual};
-use super::ordering;
 use super::problem::NonlinearProgram;
 use super::settings::{BoundMultiplierStart, NlpSettings};
 use super::start::{StartPoint, WarmPoint};
@@ -32,7 +31,7 @@ pub fn solve(
     settings.validate()?;
     let mut form = Formulation::new(problem, settings)?;
     if let Some(blocks) = problem.elimination_blocks() {
-        ordering::check_blocks(&form, blocks)?;
+        check_blocks(&form, blocks)?;
     }
     check_start(&form, start)?;
 
@@ -73,7 +72,7 @@ pub fn solve(
 
     let analysis = Instant::now();
     let matrix = KktMatrix::new(&run.form);
-    let solver = linear_solver::choose(&run.form, &matrix, settings)?;
+    let solver = factorisation::choose(&run.form, &matrix, settings)?;
     let analysis = analysis.elapsed().as_secs_f64();
     let mut session = Session {
         settings,

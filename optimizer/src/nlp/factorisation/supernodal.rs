@@ -12,7 +12,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
 use super::kkt_solver::{Change, Inertia, KktSolver};
-use super::status::NlpError;
+use crate::nlp::status::NlpError;
 
 /// Analysis, factor and workspace.
 pub(super) struct Supernodal {

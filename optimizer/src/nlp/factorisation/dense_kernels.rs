@@ -114,7 +114,7 @@ pub(super) fn sum_of_lanes(sums: &[f64; LANES]) -> f64 {
 
 /// Largest |v_i|; numbers that are none do not count.
 #[inline(always)]
-pub(super) fn largest_magnitude(values: &[f64]) -> f64 {
+pub(in crate::nlp) fn largest_magnitude(values: &[f64]) -> f64 {
     let larger = |a: f64, v: f64| if v.abs() > a { v.abs() } else { a };
     let mut largest = [0.0; LANES];
     let (blocks, rest) = values.as_chunks::<LANES>();
@@ -136,7 +136,7 @@ pub(super) fn largest_entry(values: &[f64], first: usize) -> (f64, usize) {
 
 /// Whether all values are finite.
 #[inline(always)]
-pub(super) fn all_finite(values: &[f64]) -> bool {
+pub(in crate::nlp) fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0f64; LANES];
     let (blocks, rest) = values.as_chunks::<LANES>();
     for block in blocks {

@@ -4,10 +4,10 @@
 //! it is structurally matched with, so that no supernode begins with a lone row, whose diagonal may be zero.
 //! Without: approximate minimum degree, left to the factorisation.
 
-use super::formulation::{Formulation, RowKind};
-use super::kkt::couplings;
-use super::problem::EliminationBlocks;
-use super::status::NlpError;
+use crate::nlp::formulation::{Formulation, RowKind};
+use crate::nlp::kkt::couplings;
+use crate::nlp::problem::EliminationBlocks;
+use crate::nlp::status::NlpError;
 
 /// Block of each index of the KKT matrix (variables, then rows).
 pub(super) fn block_of_index(blocks: &EliminationBlocks) -> Vec<usize> {
@@ -15,7 +15,7 @@ pub(super) fn block_of_index(blocks: &EliminationBlocks) -> Vec<usize> {
 }
 
 /// Checks that blocks form a forest and couple only along its branches.
-pub(super) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Result<(), NlpError> {
+pub(in crate::nlp) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Result<(), NlpError> {
     let fail = |what: String| Err(NlpError::InvalidProblem(format!("elimination blocks: {what}")));
     let count = blocks.parent.len();
     if blocks.block_of_variable.len() != form.n || blocks.block_of_row.len() != form.m {

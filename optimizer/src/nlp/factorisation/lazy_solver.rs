@@ -1,7 +1,7 @@
 //! A factorisation that is analysed when it is first needed: fallbacks mostly are not.
 
 use super::kkt_solver::{Change, Inertia, KktSolver};
-use super::status::NlpError;
+use crate::nlp::status::NlpError;
 
 type Analysis = Box<dyn FnOnce() -> Result<Box<dyn KktSolver>, NlpError> + Send>;
 

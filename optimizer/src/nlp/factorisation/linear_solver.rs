@@ -1,16 +1,16 @@
 //! Choice of the factorisation, and the way back from a failed one.
 
 use super::delayed_pivots::DelayedPivots;
-use super::formulation::{Formulation, RowKind};
 use super::front::PivotKind;
-use super::kkt::KktMatrix;
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::lazy_solver::LazySolver;
 use super::multifrontal::Multifrontal;
 use super::ordering;
-use super::settings::{LinearSolver, NlpSettings};
-use super::status::NlpError;
 use super::supernodal::Supernodal;
+use crate::nlp::formulation::{Formulation, RowKind};
+use crate::nlp::kkt::KktMatrix;
+use crate::nlp::settings::{LinearSolver, NlpSettings};
+use crate::nlp::status::NlpError;
 
 /// Multifrontal only while it costs at most this many times the operations of the supernodal factorisation.
 const WORTHWHILE: f64 = 4.0;
@@ -20,7 +20,7 @@ const WORTHWHILE: f64 = 4.0;
 const DENSE_ORDER: usize = 120;
 
 /// Chooses by setting and structure: the multifrontal factorisation needs elimination blocks.
-pub(super) fn choose(
+pub(in crate::nlp) fn choose(
     form: &Formulation,
     matrix: &KktMatrix,
     settings: &NlpSettings,

@@ -20,8 +20,8 @@ use super::front::{ChildMap, Front, PivotKind, Place};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::schedule::{Piece, Schedule};
-use super::status::NlpError;
 use super::substitution::Substitution;
+use crate::nlp::status::NlpError;
 
 /// Operations below which starting threads costs more than it saves.
 const WORTH_A_THREAD: f64 = 8e6;

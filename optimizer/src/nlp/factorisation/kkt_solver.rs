@@ -2,7 +2,7 @@
 
 /// Numbers of positive, negative and (numerically) zero eigenvalues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Inertia {
+pub(in crate::nlp) struct Inertia {
     pub positive: usize,
     pub negative: usize,
     pub zero: usize,
@@ -10,7 +10,7 @@ pub(super) struct Inertia {
 
 impl Inertia {
     /// Counts a pivot of order one.
-    pub(super) fn count(&mut self, d: f64) {
+    pub(in crate::nlp) fn count(&mut self, d: f64) {
         if d > 0.0 {
             self.positive += 1;
         } else if d < 0.0 {
@@ -21,7 +21,7 @@ impl Inertia {
     }
 
     /// Counts a symmetric pivot [a e; e b] of order two.
-    pub(super) fn count_pair(&mut self, a: f64, e: f64, b: f64) {
+    pub(in crate::nlp) fn count_pair(&mut self, a: f64, e: f64, b: f64) {
         // Divided by e^2: the product of two tiny diagonals must not underflow.
         let determinant = (a / e) * (b / e) - 1.0;
         if determinant < 0.0 {
@@ -40,7 +40,7 @@ impl Inertia {
 
 /// How a matrix differs from the one factorised before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Change {
+pub(in crate::nlp) enum Change {
     Any,
     /// On the diagonal only: another regularisation.
     Diagonal,
@@ -48,7 +48,7 @@ pub(super) enum Change {
 
 /// A symmetric indefinite factorisation, analysed once for a fixed pattern. The residual of a solution is the
 /// caller's business.
-pub(super) trait KktSolver: Send {
+pub(in crate::nlp) trait KktSolver: Send {
     /// Whether the method is meant for a matrix with these values.
     fn suits(&self, _values: &[f64]) -> bool {
         true
