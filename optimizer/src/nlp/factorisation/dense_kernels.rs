@@ -28,12 +28,6 @@ fn vectors_mut<S: Simd>(values: &mut [f64]) -> &mut [S::f64s] {
     S::as_mut_simd_f64s(values).0
 }
 
-/// Entries [from, from + length) of column k.
-#[inline(always)]
-fn column<S: Simd>(x: &[f64], stride: usize, k: usize, from: usize, length: usize) -> &[S::f64s] {
-    vectors::<S>(&x[k * stride + from..][..length])
-}
-
 /// y -= f a.
 #[inline(always)]
 pub(super) fn subtract<S: Simd>(simd: S, y: &mut [f64], a: &[f64], f: f64) {
@@ -65,27 +59,42 @@ pub(super) fn subtract_columns_within<S: Simd>(
     from: usize,
     to: usize,
 ) {
-    let length = to - from;
-    let y = vectors_mut::<S>(&mut y[from..to]);
-    let (groups, rest) = terms.as_chunks::<4>();
-    for [ta, tb, tc, td] in groups {
-        let a = column::<S>(x, stride, ta.0, from, length);
-        let b = column::<S>(x, stride, tb.0, from, length);
-        let c = column::<S>(x, stride, tc.0, from, length);
-        let d = column::<S>(x, stride, td.0, from, length);
-        let (fa, fb) = (simd.splat_f64s(-ta.1), simd.splat_f64s(-tb.1));
-        let (fc, fd) = (simd.splat_f64s(-tc.1), simd.splat_f64s(-td.1));
-        for ((((y, a), b), c), d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-            let sum = simd.mul_add_f64s(*b, fb, simd.mul_add_f64s(*a, fa, *y));
-            *y = simd.mul_add_f64s(*d, fd, simd.mul_add_f64s(*c, fc, sum));
-        }
+    let per_block = LANES / S::F64_LANES;
+    let y = vectors_mut::<S>(y);
+    let (mut i, end) = (from / LANES * per_block, to / LANES * per_block);
+    while i + 4 <= end {
+        subtract_columns_tile::<S, 4>(simd, y, x, stride, terms, i);
+        i += 4;
     }
-    for &(k, f) in rest {
+    while i + 2 <= end {
+        subtract_columns_tile::<S, 2>(simd, y, x, stride, terms, i);
+        i += 2;
+    }
+    if i < end {
+        subtract_columns_tile::<S, 1>(simd, y, x, stride, terms, i);
+    }
+}
+
+/// V vectors of them, from number i on, which stay in registers.
+#[inline(always)]
+fn subtract_columns_tile<S: Simd, const V: usize>(
+    simd: S,
+    y: &mut [S::f64s],
+    x: &[f64],
+    stride: usize,
+    terms: &[(usize, f64)],
+    i: usize,
+) {
+    let Some(y) = y[i..].first_chunk_mut::<V>() else { return };
+    let mut sum = *y;
+    for &(k, f) in terms {
+        let Some(x) = vectors::<S>(&x[k * stride..][..stride])[i..].first_chunk::<V>() else { return };
         let f = simd.splat_f64s(-f);
-        for (y, a) in y.iter_mut().zip(column::<S>(x, stride, k, from, length)) {
-            *y = simd.mul_add_f64s(*a, f, *y);
+        for v in 0..V {
+            sum[v] = simd.mul_add_f64s(x[v], f, sum[v]);
         }
     }
+    *y = sum;
 }
 
 /// Dot product of vectors of padded length, in [`LANES`] partial sums.

@@ -66,6 +66,8 @@ pub(super) struct Front {
     pub reduced: usize,
     /// Length of the numbers while it is factorised.
     pub length: usize,
+    /// Which variables of stage 1 each of them couples with in the Hessian, itself included; ascending.
+    pub partners: Vec<Vec<u32>>,
     /// What solves need of them.
     pub kept: Kept,
 }
@@ -246,7 +248,14 @@ impl Front {
         }
         let tall = self.tall;
         let mirrored = |offset: usize| [offset, offset % tall * tall + offset / tall];
-        let hessian = offsets.iter().copied().filter(|&offset| offset < self.jacobian).flat_map(mirrored);
+        let hessian: Vec<usize> =
+            offsets.iter().copied().filter(|&offset| offset < self.jacobian).flat_map(mirrored).collect();
+        let mut pairs: Vec<(usize, u32)> =
+            hessian.iter().filter_map(|offset| Some((offset / tall, u32::try_from(offset % tall).ok()?))).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        self.partners = vec![Vec::new(); variables];
+        pairs.into_iter().for_each(|(variable, partner)| self.partners[variable].push(partner));
         // Free variables and deferred rows couple with any variable.
         let deferred = (0..variables).flat_map(|v| (0..self.first_other()).map(move |slot| (v, slot)));
         let own = offsets.iter().filter(|&&offset| (self.coupling..self.row_coupling).contains(&offset));
@@ -256,7 +265,7 @@ impl Front {
         let kept = Kept {
             row_coupling: BlockColumns::new(rows, self.wide, row_coupling),
             coupling: BlockColumns::new(variables, self.wide, coupling),
-            hessian: BlockColumns::new(variables, tall, hessian),
+            hessian: BlockColumns::new(variables, tall, hessian.into_iter()),
             starts: [0; 6],
         };
         let lengths = [

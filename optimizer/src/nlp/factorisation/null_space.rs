@@ -52,6 +52,8 @@ pub(super) struct Workspace {
     jacobian: Vec<f64>,
     pivot: Vec<f64>,
     terms: Vec<(usize, f64)>,
+    /// Position in the null space of each variable.
+    position: Vec<usize>,
 }
 
 impl Workspace {
@@ -65,6 +67,7 @@ impl Workspace {
             jacobian: vec![0.0; largest(&|f| f.tall * f.rows.len())],
             pivot: vec![0.0; largest(&|f| f.tall)],
             terms: Vec::with_capacity(largest(&|f| f.variables.len())),
+            position: vec![0; largest(&|f| f.variables.len())],
         }
     }
 }
@@ -122,8 +125,8 @@ pub(super) fn eliminate<S: Simd>(
         solve_for_slots(simd, front, lu, x, null_space.rank, &mut work.terms);
     }
     let rank = null_space.rank;
-    for c in 0..variables {
-        for r in c + 1..variables {
+    for (c, partners) in front.partners.iter().enumerate() {
+        for r in partners.iter().map(|&r| r as usize).filter(|&r| r > c) {
             hessian[r * tall + c] = hessian[c * tall + r];
         }
     }
@@ -159,17 +162,21 @@ pub(super) fn eliminate<S: Simd>(
         }
     }
 
+    for (k, &variable) in null_space.variables.iter().enumerate() {
+        work.position[variable] = k;
+    }
     let g = &mut work.columns[..wide * rank];
     for (position, &variable) in null_space.variables[..rank].iter().enumerate() {
         let column = &mut g[position * wide..(position + 1) * wide];
         column.copy_from_slice(&coupling[variable * wide..(variable + 1) * wide]);
         work.terms.clear();
-        for (k, &other) in (0..).zip(&null_space.variables[..rank]) {
-            let h = hessian[variable * tall + other];
-            if h != 0.0 {
-                work.terms.push((k, 0.5 * h));
+        for &partner in &front.partners[variable] {
+            let (position, h) = (work.position[partner as usize], hessian[variable * tall + partner as usize]);
+            if position < rank && h != 0.0 {
+                work.terms.push((position, 0.5 * h));
             }
         }
+        work.terms.sort_unstable_by_key(|term| term.0);
         for &(from, to) in &front.ranges {
             subtract_columns_within(simd, column, x, wide, &work.terms, from, to);
         }
