@@ -27,8 +27,17 @@ pub(super) enum PivotKind {
     Other,
 }
 
-/// Rows that stage 1 may leave to stage 2 because no variable of the front can take them.
-pub(super) const MOST_DEFERRED: usize = 3;
+/// Room of a front for rows that stage 1 leaves to stage 2 because no variable of the front can take them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RoomForDeferred {
+    /// What the padding of the columns leaves, so that it costs nothing; at most [`MOST_DEFERRED`] rows.
+    Padding,
+    /// [`MOST_DEFERRED`] rows.
+    Full,
+}
+
+/// Rows of a front that can be deferred at most.
+const MOST_DEFERRED: usize = 3;
 /// Fewer rows are not worth a stage of their own.
 const FEWEST_ROWS: usize = 6;
 
@@ -40,6 +49,8 @@ pub(super) struct Front {
     pub rows: Vec<usize>,
     /// Pivots of stage 2 only.
     pub others: Vec<usize>,
+    /// Rows that may be deferred; each takes two spare slots.
+    pub most_deferred: usize,
     /// Later indices it couples with, by elimination order.
     pub border: Vec<usize>,
     /// (position in the matrix values, offset in the numbers of the front).
@@ -135,7 +146,13 @@ impl ChildMap {
 impl Front {
     /// Front with these pivots and border. `touched`: pivots that a child contributes to; such rows have a diagonal, so
     /// they are no candidates for stage 1.
-    pub(super) fn new(pivots: &[usize], border: Vec<usize>, kinds: &[PivotKind], touched: &[bool]) -> Self {
+    pub(super) fn new(
+        pivots: &[usize],
+        border: Vec<usize>,
+        kinds: &[PivotKind],
+        touched: &[bool],
+        room: RoomForDeferred,
+    ) -> Self {
         let is_row = |i: &usize| kinds[*i] == PivotKind::Equality && !touched[*i];
         let variables: Vec<usize> = pivots.iter().copied().filter(|i| kinds[*i] == PivotKind::Variable).collect();
         let rows: Vec<usize> = pivots.iter().copied().filter(is_row).collect();
@@ -147,6 +164,11 @@ impl Front {
             front.others = pivots.to_vec();
         }
         let (variables, rows) = (front.variables.len(), front.rows.len());
+        if rows > 0 {
+            let unused = padded(front.slots()) - front.slots();
+            front.most_deferred =
+                if room == RoomForDeferred::Full { MOST_DEFERRED } else { MOST_DEFERRED.min(unused / 2) };
+        }
         let size = front.slots();
         front.tall = padded(variables);
         front.wide = padded(size);
@@ -164,7 +186,7 @@ impl Front {
 
     /// Spare slots, at the beginning.
     pub(super) fn spare(&self) -> usize {
-        if self.rows.is_empty() { 0 } else { 2 * MOST_DEFERRED }
+        2 * self.most_deferred
     }
 
     /// Slots of stage 2's pivots, spare ones included.

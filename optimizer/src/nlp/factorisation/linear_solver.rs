@@ -1,7 +1,9 @@
 //! Choice of the factorisation, and the way back from a failed one.
 
+use std::sync::Arc;
+
 use super::delayed_pivots::DelayedPivots;
-use super::front::PivotKind;
+use super::front::{PivotKind, RoomForDeferred};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::lazy_solver::LazySolver;
 use super::multifrontal::Multifrontal;
@@ -27,7 +29,8 @@ pub(in crate::nlp) fn choose(
 ) -> Result<Box<dyn KktSolver>, NlpError> {
     let supernodal = |order| Supernodal::new(&matrix.column_starts, &matrix.row_indices, order);
     let multifrontal = |front_of: &[usize], kinds: &[PivotKind], threads| {
-        Multifrontal::new(&matrix.column_starts, &matrix.row_indices, front_of, kinds, threads)
+        let room = RoomForDeferred::Padding;
+        Multifrontal::new(&matrix.column_starts, &matrix.row_indices, front_of, kinds, room, threads)
     };
     let alike = vec![PivotKind::Other; matrix.order];
     let diagonal = matrix.row_indices.len() == matrix.order;
@@ -54,14 +57,20 @@ pub(in crate::nlp) fn choose(
         RowKind::Equality(_) => PivotKind::Equality,
         RowKind::Inequality(_) | RowKind::Free => PivotKind::Other,
     });
-    let two_stages = multifrontal(&front_of, &variables.chain(rows).collect::<Vec<_>>(), settings.threads)?;
+    let kinds: Vec<PivotKind> = variables.chain(rows).collect();
+    let two_stages = multifrontal(&front_of, &kinds, settings.threads)?;
     if settings.linear_solver == LinearSolver::Auto && two_stages.flops() > WORTHWHILE * other.flops() {
         return Ok(with_trusted(settings.linear_solver, other, trusted));
     }
-    let (starts, indices, threads) = (matrix.column_starts.clone(), matrix.row_indices.clone(), settings.threads);
-    let plain =
-        LazySolver::new(move || Ok(Box::new(Multifrontal::new(&starts, &indices, &front_of, &alike, threads)?)));
-    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), Box::new(plain)];
+    let pattern = Arc::new((matrix.column_starts.clone(), matrix.row_indices.clone(), front_of));
+    let lazily = |kinds: Vec<PivotKind>| -> Box<dyn KktSolver> {
+        let (pattern, threads, room) = (pattern.clone(), settings.threads, RoomForDeferred::Full);
+        Box::new(LazySolver::new(move || {
+            let (starts, indices, front_of) = &*pattern;
+            Ok(Box::new(Multifrontal::new(starts, indices, front_of, &kinds, room, threads)?))
+        }))
+    };
+    let mut methods: Vec<Box<dyn KktSolver>> = vec![Box::new(two_stages), lazily(kinds), lazily(alike)];
     if settings.linear_solver == LinearSolver::Auto {
         methods.push(trusted);
     }
@@ -93,15 +102,15 @@ struct Ladder {
     /// Which holds the present factor.
     in_use: usize,
     fallbacks: usize,
-    /// Matrices in a row that were distrusted.
-    doubts: usize,
-    /// Matrices that the most trusted method has still to factorise without asking the others.
-    trusted_only: usize,
+    /// Matrices in a row that did not end with the method they began with.
+    in_vain: usize,
+    /// Where the next matrices begin, and how many of them.
+    detour: (usize, usize),
 }
 
-/// Matrices in a row that are distrusted before the next ones go to the most trusted method at once, and how many do.
-const DOUBTS: usize = 3;
-const TRUSTED_ONLY: usize = 20;
+/// Matrices in a row that go further down the ladder before the next ones begin where they ended, and how many do.
+const IN_VAIN: usize = 3;
+const DETOUR: usize = 20;
 
 impl Ladder {
     fn new(methods: Vec<Box<dyn KktSolver>>) -> Self {
@@ -111,9 +120,26 @@ impl Ladder {
             first: 0,
             in_use: 0,
             fallbacks: 0,
-            doubts: 0,
-            trusted_only: 0,
+            in_vain: 0,
+            detour: (0, 0),
         }
+    }
+
+    /// Where a new matrix begins.
+    fn begin(&mut self) -> usize {
+        let (at, left) = self.detour;
+        if left > 0 {
+            self.detour.1 -= 1;
+            return at;
+        }
+        let last = self.in_use.max(self.first);
+        self.in_vain = if last > 0 { self.in_vain + 1 } else { 0 };
+        if self.in_vain < IN_VAIN {
+            return 0;
+        }
+        self.in_vain = 0;
+        self.detour = (last, DETOUR - 1);
+        last
     }
 }
 
@@ -122,14 +148,7 @@ impl KktSolver for Ladder {
         // What was distrusted stays so while only the diagonal changes.
         if change == Change::Any {
             self.up_to_date.fill(false);
-            if self.trusted_only == 0 {
-                self.doubts = if self.first > 0 { self.doubts + 1 } else { 0 };
-                if self.doubts == DOUBTS {
-                    (self.doubts, self.trusted_only) = (0, TRUSTED_ONLY);
-                }
-            }
-            self.first = if self.trusted_only > 0 { self.methods.len() - 1 } else { 0 };
-            self.trusted_only = self.trusted_only.saturating_sub(1);
+            self.first = self.begin();
         }
         for (k, method) in self.methods.iter_mut().enumerate().skip(self.first) {
             if !method.suits(values) {

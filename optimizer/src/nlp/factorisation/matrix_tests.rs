@@ -1,7 +1,7 @@
 //! Factorisations against matrices of known inertia, and the promise that no wrong answer is silent.
 
 use super::delayed_pivots::DelayedPivots;
-use super::front::PivotKind;
+use super::front::{PivotKind, RoomForDeferred};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::multifrontal::Multifrontal;
 use super::supernodal::Supernodal;
@@ -63,9 +63,10 @@ impl Matrix {
             solvers.push(("supernodal, own order", Box::new(Supernodal::new(&self.starts, &self.rows, own).unwrap())));
         }
         let kinds = vec![PivotKind::Other; order];
-        let frontal = Multifrontal::new(&self.starts, &self.rows, &front_of, &kinds, 1).unwrap();
+        let frontal = Multifrontal::new(&self.starts, &self.rows, &front_of, &kinds, RoomForDeferred::Full, 1).unwrap();
         solvers.push(("multifrontal", Box::new(frontal)));
-        let dense = Multifrontal::new(&self.starts, &self.rows, &vec![0; order], &kinds, 1).unwrap();
+        let dense =
+            Multifrontal::new(&self.starts, &self.rows, &vec![0; order], &kinds, RoomForDeferred::Full, 1).unwrap();
         solvers.push(("one front", Box::new(dense)));
         let delayed = DelayedPivots::new(&self.starts, &self.rows, &front_of);
         solvers.push(("delayed pivots", Box::new(delayed)));
@@ -259,7 +260,7 @@ fn nlp_threads_do_not_change_a_bit() {
     }
     let kinds = vec![PivotKind::Other; order];
     let solve_with = |threads| {
-        let mut solver = Multifrontal::new(&starts, &rows, &front_of, &kinds, threads).unwrap();
+        let mut solver = Multifrontal::new(&starts, &rows, &front_of, &kinds, RoomForDeferred::Full, threads).unwrap();
         let inertia = solver.factor(&values, Change::Any).unwrap();
         let mut x: Vec<f64> = (0..order).map(|i| (i % 17) as f64).collect();
         solver.solve(&mut x);
@@ -320,8 +321,10 @@ fn nlp_rows_eliminated_by_their_variables_give_the_same_answer() {
     for hessian in [0.0, 1.0, 1e3] {
         let (matrix, front_of, kinds) = kkt_of_points(6, hessian);
         let alike = vec![PivotKind::Other; kinds.len()];
-        let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, 1).unwrap();
-        let mut two = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+        let mut one =
+            Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, RoomForDeferred::Full, 1).unwrap();
+        let mut two =
+            Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, RoomForDeferred::Full, 1).unwrap();
         assert!(two.suits(&matrix.values));
         assert_eq!(
             one.factor(&matrix.values, Change::Any).unwrap(),
@@ -346,7 +349,7 @@ fn nlp_rows_eliminated_by_their_variables_give_the_same_answer() {
 fn nlp_a_diagonal_that_matters_is_not_neglected() {
     let (mut matrix, front_of, kinds) = kkt_of_points(2, 1.0);
     let row = kinds.iter().position(|k| *k == PivotKind::Equality).unwrap();
-    let solver = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+    let solver = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, RoomForDeferred::Full, 1).unwrap();
     assert!(solver.suits(&matrix.values));
     matrix.values[matrix.starts[row]] = -0.1;
     assert!(!solver.suits(&matrix.values));
@@ -366,9 +369,10 @@ fn nlp_rows_without_a_variable_of_their_own_are_deferred() {
         }
     }
     matrix.values[matrix.starts[second]] = -1e-7;
-    let mut solver = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+    let mut solver =
+        Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, RoomForDeferred::Full, 1).unwrap();
     let alike = vec![PivotKind::Other; kinds.len()];
-    let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, 1).unwrap();
+    let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &alike, RoomForDeferred::Full, 1).unwrap();
     assert_eq!(solver.factor(&matrix.values, Change::Any).unwrap(), one.factor(&matrix.values, Change::Any).unwrap());
     let mut neglected = vec![false; kinds.len()];
     solver.mark_neglected(&mut neglected);
@@ -382,7 +386,7 @@ fn nlp_another_diagonal_gives_the_same_bits_as_a_fresh_start() {
     for (j, kind) in kinds.iter().enumerate() {
         heavier[matrix.starts[j]] += if *kind == PivotKind::Variable { 0.3 } else { -1e-8 };
     }
-    let new = || Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+    let new = || Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, RoomForDeferred::Full, 1).unwrap();
     let (mut used, mut fresh) = (new(), new());
     used.factor(&matrix.values, Change::Any).unwrap();
     assert_eq!(used.factor(&heavier, Change::Diagonal), fresh.factor(&heavier, Change::Any));
@@ -426,8 +430,10 @@ fn nlp_delayed_pivots_count_right_where_static_ones_do_not() {
         let (matrix, front_of) = ill_conditioned_fronts(8, regular);
         let order = front_of.len();
         let kinds = vec![PivotKind::Other; order];
-        let mut one = Multifrontal::new(&matrix.starts, &matrix.rows, &vec![0; order], &kinds, 1).unwrap();
-        let mut fronts = Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, 1).unwrap();
+        let mut one =
+            Multifrontal::new(&matrix.starts, &matrix.rows, &vec![0; order], &kinds, RoomForDeferred::Full, 1).unwrap();
+        let mut fronts =
+            Multifrontal::new(&matrix.starts, &matrix.rows, &front_of, &kinds, RoomForDeferred::Full, 1).unwrap();
         let mut delayed = DelayedPivots::new(&matrix.starts, &matrix.rows, &front_of);
         let right = one.factor(&matrix.values, Change::Any).unwrap();
         assert_eq!(delayed.factor(&matrix.values, Change::Any), Some(right), "{regular}");

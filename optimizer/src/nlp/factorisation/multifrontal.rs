@@ -16,7 +16,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::bunch_kaufman::{self, Pivots};
 use super::dense_kernels::all_finite;
-use super::front::{ChildMap, Front, PivotKind, Place};
+use super::front::{ChildMap, Front, PivotKind, Place, RoomForDeferred};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::schedule::{Piece, Schedule};
@@ -80,13 +80,14 @@ impl Multifrontal {
         row_indices: &[usize],
         front_of: &[usize],
         kinds: &[PivotKind],
+        room: RoomForDeferred,
         threads: usize,
     ) -> Result<Self, NlpError> {
         let order = column_starts.len() - 1;
         let fail = |reason: &str| NlpError::Analysis { order, reason: reason.to_owned() };
         let members = postordered(column_starts, row_indices, front_of);
         let fronts =
-            analyse(column_starts, row_indices, &members, kinds).ok_or_else(|| fail("a front is too large"))?;
+            analyse(column_starts, row_indices, &members, kinds, room).ok_or_else(|| fail("a front is too large"))?;
         let mut factors: Vec<Factor> = fronts.iter().map(Factor::new).collect();
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
         let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
@@ -167,6 +168,7 @@ fn analyse(
     row_indices: &[usize],
     members: &[Vec<usize>],
     kinds: &[PivotKind],
+    room: RoomForDeferred,
 ) -> Option<Vec<Front>> {
     let order = column_starts.len() - 1;
     let count = members.len();
@@ -207,7 +209,7 @@ fn analyse(
         if let Some(&i) = border.first() {
             children[front_of[i]].push(f);
         }
-        let mut front = Front::new(pivots, border, kinds, &touched);
+        let mut front = Front::new(pivots, border, kinds, &touched, room);
         u32::try_from(front.length).ok()?;
         for (i, place) in front.places() {
             places[i] = place;

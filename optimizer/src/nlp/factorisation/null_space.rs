@@ -21,7 +21,7 @@ use super::bunch_kaufman::WORK_COLUMNS;
 use super::dense_kernels::{
     LANES, largest_entry, largest_magnitude, subtract, subtract_columns_within, subtract_symmetric_product,
 };
-use super::front::{Front, MOST_DEFERRED};
+use super::front::Front;
 
 /// A pivot below this share of its row's largest entry defers the row.
 const SMALLEST_PIVOT: f64 = 1e-8;
@@ -209,7 +209,7 @@ fn factor<S: Simd>(
         let acceptable = largest > SMALLEST_PIVOT * largest_magnitude(column);
         if !acceptable {
             count -= 1;
-            if null_space.rows.len() - count > MOST_DEFERRED {
+            if null_space.rows.len() - count > front.most_deferred {
                 return false;
             }
             for i in 0..tall {
