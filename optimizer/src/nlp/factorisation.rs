@@ -1,9 +1,11 @@
 //! Factorisations of the KKT matrix behind one trait (`kkt_solver`), chosen by structure and setting in `linear_solver`:
-//! `multifrontal` (`front`, `null_space`, `bunch_kaufman`, `substitution`, threads by `schedule`), `supernodal` (faer) and
+//! `multifrontal` (`front`, `null_space`, `bunch_kaufman`, `substitution`; `schedule` and `crew` share the work among threads), `supernodal` (faer) and
 //! `delayed_pivots`, the most trusted; fallbacks are analysed when they are needed (`lazy_solver`).
 
+mod aligned;
 mod block_columns;
 mod bunch_kaufman;
+mod crew;
 mod delayed_pivots;
 mod dense_kernels;
 mod front;

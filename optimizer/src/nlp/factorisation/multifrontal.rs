@@ -6,21 +6,26 @@
 //! singular breaks the factorisation down (`None`), one that is nearly so shows in the residual, and either way the
 //! caller regularises or changes the method.
 //!
-//! Independent subtrees are factorised by several threads ([`super::schedule`]). Each front is computed by one thread, from its own entries
-//! and then its children in fixed order, so the result is bit for bit that of one thread.
+//! Several threads ([`super::crew`]) factorise independent parts of the forest at once ([`super::schedule`]). Each front is
+//! computed by one thread, from its own entries and then its children in fixed order, so the result is bit for bit that of
+//! one thread.
 
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
 #![allow(clippy::inline_always)]
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+
 use pulp::{Arch, Simd, WithSimd};
 
+use super::aligned::Aligned;
 use super::bunch_kaufman::{self, Pivots};
+use super::crew::{Crew, Job};
 use super::dense_kernels::all_finite;
 use super::front::{ChildMap, Front, PivotKind, Place, RoomForDeferred};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
-use super::schedule::{Piece, Schedule};
-use super::substitution::Substitution;
+use super::schedule::{Direction, Piece, Schedule};
+use super::substitution::{Space, Substitution};
 use crate::nlp::status::NlpError;
 
 /// Operations below which starting threads costs more than it saves.
@@ -30,7 +35,7 @@ const WORTH_A_THREAD: f64 = 8e6;
 #[derive(Debug, Default)]
 pub(super) struct Factor {
     /// What solves need.
-    pub numbers: Vec<f64>,
+    pub numbers: Aligned,
     /// The Schur complement, where its parent is done by another piece of the schedule; the others wait on a stack.
     schur: Vec<f64>,
     pub null_space: NullSpace,
@@ -50,7 +55,7 @@ impl Factor {
             rank: front.rows.len(),
         };
         Self {
-            numbers: vec![0.0; front.kept.length()],
+            numbers: Aligned::zeros(front.kept.length()),
             null_space,
             off_diagonal: vec![0.0; pivots],
             order: (0..pivots).collect(),
@@ -59,17 +64,63 @@ impl Factor {
     }
 }
 
-/// Analysis, factor and workspace.
+/// Analysis, factor and work space.
 pub(super) struct Multifrontal {
     order: usize,
-    architecture: Arch,
-    fronts: Vec<Front>,
-    factors: Vec<Factor>,
-    schedule: Schedule,
+    forest: Arc<Forest>,
+    /// The threads beside the caller's.
+    crew: Option<Crew>,
     /// Positions of the diagonals that stage 1 neglects.
     neglected: Vec<u32>,
-    workspaces: Vec<Workspace>,
+}
+
+/// What the threads share.
+struct Forest {
+    architecture: Arch,
+    fronts: Vec<Front>,
+    factors: Vec<Mutex<Factor>>,
+    schedule: Schedule,
     substitution: Substitution,
+    /// By thread.
+    workspaces: Vec<Mutex<(Workspace, Space)>>,
+    /// What the crew is called for.
+    call: RwLock<(Pass, Vec<f64>)>,
+}
+
+/// What is done in a round over the forest, with the values of the matrix or a right-hand side.
+#[derive(Debug, Clone, Copy)]
+enum Pass {
+    Factor(Change),
+    Forward,
+    Backward,
+}
+
+impl Forest {
+    /// Takes part in a round.
+    fn take_part_in(&self, pass: Pass, numbers: &[f64], member: usize) {
+        let Self { architecture, fronts, factors, schedule, substitution, workspaces, .. } = self;
+        let Some(workspace) = workspaces.get(member) else { return };
+        let (work, space) = &mut *lock(workspace);
+        schedule.take_part(|piece| match pass {
+            Pass::Factor(change) => {
+                architecture.dispatch(FactorPiece { fronts, values: numbers, change, piece, factors, work });
+            }
+            Pass::Forward => substitution.forward(*architecture, fronts, factors, piece, numbers, space),
+            Pass::Backward => substitution.backward(*architecture, fronts, factors, piece, space),
+        });
+    }
+}
+
+impl Job for Forest {
+    fn take_part(&self, member: usize) {
+        let call = self.call.read().unwrap_or_else(PoisonError::into_inner);
+        self.take_part_in(call.0, &call.1, member);
+    }
+}
+
+/// The lock of something that is whole at any time.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Multifrontal {
@@ -95,21 +146,42 @@ impl Multifrontal {
         for root in schedule.pieces.iter().map(|piece| piece.end - 1) {
             factors[root].schur = vec![0.0; fronts[root].schur_length()];
         }
-        Ok(Self {
-            order,
+        let neglected = fronts.iter().flat_map(Front::neglected).collect();
+        let workspace = |_| Mutex::new((Workspace::new(&fronts), Space::new(&fronts)));
+        let longest = column_starts[order].max(order);
+        let forest = Arc::new(Forest {
             architecture: Arch::new(),
-            substitution: Substitution::new(&fronts, threads),
+            substitution: Substitution::new(&fronts),
             schedule,
-            neglected: fronts.iter().flat_map(Front::neglected).collect(),
-            factors,
-            workspaces: (0..threads).map(|_| Workspace::new(&fronts)).collect(),
+            factors: factors.into_iter().map(Mutex::new).collect(),
+            workspaces: (0..threads).map(workspace).collect(),
+            call: RwLock::new((Pass::Forward, Vec::with_capacity(if threads > 1 { longest } else { 0 }))),
             fronts,
-        })
+        });
+        let crew = (threads > 1).then(|| Crew::new(&forest, threads - 1));
+        Ok(Self { order, forest, crew, neglected })
     }
 
     /// Multiplications and additions of a factorisation.
     pub(super) fn flops(&self) -> f64 {
-        self.fronts.iter().map(|f| f.flops).sum()
+        self.forest.fronts.iter().map(|f| f.flops).sum()
+    }
+
+    /// One round over the forest; false when it was not done.
+    fn go_over(&self, pass: Pass, numbers: &[f64]) -> bool {
+        let forest = &self.forest;
+        forest.schedule.begin(if matches!(pass, Pass::Backward) { Direction::Down } else { Direction::Up });
+        let Some(crew) = &self.crew else {
+            forest.take_part_in(pass, numbers, 0);
+            return true;
+        };
+        {
+            let mut call = forest.call.write().unwrap_or_else(PoisonError::into_inner);
+            call.0 = pass;
+            call.1.clear();
+            call.1.extend_from_slice(numbers);
+        }
+        crew.call(&**forest)
     }
 }
 
@@ -233,10 +305,8 @@ struct FactorPiece<'a> {
     fronts: &'a [Front],
     values: &'a [f64],
     change: Change,
-    piece: Piece,
-    /// From front number `base` to the end of the piece.
-    factors: &'a mut [Factor],
-    base: usize,
+    piece: &'a Piece,
+    factors: &'a [Mutex<Factor>],
     work: &'a mut Workspace,
 }
 
@@ -245,11 +315,10 @@ impl WithSimd for FactorPiece<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { fronts, values, change, piece, factors, base, work } = self;
+        let Self { fronts, values, change, piece, factors, work } = self;
         work.stack.clear();
         for f in piece.start..piece.end {
-            let (before, rest) = factors.split_at_mut(f - base);
-            let Some(own) = rest.first_mut() else { continue };
+            let own = &mut *lock(&factors[f]);
             let mut numbers = std::mem::take(&mut work.numbers);
             let front = &fronts[f];
             let scratch = &mut numbers[..front.length];
@@ -259,7 +328,7 @@ impl WithSimd for FactorPiece<'_> {
             }
             // Deferred rows are needed as they were.
             let same_rows = change == Change::Diagonal && !own.broke_down && own.null_space.rank == front.rows.len();
-            own.broke_down = !add_children(fronts, f, scratch, before, base, &mut work.stack)
+            own.broke_down = !add_children(fronts, f, scratch, factors, &mut work.stack)
                 || !factor_front(simd, front, scratch, own, same_rows, work);
             if !own.broke_down {
                 front.keep(scratch, front.first_slot(own.null_space.rank), &mut own.numbers);
@@ -285,29 +354,37 @@ fn schur_columns<'a>(front: &'a Front, numbers: &'a [f64]) -> impl Iterator<Item
     (front.pivot_slots()..end).map(move |c| &numbers[front.reduced + c * front.wide..][c..end])
 }
 
-/// Adds the Schur complements of the children of front `f`; false when one of them broke down. A front alone finds them
-/// with its children (in `before`, which begins with front number `base`), one of a subtree on top of the stack.
+/// Adds the Schur complements of the children of front `f`; false when one of them broke down. The first front of a piece
+/// finds them with its children, the others on top of the stack.
 #[inline(always)]
 fn add_children(
     fronts: &[Front],
     f: usize,
     numbers: &mut [f64],
-    before: &[Factor],
-    base: usize,
+    factors: &[Mutex<Factor>],
     stack: &mut Vec<f64>,
 ) -> bool {
     let front = &fronts[f];
-    if front.children.iter().any(|(child, _)| before[child - base].broke_down) {
-        return false;
+    // What waits on the stack.
+    let mut height = 0;
+    for (child, _) in &front.children {
+        let factor = lock(&factors[*child]);
+        if factor.broke_down {
+            return false;
+        }
+        height += if factor.schur.is_empty() { fronts[*child].schur_length() } else { 0 };
     }
-    let waiting = |child: usize| if before[child - base].schur.is_empty() { fronts[child].schur_length() } else { 0 };
-    let bottom = stack.len() - front.children.iter().map(|(child, _)| waiting(*child)).sum::<usize>();
+    let bottom = stack.len() - height;
     let mut at = bottom;
     for (child, map) in &front.children {
-        let length = waiting(*child);
-        let schur = if length > 0 { &stack[at..at + length] } else { &before[child - base].schur };
-        at += length;
-        add_child(front, numbers, schur, map);
+        let factor = lock(&factors[*child]);
+        if factor.schur.is_empty() {
+            let length = fronts[*child].schur_length();
+            add_child(front, numbers, &stack[at..at + length], map);
+            at += length;
+        } else {
+            add_child(front, numbers, &factor.schur, map);
+        }
     }
     stack.truncate(bottom);
     true
@@ -325,7 +402,7 @@ fn factor_front<S: Simd>(
 ) -> bool {
     own.inertia = Inertia::default();
     if !front.rows.is_empty() {
-        let before = same_rows.then_some(own.numbers.as_slice());
+        let before = same_rows.then_some(&*own.numbers);
         if !null_space::eliminate(simd, front, numbers, &mut own.null_space, before, work) {
             return false;
         }
@@ -384,19 +461,11 @@ impl KktSolver for Multifrontal {
     }
 
     fn factor(&mut self, values: &[f64], change: Change) -> Option<Inertia> {
-        let (fronts, architecture) = (&self.fronts, self.architecture);
-        self.schedule.subtrees(&mut self.factors, &mut self.workspaces, |piece, factors, work| {
-            architecture.dispatch(FactorPiece { fronts, values, change, piece, factors, base: piece.start, work });
-        });
-        if let Some(work) = self.workspaces.first_mut() {
-            for piece in self.schedule.top() {
-                let factors = &mut self.factors;
-                architecture.dispatch(FactorPiece { fronts, values, change, piece, factors, base: 0, work });
-            }
-        }
+        let done = self.go_over(Pass::Factor(change), values);
         let mut inertia = Inertia::default();
-        for factor in &self.factors {
-            if factor.broke_down {
+        for factor in &self.forest.factors {
+            let factor = lock(factor);
+            if !done || factor.broke_down {
                 return None;
             }
             inertia.positive += factor.inertia.positive;
@@ -408,18 +477,24 @@ impl KktSolver for Multifrontal {
 
     fn solve(&mut self, x: &mut [f64]) {
         debug_assert_eq!(x.len(), self.order);
-        self.substitution.solve(self.architecture, &self.schedule, &self.fronts, &self.factors, x);
+        if self.go_over(Pass::Forward, x) && self.go_over(Pass::Backward, &[]) {
+            self.forest.substitution.read(&self.forest.fronts, x);
+        } else {
+            // Whoever asks sees it in the residual.
+            x.fill(f64::NAN);
+        }
     }
 
     fn mark_neglected(&self, neglected: &mut [bool]) {
-        for (front, factor) in self.fronts.iter().zip(&self.factors) {
-            for &row in &factor.null_space.rows[..factor.null_space.rank] {
+        for (front, factor) in self.forest.fronts.iter().zip(&self.forest.factors) {
+            let null_space = &lock(factor).null_space;
+            for &row in &null_space.rows[..null_space.rank] {
                 neglected[front.rows[row]] = true;
             }
         }
     }
 
     fn factor_entries(&self) -> usize {
-        self.fronts.iter().map(|front| front.kept.length()).sum()
+        self.forest.fronts.iter().map(|front| front.kept.length()).sum()
     }
 }

@@ -17,6 +17,7 @@
 
 use pulp::Simd;
 
+use super::aligned::Aligned;
 use super::bunch_kaufman::WORK_COLUMNS;
 use super::dense_kernels::{
     LANES, largest_entry, largest_magnitude, subtract, subtract_columns_within, subtract_symmetric_product,
@@ -43,14 +44,14 @@ pub(super) struct NullSpace {
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
     /// The numbers of the front in work: one place for all of them stays in the cache.
-    pub numbers: Vec<f64>,
+    pub numbers: Aligned,
     /// Schur complements that wait for their parents.
     pub stack: Vec<f64>,
     /// Columns as long as the slots.
-    pub columns: Vec<f64>,
+    pub columns: Aligned,
     /// Copy of the transposed Jacobian.
-    jacobian: Vec<f64>,
-    pivot: Vec<f64>,
+    jacobian: Aligned,
+    pivot: Aligned,
     terms: Vec<(usize, f64)>,
     /// Position in the null space of each variable.
     position: Vec<usize>,
@@ -61,11 +62,11 @@ impl Workspace {
     pub(super) fn new(fronts: &[Front]) -> Self {
         let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
         Self {
-            numbers: vec![0.0; largest(&|f| f.length)],
+            numbers: Aligned::zeros(largest(&|f| f.length)),
             stack: Vec::with_capacity(highest_stack(fronts)),
-            columns: vec![0.0; largest(&|f| f.wide * f.rows.len().max(WORK_COLUMNS))],
-            jacobian: vec![0.0; largest(&|f| f.tall * f.rows.len())],
-            pivot: vec![0.0; largest(&|f| f.tall)],
+            columns: Aligned::zeros(largest(&|f| f.wide * f.rows.len().max(WORK_COLUMNS))),
+            jacobian: Aligned::zeros(largest(&|f| f.tall * f.rows.len())),
+            pivot: Aligned::zeros(largest(&|f| f.tall)),
             terms: Vec::with_capacity(largest(&|f| f.variables.len())),
             position: vec![0; largest(&|f| f.variables.len())],
         }

@@ -1,110 +1,181 @@
-//! Who does which fronts: independent subtrees on several threads, the top of the forest after (or before) them.
+//! Who does which fronts: the forest in pieces, each a subtree or a single front near the roots, done by whoever is free.
+//!
+//! Going up, a piece may begin when those below it are done, going down when the one above it is. What a piece computes does
+//! not depend on who does it or when, so the result does not depend on the number of threads.
+
+use std::hint::spin_loop;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::yield_now;
 
 use super::front::Front;
 
-/// Something a thread can do independently, or a front of the sequential top of the forest.
-#[derive(Debug, Clone, Copy)]
+/// Fronts that one thread does one after the other.
+#[derive(Debug, Clone)]
 pub(super) struct Piece {
-    /// Range of fronts.
+    /// Range of fronts; the last one is above the others.
     pub start: usize,
     pub end: usize,
-    /// Thread that does it; `None`: the sequential top.
-    thread: Option<usize>,
+    /// The piece above, and those below.
+    parent: Option<usize>,
+    children: Vec<usize>,
 }
 
-/// The pieces of a forest, by ascending front.
+/// Which way a round goes through the forest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    /// From the leaves to the roots.
+    Up,
+    /// From the roots to the leaves.
+    Down,
+}
+
+/// What is left of a round.
+#[derive(Debug)]
+struct Round {
+    direction: Direction,
+    /// Pieces that may begin, the next one last.
+    ready: Vec<usize>,
+    /// By piece: how many others it waits for.
+    waits_for: Vec<usize>,
+    /// Pieces that are not done.
+    left: usize,
+}
+
+/// The pieces of a forest.
 #[derive(Debug)]
 pub(super) struct Schedule {
+    /// By ascending front.
     pub pieces: Vec<Piece>,
-    threads: usize,
+    /// Pieces without others below them, the heaviest last; those without one above.
+    leaves: Vec<usize>,
+    roots: Vec<usize>,
+    round: Mutex<Round>,
 }
 
+/// A subtree is split until it is no larger than a thread's share divided by this.
+const PIECES_PER_SHARE: usize = 4;
+/// Looks for a piece before a thread that finds none lets others have the processor.
+const LOOKS: usize = 100;
+/// Pauses between two looks.
+const SPINS: usize = 20;
+
 impl Schedule {
-    /// Cuts the forest into subtrees for the threads and a sequential top: the heaviest subtree is split until no subtree
-    /// is larger than a quarter of a thread's share; subtrees go to the least loaded thread, heaviest first.
+    /// Cuts the forest into pieces for that many threads: the heaviest subtree is split until none is larger than a part
+    /// of a thread's share.
     pub(super) fn new(fronts: &[Front], threads: usize) -> Self {
         let count = fronts.len();
         let (mut weight, mut start): (Vec<f64>, Vec<usize>) = (vec![0.0; count], (0..count).collect());
-        let mut has_parent = vec![false; count];
+        let mut parent = vec![None; count];
         for f in 0..count {
             weight[f] = fronts[f].flops;
             for (child, _) in &fronts[f].children {
                 weight[f] += weight[*child];
                 start[f] = start[f].min(start[*child]);
-                has_parent[*child] = true;
+                parent[*child] = Some(f);
             }
         }
-        let mut subtrees: Vec<usize> = (0..count).filter(|&f| !has_parent[f]).collect();
-        let mut top = Vec::new();
+        let mut subtrees: Vec<usize> = (0..count).filter(|&f| parent[f].is_none()).collect();
+        let mut single = Vec::new();
         if threads > 1 {
-            let limit = subtrees.iter().map(|&f| weight[f]).sum::<f64>() / (4 * threads) as f64;
+            let limit = subtrees.iter().map(|&f| weight[f]).sum::<f64>() / (PIECES_PER_SHARE * threads) as f64;
             while let Some(k) = subtrees.iter().position(|&f| weight[f] > limit && !fronts[f].children.is_empty()) {
                 let f = subtrees.swap_remove(k);
-                top.push(f);
+                single.push(f);
                 subtrees.extend(fronts[f].children.iter().map(|c| c.0));
             }
         }
-        subtrees.sort_unstable_by(|a, b| weight[*b].total_cmp(&weight[*a]).then(a.cmp(b)));
-        let mut load = vec![0.0; threads];
-        let mut pieces: Vec<Piece> = top.iter().map(|&f| Piece { start: f, end: f + 1, thread: None }).collect();
-        for f in subtrees {
-            let mut thread = 0;
-            for t in 1..threads {
-                if load[t] < load[thread] {
-                    thread = t;
-                }
+        // By their last fronts.
+        let mut last: Vec<(usize, usize)> = single.iter().map(|&f| (f, f)).collect();
+        last.extend(subtrees.iter().map(|&f| (f, start[f])));
+        last.sort_unstable();
+        let piece_of = |f: usize| last.binary_search_by_key(&f, |(end, _)| *end).ok();
+        let mut pieces: Vec<Piece> = last
+            .iter()
+            .map(|&(f, start)| Piece { start, end: f + 1, parent: parent[f].and_then(piece_of), children: Vec::new() })
+            .collect();
+        for k in 0..pieces.len() {
+            if let Some(parent) = pieces[k].parent {
+                pieces[parent].children.push(k);
             }
-            load[thread] += weight[f];
-            pieces.push(Piece { start: start[f], end: f + 1, thread: Some(thread) });
         }
-        pieces.sort_unstable_by_key(|p| p.start);
-        Self { pieces, threads }
-    }
-
-    /// The fronts of the sequential top, children before parents.
-    pub(super) fn top(&self) -> impl DoubleEndedIterator<Item = Piece> + '_ {
-        self.pieces.iter().copied().filter(|piece| piece.thread.is_none())
-    }
-
-    /// Does every subtree, each thread with a workspace of its own. `items` has one item per front; `work` gets the
-    /// subtree, its items, the workspace.
-    pub(super) fn subtrees<T: Send, W: Send>(
-        &self,
-        items: &mut [T],
-        workspaces: &mut [W],
-        work: impl Fn(Piece, &mut [T], &mut W) + Sync,
-    ) {
-        if let ([workspace], 1) = (&mut *workspaces, self.threads) {
-            for piece in &self.pieces {
-                work(*piece, &mut items[piece.start..piece.end], workspace);
-            }
-            return;
-        }
-        let mut hands: Vec<Vec<(Piece, &mut [T])>> = (0..self.threads).map(|_| Vec::new()).collect();
-        let (mut rest, mut at) = (items, 0);
-        for piece in &self.pieces {
-            let (_, tail) = rest.split_at_mut(piece.start - at);
-            let (own, tail) = tail.split_at_mut(piece.end - piece.start);
-            if let Some(thread) = piece.thread {
-                hands[thread].push((*piece, own));
-            }
-            (rest, at) = (tail, piece.end);
-        }
-        let play = |hand: Vec<(Piece, &mut [T])>, workspace: &mut W| {
-            for (piece, items) in hand {
-                work(piece, items, workspace);
-            }
+        let mut leaves: Vec<usize> = (0..pieces.len()).filter(|&k| pieces[k].children.is_empty()).collect();
+        let heaviness = |k: &usize| weight[pieces[*k].end - 1];
+        leaves.sort_by(|a, b| heaviness(a).total_cmp(&heaviness(b)));
+        let roots = (0..pieces.len()).filter(|&k| pieces[k].parent.is_none()).collect();
+        let round = Round {
+            direction: Direction::Up,
+            ready: Vec::with_capacity(pieces.len()),
+            waits_for: vec![0; pieces.len()],
+            left: 0,
         };
-        let play = &play;
-        std::thread::scope(|scope| {
-            let mut players = hands.into_iter().zip(workspaces);
-            let first = players.next();
-            for (hand, workspace) in players.filter(|(hand, _)| !hand.is_empty()) {
-                scope.spawn(move || play(hand, workspace));
+        Self { pieces, leaves, roots, round: Mutex::new(round) }
+    }
+
+    fn round(&self) -> MutexGuard<'_, Round> {
+        self.round.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes ready for a round.
+    pub(super) fn begin(&self, direction: Direction) {
+        let mut round = self.round();
+        round.direction = direction;
+        round.left = self.pieces.len();
+        round.ready.clear();
+        round.ready.extend(if direction == Direction::Up { &self.leaves } else { &self.roots });
+        for (waits_for, piece) in round.waits_for.iter_mut().zip(&self.pieces) {
+            *waits_for =
+                if direction == Direction::Up { piece.children.len() } else { usize::from(piece.parent.is_some()) };
+        }
+    }
+
+    /// Does pieces of the present round until none is left. Several threads may do so at once.
+    pub(super) fn take_part(&self, mut work: impl FnMut(&Piece)) {
+        let mut looks = 0;
+        loop {
+            let taken = {
+                let mut round = self.round();
+                if round.left == 0 {
+                    return;
+                }
+                round.ready.pop()
+            };
+            let Some(k) = taken else {
+                looks += 1;
+                if looks % LOOKS == 0 {
+                    yield_now();
+                } else {
+                    (0..SPINS).for_each(|_| spin_loop());
+                }
+                continue;
+            };
+            // Whatever becomes of the piece, nobody waits for it for ever.
+            let done = Done { schedule: self, piece: k };
+            work(&self.pieces[k]);
+            drop(done);
+        }
+    }
+}
+
+/// Notes that a piece is done when it is dropped.
+struct Done<'a> {
+    schedule: &'a Schedule,
+    piece: usize,
+}
+
+impl Drop for Done<'_> {
+    fn drop(&mut self) {
+        let piece = &self.schedule.pieces[self.piece];
+        let mut round = self.schedule.round();
+        round.left -= 1;
+        let next = match round.direction {
+            Direction::Up => piece.parent.as_slice(),
+            Direction::Down => piece.children.as_slice(),
+        };
+        for &k in next {
+            round.waits_for[k] -= 1;
+            if round.waits_for[k] == 0 {
+                round.ready.push(k);
             }
-            if let Some((hand, workspace)) = first {
-                play(hand, workspace);
-            }
-        });
+        }
     }
 }

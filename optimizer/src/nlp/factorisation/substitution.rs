@@ -8,140 +8,160 @@
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
 #![allow(clippy::inline_always)]
 
+use std::sync::Mutex;
+
 use pulp::{Arch, Simd, WithSimd};
 
+use super::aligned::Aligned;
 use super::bunch_kaufman::inverse_pair;
 use super::dense_kernels::{LANES, dot, padded, subtract_range};
 use super::front::Front;
-use super::multifrontal::Factor;
+use super::multifrontal::{Factor, lock};
 use super::null_space::NullSpace;
-use super::schedule::{Piece, Schedule};
+use super::schedule::Piece;
 
 /// Values at a front: half-way between the two substitutions first, the solution then.
 #[derive(Debug)]
 struct Values {
     /// By variable.
-    variables: Vec<f64>,
+    variables: Aligned,
     /// By row; half-way v0, by position in the null space.
-    rows: Vec<f64>,
+    rows: Aligned,
     /// By slot. Those of the border are for the parent after the forward, from the parent before the backward
     /// substitution.
-    slots: Vec<f64>,
+    slots: Aligned,
 }
 
 /// Work vectors of a thread, long enough for every front.
 #[derive(Debug)]
-struct Space {
+pub(super) struct Space {
     /// One value per pivot slot, in the order of the pivots.
-    ordered: Vec<f64>,
+    ordered: Aligned,
     /// One value per position of the null space.
-    positions: Vec<f64>,
-    products: Vec<f64>,
+    positions: Aligned,
+    products: Aligned,
     terms: Vec<(usize, f64)>,
 }
 
 impl Space {
-    fn new(fronts: &[Front]) -> Self {
+    pub(super) fn new(fronts: &[Front]) -> Self {
         let largest = |length: &dyn Fn(&Front) -> usize| fronts.iter().map(length).max().unwrap_or(0);
         let (slots, positions) = (largest(&|f| f.wide), largest(&|f| f.tall));
         Self {
-            ordered: vec![0.0; slots],
-            positions: vec![0.0; positions],
-            products: vec![0.0; positions],
+            ordered: Aligned::zeros(slots),
+            positions: Aligned::zeros(positions),
+            products: Aligned::zeros(positions),
             terms: Vec::with_capacity(positions),
         }
     }
 }
 
-/// Work space of the substitutions.
+/// Values at the fronts.
 pub(super) struct Substitution {
-    values: Vec<Values>,
-    spaces: Vec<Space>,
+    values: Vec<Mutex<Values>>,
 }
 
 impl Substitution {
-    pub(super) fn new(fronts: &[Front], threads: usize) -> Self {
+    pub(super) fn new(fronts: &[Front]) -> Self {
         let values = |front: &Front| Values {
-            variables: vec![0.0; front.tall],
-            rows: vec![0.0; front.tall],
-            slots: vec![0.0; front.wide],
+            variables: Aligned::zeros(front.tall),
+            rows: Aligned::zeros(front.tall),
+            slots: Aligned::zeros(front.wide),
         };
-        Self { values: fronts.iter().map(values).collect(), spaces: (0..threads).map(|_| Space::new(fronts)).collect() }
+        Self { values: fronts.iter().map(|front| Mutex::new(values(front))).collect() }
     }
 
-    /// Overwrites x by the solution.
-    pub(super) fn solve(
-        &mut self,
+    /// Forward substitution over a piece whose children are done.
+    pub(super) fn forward(
+        &self,
         architecture: Arch,
-        schedule: &Schedule,
         fronts: &[Front],
-        factors: &[Factor],
-        x: &mut [f64],
+        factors: &[Mutex<Factor>],
+        piece: &Piece,
+        rhs: &[f64],
+        space: &mut Space,
     ) {
-        let rhs = &*x;
-        let run = |piece: Piece, values: &mut [Values], base: usize, space: &mut Space, forward: bool| {
-            architecture.dispatch(Sweep { fronts, factors, piece, values, base, rhs, space, forward });
-        };
-        let Self { values, spaces } = self;
-        schedule.subtrees(values, spaces, |piece, values, space| run(piece, values, piece.start, space, true));
-        if let Some(space) = spaces.first_mut() {
-            schedule.top().for_each(|piece| run(piece, values, 0, space, true));
-            schedule.top().rev().for_each(|piece| run(piece, values, 0, space, false));
-        }
-        schedule.subtrees(values, spaces, |piece, values, space| run(piece, values, piece.start, space, false));
-        for (front, values) in fronts.iter().zip(values) {
-            let scatter = |x: &mut [f64], indices: &[usize], from: &[f64]| {
+        architecture.dispatch(Forward { fronts, factors, piece, values: &self.values, rhs, space });
+    }
+
+    /// Backward substitution over a piece whose parent is done.
+    pub(super) fn backward(
+        &self,
+        architecture: Arch,
+        fronts: &[Front],
+        factors: &[Mutex<Factor>],
+        piece: &Piece,
+        space: &mut Space,
+    ) {
+        architecture.dispatch(Backward { fronts, factors, piece, values: &self.values, space });
+    }
+
+    /// Writes the solution.
+    pub(super) fn read(&self, fronts: &[Front], x: &mut [f64]) {
+        for (front, values) in fronts.iter().zip(&self.values) {
+            let values = lock(values);
+            let mut scatter = |indices: &[usize], from: &[f64]| {
                 for (&i, value) in indices.iter().zip(from) {
                     x[i] = *value;
                 }
             };
-            scatter(x, &front.variables, &values.variables);
-            scatter(x, &front.rows, &values.rows);
-            scatter(x, &front.others, &values.slots[front.first_other()..]);
+            scatter(&front.variables, &values.variables);
+            scatter(&front.rows, &values.rows);
+            scatter(&front.others, &values.slots[front.first_other()..]);
         }
     }
 }
 
-/// One substitution over a piece: a subtree, or one front whose children are done.
-struct Sweep<'a> {
+/// Forward substitution over a piece.
+struct Forward<'a> {
     fronts: &'a [Front],
-    factors: &'a [Factor],
-    piece: Piece,
-    /// From front number `base` to the end of the piece at least.
-    values: &'a mut [Values],
-    base: usize,
+    factors: &'a [Mutex<Factor>],
+    piece: &'a Piece,
+    values: &'a [Mutex<Values>],
     rhs: &'a [f64],
     space: &'a mut Space,
-    forward: bool,
 }
 
-impl WithSimd for Sweep<'_> {
+impl WithSimd for Forward<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { fronts, factors, piece, values, base, rhs, space, forward } = self;
-        if forward {
-            for f in piece.start..piece.end {
-                let (children, rest) = values.split_at_mut(f - base);
-                let Some(own) = rest.first_mut() else { continue };
-                collect(fronts, f, rhs, children, base, own);
-                eliminate(simd, &fronts[f], &factors[f], rhs, own, space);
-            }
-        } else {
-            for f in (piece.start..piece.end).rev() {
-                let (children, rest) = values.split_at_mut(f - base);
-                let Some(own) = rest.first_mut() else { continue };
-                substitute(simd, &fronts[f], &factors[f], own, space);
-                distribute(fronts, f, own, children, base);
-            }
+        let Self { fronts, factors, piece, values, rhs, space } = self;
+        for f in piece.start..piece.end {
+            let own = &mut *lock(&values[f]);
+            collect(fronts, f, rhs, values, own);
+            eliminate(simd, &fronts[f], &lock(&factors[f]), rhs, own, space);
+        }
+    }
+}
+
+/// Backward substitution over a piece.
+struct Backward<'a> {
+    fronts: &'a [Front],
+    factors: &'a [Mutex<Factor>],
+    piece: &'a Piece,
+    values: &'a [Mutex<Values>],
+    space: &'a mut Space,
+}
+
+impl WithSimd for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { fronts, factors, piece, values, space } = self;
+        for f in (piece.start..piece.end).rev() {
+            let own = &mut *lock(&values[f]);
+            substitute(simd, &fronts[f], &lock(&factors[f]), own, space);
+            distribute(fronts, f, own, values);
         }
     }
 }
 
 /// Right-hand sides of the variables and of the other pivots, with what the children pass on.
 #[inline(always)]
-fn collect(fronts: &[Front], f: usize, rhs: &[f64], children: &[Values], base: usize, own: &mut Values) {
+fn collect(fronts: &[Front], f: usize, rhs: &[f64], values: &[Mutex<Values>], own: &mut Values) {
     let front = &fronts[f];
     for (value, &i) in own.variables.iter_mut().zip(&front.variables) {
         *value = rhs[i];
@@ -151,7 +171,8 @@ fn collect(fronts: &[Front], f: usize, rhs: &[f64], children: &[Values], base: u
         *value = rhs[i];
     }
     for (child, map) in &front.children {
-        let border = &children[child - base].slots[fronts[*child].pivot_slots()..];
+        let child_values = lock(&values[*child]);
+        let border = &child_values.slots[fronts[*child].pivot_slots()..];
         let (to_variables, to_slots) = border.split_at(map.variables.len());
         for (value, &variable) in to_variables.iter().zip(&map.variables) {
             own.variables[variable as usize] += value;
@@ -164,9 +185,10 @@ fn collect(fronts: &[Front], f: usize, rhs: &[f64], children: &[Values], base: u
 
 /// Gives the children the values at their borders.
 #[inline(always)]
-fn distribute(fronts: &[Front], f: usize, own: &Values, children: &mut [Values], base: usize) {
+fn distribute(fronts: &[Front], f: usize, own: &Values, values: &[Mutex<Values>]) {
     for (child, map) in &fronts[f].children {
-        let border = &mut children[child - base].slots[fronts[*child].pivot_slots()..];
+        let mut child_values = lock(&values[*child]);
+        let border = &mut child_values.slots[fronts[*child].pivot_slots()..];
         let (from_variables, from_slots) = border.split_at_mut(map.variables.len());
         for (value, &variable) in from_variables.iter_mut().zip(&map.variables) {
             *value = own.variables[variable as usize];
@@ -183,11 +205,11 @@ fn distribute(fronts: &[Front], f: usize, own: &Values, children: &mut [Values],
 fn eliminate<S: Simd>(simd: S, front: &Front, factor: &Factor, rhs: &[f64], own: &mut Values, space: &mut Space) {
     let (tall, wide) = (front.tall, front.wide);
     let [lu, row_coupling, coupling, hessian, reduced] = front.kept.parts(&factor.numbers);
-    let slots = own.slots.as_mut_slice();
+    let slots = &mut *own.slots;
     let NullSpace { variables, rows, rank } = &factor.null_space;
     let rank = *rank;
     if rank > 0 {
-        let (v0, h) = (own.rows.as_mut_slice(), &mut space.positions[..tall]);
+        let (v0, h) = (&mut *own.rows, &mut space.positions[..tall]);
         h.fill(0.0);
         for e in 0..rank {
             let column = &lu[e * tall..(e + 1) * tall];
@@ -257,7 +279,7 @@ fn substitute<S: Simd>(simd: S, front: &Front, factor: &Factor, own: &mut Values
     let rank = *rank;
     let first = front.first_slot(rank);
     let pivots = front.pivot_slots();
-    let slots = own.slots.as_mut_slice();
+    let slots = &mut *own.slots;
     let ordered = &mut space.ordered[..pivots];
     ordered[first..].copy_from_slice(&slots[first..pivots]);
     slots[..pivots].fill(0.0);
