@@ -102,7 +102,9 @@ pub(super) struct Solved {
 /// Clock of the linear algebra.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LinearTally {
+    /// Assembly and factorisation.
     pub factor_seconds: f64,
+    /// Substitutions, residuals and refinement.
     pub solve_seconds: f64,
     pub factorisations: usize,
     pub backsolves: usize,
@@ -221,8 +223,11 @@ impl NewtonSystem {
             let inertia = self.factor_with(form, None, jacobian, change)?;
             change = Change::Diagonal;
             if inertia.negative == form.m && inertia.zero == 0 {
+                let clock = Instant::now();
                 self.reduced_solve(form, &b, &zero, &mut dw, &mut y);
-                if self.least_squares_residual(form, jacobian, &b, &dw, &y) <= settings.residual_limit {
+                let residual = self.least_squares_residual(form, jacobian, &b, &dw, &y);
+                self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+                if residual <= settings.residual_limit {
                     return (largest(&y) <= settings.multiplier_limit).then_some(y);
                 }
             }
@@ -241,7 +246,6 @@ impl NewtonSystem {
         dw: &[f64],
         y: &[f64],
     ) -> f64 {
-        let clock = Instant::now();
         let r = &mut self.residual;
         r.w.copy_from_slice(dw);
         r.y.fill(0.0);
@@ -258,13 +262,11 @@ impl NewtonSystem {
         }
         let error = largest(&r.w).max(largest(&r.y));
         let length = largest(dw).max(largest(y));
-        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
         relative(error, size, length)
     }
 
     /// Solves (W + d) dw + A^T dy = b, A dw - delta_c dy = c with the last factorisation.
     fn reduced_solve(&mut self, form: &Formulation, b: &[f64], c: &[f64], dw: &mut [f64], dy: &mut [f64]) {
-        let clock = Instant::now();
         let n = form.n;
         for j in 0..n {
             self.rhs[j] = if form.fixed[j].is_some() { 0.0 } else { b[j] };
@@ -279,7 +281,6 @@ impl NewtonSystem {
         for (k, a) in form.attached.iter().enumerate() {
             dw[n + k] = (b[n + k] - a.sign * dy[a.row]) / self.diagonal[n + k];
         }
-        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
         self.tally.backsolves += 1;
     }
 
@@ -363,8 +364,11 @@ impl NewtonSystem {
         rhs: &PrimalDual,
         out: &mut PrimalDual,
     ) -> f64 {
+        let clock = Instant::now();
         self.full_solve(form, point, at, rhs, out);
-        self.relative_residual(form, point, at, rhs, out)
+        let residual = self.relative_residual(form, point, at, rhs, out);
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        residual
     }
 
     /// Leaves the residual itself in `self.residual`.
@@ -391,7 +395,24 @@ impl NewtonSystem {
         out: &mut PrimalDual,
     ) -> Solved {
         let unrefined = self.unrefined_residual(form, point, at, rhs, out);
-        let solved = |refined| Solved { unrefined, refined };
+        let clock = Instant::now();
+        let refined = self.refine(form, settings, point, at, rhs, out, unrefined);
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        Solved { unrefined, refined }
+    }
+
+    /// Refines a solution whose residual is in `self.residual`; returns the relative residual then.
+    #[allow(clippy::too_many_arguments)] // the system, its right-hand side, its solution
+    fn refine(
+        &mut self,
+        form: &Formulation,
+        settings: &NlpSettings,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+        unrefined: f64,
+    ) -> f64 {
         let (mut best, mut ratio) = (f64::INFINITY, unrefined);
         let mut refinements = 0;
         loop {
@@ -402,15 +423,15 @@ impl NewtonSystem {
                         *x -= y;
                     }
                 }
-                return solved(best);
+                return best;
             }
             let stagnates = refinements > 0 && ratio > 0.5 * best;
             best = ratio;
             if ratio <= settings.residual_target || !ratio.is_finite() || stagnates {
-                return solved(best);
+                return best;
             }
             if refinements == settings.max_refinements {
-                return solved(best);
+                return best;
             }
             let residual = std::mem::take(&mut self.residual);
             let mut correction = std::mem::take(&mut self.correction);

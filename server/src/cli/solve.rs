@@ -193,6 +193,7 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
             r.variables, r.equalities, r.inequalities
         ),
     ];
+    lines.extend(linear_algebra_in_words(r));
     lines.extend(basins_in_words(r));
     for violation in outcome.violations.iter().take(10) {
         lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
@@ -201,6 +202,26 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
         lines.extend(explanation.sentences().iter().map(|sentence| format!("  {sentence}")));
     }
     lines.join("\n")
+}
+
+/// Where the time of all attempts went.
+fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
+    let Some(algebra) = &report.linear_algebra else { return Vec::new() };
+    let fallbacks = match algebra.fallbacks {
+        0 => "no fallback".to_owned(),
+        1 => "1 fallback".to_owned(),
+        many => format!("{many} fallbacks"),
+    };
+    vec![
+        format!(
+            "  time               evaluation {:.2} s, factorisation {:.2} s, solves {:.2} s, analysis {:.2} s",
+            report.seconds_evaluation, algebra.seconds_factorisation, algebra.seconds_solves, algebra.seconds_analysis
+        ),
+        format!(
+            "  linear algebra     {} factorisations, {} substitutions, {fallbacks}",
+            algebra.factorisations, algebra.substitutions
+        ),
+    ]
 }
 
 /// The local optima that were found, where there are several, each as its first attempt left it: before any bound was
