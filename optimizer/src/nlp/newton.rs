@@ -511,7 +511,9 @@ mod tests {
         }
         fn solve(&mut self, rhs: &mut [f64]) {
             self.exact.solve(rhs);
-            rhs.iter_mut().for_each(|x| *x *= self.factor);
+            for x in rhs {
+                *x *= self.factor;
+            }
         }
         fn factor_entries(&self) -> usize {
             self.exact.factor_entries()
@@ -524,11 +526,13 @@ mod tests {
 
     /// Multipliers by a faulty factorisation, and how often was factorised.
     fn multipliers(factor: f64, miscounted: usize, has_another_method: bool) -> (Option<Vec<f64>>, usize) {
-        let pattern = |column_starts: &[usize], row_indices: &[usize]| SparsityPattern {
+        let pattern = |rows, column_starts: &[usize], row_indices: &[usize]| SparsityPattern {
+            rows,
+            columns: 2,
             column_starts: column_starts.to_vec(),
             row_indices: row_indices.to_vec(),
         };
-        let line = Line { jacobian: pattern(&[0, 1, 2], &[0, 0]), hessian: pattern(&[0, 0, 0], &[]) };
+        let line = Line { jacobian: pattern(1, &[0, 1, 2], &[0, 0]), hessian: pattern(2, &[0, 0, 0], &[]) };
         let settings = NlpSettings::default();
         let form = Formulation::new(&line, &settings).unwrap();
         let matrix = KktMatrix::new(&form);
