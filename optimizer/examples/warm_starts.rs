@@ -1,8 +1,12 @@
-//! Warm starts against cold starts after changing one bound of Table I.
+//! Warm starts against cold starts after changing bounds of Table I.
 //!
 //! `cargo run --release -p gait-optimizer --example warm_starts -- [--subject 1] [--muscles on] [--changes 20] [--seed 1]
-//! [--cold on] [--threads 1]`: solves the default problem, then for each random one-bound change solves warm from it
-//! (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end.
+//! [--cold on] [--threads 1] [--at-once 1] [--from 20,90,0.3,1.4,0,0.5,50,40] [--values table|tight]`: solves the problem
+//! with the bounds `--from` (default: the default ones), then for each random change of `--at-once` bounds solves warm
+//! from it (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end. `--values tight` draws far
+//! beyond Table I, where warm starts fail. `warm_attempt` is how the start ended by itself, before any cold start after
+//! it; `violation_stands` its longest run of iterations in which the smallest violation did not fall to .9 of what it was,
+//! `residuals_stand` the same of the largest of violation, dual infeasibility and barrier parameter, to .5.
 
 mod arguments;
 mod median;
@@ -11,16 +15,56 @@ mod tuned_actions;
 
 use arguments::argument;
 use gait_optimizer::{
-    CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
+    CancelToken, GaitProblem, IterationRecord, Phase, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
+    WarmStart, solve,
 };
 use median::median;
 use splitmix::SplitMix;
 use std::error::Error;
-use tuned_actions::LEVELS;
+use tuned_actions::{LEVELS, TIGHT};
 
-fn run(problem: &GaitProblem, warm: Option<&WarmStart>, threads: usize) -> Result<SolveOutcome, Box<dyn Error>> {
+fn run(
+    problem: &GaitProblem,
+    warm: Option<&WarmStart>,
+    threads: usize,
+    observer: &mut dyn FnMut(&IterationRecord),
+) -> Result<SolveOutcome, Box<dyn Error>> {
     let options = SolveOptions { threads, ..SolveOptions::default() };
-    Ok(solve(problem, warm, &options, &mut |_| {}, &CancelToken::new())?)
+    Ok(solve(problem, warm, &options, observer, &CancelToken::new())?)
+}
+
+/// The bounds with some of them, all different, set to other values.
+fn changed(from: TunedBounds, count: usize, values: &[&[f64]; 8], random: &mut SplitMix) -> (TunedBounds, String) {
+    loop {
+        let mut action = from.to_array();
+        let mut drawn = Vec::new();
+        while drawn.len() < count {
+            let bound = random.below(8);
+            if drawn.contains(&bound) {
+                continue;
+            }
+            let others: Vec<f64> = values[bound].iter().copied().filter(|&v| v != action[bound]).collect();
+            action[bound] = others[random.below(others.len())];
+            drawn.push(bound);
+        }
+        if let Ok(bounds) = TunedBounds::from_array(action) {
+            let words = drawn.iter().map(|&bound| format!("{}={}", TunedBounds::NAMES[bound], action[bound]));
+            return (bounds, words.collect::<Vec<_>>().join(" "));
+        }
+    }
+}
+
+/// Longest run of iterations in which the smallest value did not fall to this share of what it was.
+fn longest_stand(records: &[IterationRecord], share: f64, value: impl Fn(&IterationRecord) -> f64) -> usize {
+    let (mut least, mut since, mut longest) = (f64::INFINITY, 0, 0);
+    for (number, record) in records.iter().enumerate() {
+        let now = value(record);
+        if now <= share * least {
+            (least, since) = (now, number);
+        }
+        longest = longest.max(number - since);
+    }
+    longest
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -29,31 +73,52 @@ fn main() -> Result<(), Box<dyn Error>> {
     let changes: usize = argument("--changes", "20").parse()?;
     let with_cold = argument("--cold", "on") == "on";
     let threads: usize = argument("--threads", "1").parse()?;
+    let at_once: usize = argument("--at-once", "1").parse()?;
+    if !(1..=8).contains(&at_once) {
+        return Err("--at-once: 1 to 8".into());
+    }
+    let values = match argument("--values", "table").as_str() {
+        "table" => LEVELS,
+        "tight" => TIGHT,
+        other => return Err(format!("--values {other}: table or tight").into()),
+    };
     let mut random = SplitMix(argument("--seed", "1").parse()?);
-    let base = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
-    let start = run(&base, None, threads)?;
+    let mut base = GaitProblem::new(Subject::builtin(subject)?, muscles)?;
+    let from = argument("--from", "");
+    if !from.is_empty() {
+        let action: Vec<f64> = from.split(',').map(str::parse).collect::<Result<_, _>>()?;
+        base.bounds = TunedBounds::from_array(action.try_into().map_err(|_| "--from: eight numbers")?)?;
+    }
+    let start = run(&base, None, threads, &mut |_| {})?;
     eprintln!(
         "base: {:?} {} iterations {:.2} s",
         start.report.status, start.report.iterations, start.report.seconds_total
     );
     println!(
-        "bound,value,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse"
+        "change,warm_attempt,warm_attempt_iterations,violation_stands,residuals_stand,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse"
     );
     let (mut warm_seconds, mut warm_iterations) = (Vec::new(), Vec::new());
     let (mut cold_seconds, mut cold_iterations) = (Vec::new(), Vec::new());
-    let mut worst_ratio = 0.0_f64;
-    let default = TunedBounds::default().to_array();
+    let (mut worst_ratio, mut failed) = (0.0_f64, 0);
     for _ in 0..changes {
-        let bound = random.below(8);
-        let others: Vec<f64> = LEVELS[bound].iter().copied().filter(|&v| v != default[bound]).collect();
-        let value = others[random.below(others.len())];
-        let mut action = default;
-        action[bound] = value;
-        let problem = GaitProblem { bounds: TunedBounds::from_array(action)?, ..base.clone() };
-        let warm = run(&problem, Some(&start.warm_start), threads)?.report;
+        let (bounds, words) = changed(base.bounds, at_once, &values, &mut random);
+        let problem = GaitProblem { bounds, ..base.clone() };
+        let (mut iterations, mut own) = (Vec::new(), true);
+        let warm = run(&problem, Some(&start.warm_start), threads, &mut |record| {
+            own &= record.guess == 0 && matches!(record.phase, Phase::Cost | Phase::BetweenPoints);
+            if own {
+                iterations.push(*record);
+            }
+        })?
+        .report;
+        let attempt = warm.attempts.first().ok_or("a solve without attempts")?;
+        failed += usize::from(attempt.status != SolveStatus::Converged);
         print!(
-            "{},{value},{:?},{:?},{},{:.3},{:.8},{:.4}",
-            TunedBounds::NAMES[bound],
+            "{words},{:?},{},{},{},{:?},{:?},{},{:.3},{:.8},{:.4}",
+            attempt.status,
+            attempt.iterations,
+            longest_stand(&iterations, 0.9, |r| r.constraint_violation),
+            longest_stand(&iterations, 0.5, |r| r.constraint_violation.max(r.dual_infeasibility).max(r.barrier)),
             warm.status,
             warm.started_from,
             warm.iterations,
@@ -66,7 +131,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             warm_iterations.push(warm.iterations as f64);
         }
         if with_cold {
-            let cold = run(&problem, None, threads)?.report;
+            let cold = run(&problem, None, threads, &mut |_| {})?.report;
             println!(
                 ",{:?},{},{:.3},{:.8},{:.4}",
                 cold.status, cold.iterations, cold.seconds_total, cold.objective, cold.gait_rmse_rad
@@ -79,7 +144,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     eprintln!(
-        "median warm {} iterations {:.3} s ({} of {changes} converged); median cold {} iterations {:.3} s; worst warm/cold {worst_ratio:.2}",
+        "median warm {} iterations {:.3} s ({} of {changes} converged, {failed} starts failed); median cold {} iterations {:.3} s; worst warm/cold {worst_ratio:.2}",
         median(&mut warm_iterations),
         median(&mut warm_seconds),
         warm_seconds.len(),

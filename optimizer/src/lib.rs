@@ -35,8 +35,8 @@ pub use gait_problem::margins::Margins;
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    Attempt, BasinChoice, CancelToken, ColdGuess, ColdRoute, GaitProblem, GuessTiming, IterationRecord, OtherBasin,
-    SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation, WarmStart, solve,
-    solve_from_guesses,
+    Attempt, BasinChoice, CancelToken, ColdGuess, ColdRoute, GaitProblem, GuessTiming, IterationRecord, LinearAlgebra,
+    OtherBasin, Phase, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+    WarmStart, solve, solve_from_guesses,
 };
 pub use subject::{ModelError, Subject};

@@ -21,7 +21,9 @@ pub use cold_guesses::{ColdGuess, ColdRoute, CostStrategy, GuessTiming};
 pub use options::{BasinChoice, SolveOptions};
 pub use problem::GaitProblem;
 pub use progress::{CancelToken, IterationRecord, Phase};
-pub use report::{Attempt, Optimality, OtherBasin, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation};
+pub use report::{
+    Attempt, LinearAlgebra, Optimality, OtherBasin, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+};
 use report::{Tally, other_basin, outcome};
 use run::Context;
 pub use warm_start::WarmStart;
@@ -120,7 +122,7 @@ fn finish(
         one.attempt.chosen = index == chosen;
         tally.iterations += one.attempt.iterations;
         tally.evaluation_s += one.evaluation_s;
-        tally.linear_algebra_s += one.linear_algebra_s;
+        tally.linear_algebra.add(&one.linear_algebra);
         if index == chosen {
             answer = Some((one.choice, one.margins));
         } else if let Some(basin) = one.attempt.basin.filter(|basin| Some(*basin) != chosen_basin)

@@ -6,8 +6,8 @@ use gait_optimizer::gait::{Axis, ContactRowName, FootPoint, MuscleTrajectory, Si
 use gait_optimizer::nlp::WarmPoint;
 use gait_optimizer::solve::{Phase, StartedFrom};
 use gait_optimizer::{
-    CancelToken, DomainTrajectory, Gait, IterationRecord, Margins, SolveOutcome, SolveReport, SolveStatus, Violation,
-    WarmStart,
+    CancelToken, DomainTrajectory, Gait, IterationRecord, LinearAlgebra, Margins, SolveOutcome, SolveReport,
+    SolveStatus, Violation, WarmStart,
 };
 use gaitwright::store::TrialId;
 use gaitwright::workers::{Assignment, Evaluate};
@@ -112,6 +112,13 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             seconds_total: 0.01,
             seconds_evaluation: 0.005,
             seconds_linear_algebra: 0.005,
+            linear_algebra: Some(LinearAlgebra {
+                seconds_factorisation: 0.004,
+                seconds_solves: 0.001,
+                factorisations: ITERATIONS,
+                substitutions: 2 * ITERATIONS,
+                ..LinearAlgebra::default()
+            }),
             variables: 8,
             equalities: 4,
             inequalities: 2,

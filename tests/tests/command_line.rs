@@ -246,3 +246,33 @@ fn files_that_name_no_fields_and_a_dash_for_a_file_are_refused() {
     }
     refused(&["solve", "--out", "-"], "- is no file");
 }
+
+#[test]
+fn settings_of_the_solver_are_refused_with_field_value_and_range() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0,0.5,50,40\n";
+    std::fs::write(folder.path().join("actions.csv"), table).unwrap();
+    let commands = [&["solve"][..], &["tune"], &["sweep", "--actions", "actions.csv", "--out", "out.csv"]];
+    for (settings, expected) in [
+        (
+            r#"{"tau_min": 1.5}"#,
+            "solver.json: not settings of the solver: solver: setting tau_min is 1.5, allowed is 0.1",
+        ),
+        (r#"{"tau_mni": 0.9}"#, "field tau_mni is not known (line 1, column 10); known: one of tolerance, "),
+        (r#"{"tau_min": "high"}"#, "field tau_min: \"high\" is not accepted (line 1, column 18); allowed: a number"),
+        (r#"{"linear_solver": "ma57"}"#, "field linear_solver: \"ma57\" is not accepted"),
+        (r#"{"max_iterations": 5}"#, "max_iterations is decided by the phases of a solve"),
+        ("[]", "the whole document is not an object with named fields"),
+    ] {
+        std::fs::write(folder.path().join("solver.json"), settings).unwrap();
+        for command in commands {
+            let output = gaitwright(folder.path(), &[command, &["--solver-settings", "solver.json"]].concat());
+            let text = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{command:?} {settings}: {text}");
+            assert!(text.contains(expected), "{command:?} {settings}: {text}");
+        }
+    }
+    assert_eq!(cli::files(folder.path()), ["actions.csv", "solver.json"]);
+    refused(&["solve", "--problem", "p.json", "--solver-settings", "s.json"], "--solver-settings");
+    refused(&["solve", "--solver-settings", "nowhere.json"], "cannot read nowhere.json");
+}

@@ -41,6 +41,7 @@ fn redacted(value: &Value) -> Value {
     match value {
         Value::Number(_) => "[number]".into(),
         Value::String(text) if text.len() == 36 && text.matches('-').count() == 4 => "[id]".into(),
+        Value::String(text) if text.len() == 16 && text.bytes().all(|b| b.is_ascii_hexdigit()) => "[digest]".into(),
         Value::Array(list) if list.iter().all(Value::is_number) => json!(format!("[{} numbers]", list.len())),
         Value::Array(list) => list.iter().map(redacted).collect(),
         Value::Object(fields) => Value::Object(fields.iter().map(|(k, v)| (k.clone(), redacted(v))).collect()),
@@ -61,6 +62,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     let warm = json_of(&gaitwright(folder, &[&warm[..], &COARSE].concat()));
     insta::assert_json_snapshot!("solve_warm", redacted(&warm));
     assert!(warm["iterations"].as_u64() < cold["iterations"].as_u64());
+    assert_eq!(warm["lineage"]["ancestors"], json!([ancestor(&cold)]));
 
     // Every basin that the guesses reach is kept, and can be started from.
     let many = ["solve", "--json", "--cold-guesses", "4", "--out", "many.json"];
@@ -74,6 +76,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     assert_eq!(again["attempts"][0]["status"], "converged");
     let away = again["attempts"][0]["gait_rmse_rad"].as_f64().unwrap() - other["gait_rmse_rad"].as_f64().unwrap();
     assert!(away.abs() < 1e-3, "{away}");
+    assert_eq!(again["lineage"]["ancestors"][0]["basin"].as_u64(), other["basin"].as_u64());
     let unknown =
         cli::run(BINARY, folder, &[&["solve", "--warm", "many.json", "--warm-basin", "9"][..], &COARSE].concat());
     assert_eq!(unknown.status.code(), Some(2));
@@ -98,6 +101,77 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
     assert!(text.contains("it is without muscles, the problem is with muscles"), "{text}");
+}
+
+/// The answer of a solve as those that start from it name it.
+fn ancestor(figures: &Value) -> Value {
+    let lineage = &figures["lineage"];
+    json!({
+        "id": lineage["id"], "basin": lineage["basin"], "objective": figures["objective"],
+        "gait_rmse_rad": figures["gait_rmse_rad"]
+    })
+}
+
+#[test]
+fn a_gait_names_those_it_came_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let solve = |arguments: &[&str]| {
+        json_of(&gaitwright(folder, &[&["solve", "--json", "--cold-guesses", "1"], arguments, &COARSE].concat()))
+    };
+    let first = solve(&["--out", "first.json"]);
+    assert_eq!((&first["lineage"]["basin"], &first["lineage"]["ancestors"]), (&json!(1), &json!([])));
+    let second = solve(&["--warm", "first.json", "--bounds", "a5=0.013", "--out", "second.json"]);
+    let third = solve(&["--warm", "second.json", "--bounds", "a5=0.02"]);
+    assert_eq!(third["started_from"], "warm");
+    assert_eq!(third["lineage"]["ancestors"], json!([ancestor(&second), ancestor(&first)]));
+    assert_ne!(first["lineage"]["id"], second["lineage"]["id"]);
+
+    // For people the same, in words.
+    let output = gaitwright(folder, &[&["solve", "--warm", "second.json"][..], &COARSE].concat());
+    let text = String::from_utf8_lossy(&output.stdout);
+    for (words, gait) in [("started from", &second), ("which came from", &first)] {
+        let id = gait["lineage"]["id"].as_str().unwrap();
+        assert!(text.contains(&format!("  {words:<19}gait {id} (basin 1, objective ")), "{text}");
+    }
+
+    // A file of a version that kept no lineage, and one whose gait is not the one it speaks of.
+    let mut file: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("second.json")).unwrap()).unwrap();
+    file["lineage"]["id"] = "0123456789abcdef".into();
+    std::fs::write(folder.join("other.json"), file.to_string()).unwrap();
+    file.as_object_mut().unwrap().remove("lineage");
+    std::fs::write(folder.join("older.json"), file.to_string()).unwrap();
+    for name in ["other.json", "older.json"] {
+        let child = solve(&["--warm", name, "--bounds", "a5=0.02"]);
+        assert_eq!(child["lineage"]["ancestors"], json!([ancestor(&second)]), "{name}");
+    }
+
+    // A gait of the cold start that follows a warm one in vain has not come from there.
+    for x in file["warm_start"]["point"]["x"].as_array_mut().unwrap() {
+        *x = 0.0.into();
+    }
+    std::fs::write(folder.join("nothing.json"), file.to_string()).unwrap();
+    let fresh = solve(&["--warm", "nothing.json"]);
+    assert_eq!((&fresh["started_from"], &fresh["lineage"]["ancestors"]), (&json!("cold_after_warm"), &json!([])));
+    assert_eq!(fresh["lineage"]["id"], first["lineage"]["id"]);
+    let output = gaitwright(folder, &[&["solve", "--warm", "nothing.json"][..], &COARSE].concat());
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("  started from       its own guesses: nothing converged from gait "), "{text}");
+}
+
+#[test]
+fn settings_of_the_solver_are_taken_from_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("solver.json"), r#"{"kappa_mu": 0.9, "theta_mu": 1.05}"#).unwrap();
+    let solve = ["solve", "--json", "--cold-guesses", "1"];
+    let iterations = |flags: &[&str]| {
+        let figures = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
+        assert_eq!(figures["status"], "converged");
+        figures["iterations"].as_u64().unwrap()
+    };
+    // The barrier parameter falls otherwise, so the way is another one.
+    assert_ne!(iterations(&["--solver-settings", "solver.json"]), iterations(&[]));
 }
 
 /// A place that goes away while the solve runs: the figures are printed all the same.

@@ -11,3 +11,16 @@ pub(crate) const LEVELS: [&[f64]; 8] = [
     &[20.0, 35.0, 50.0],
     &[20.0, 30.0, 40.0],
 ];
+
+/// Values far beyond Table I, as those of `explanations`.
+#[allow(dead_code)] // each example takes what it needs
+pub(crate) const TIGHT: [&[f64]; 8] = [
+    &[2.0, 3.0, 4.0],
+    &[10.0, 20.0, 30.0],
+    &[1.5, 2.0],
+    &[0.35, 0.5],
+    &[0.15, 0.2, 0.3],
+    &[0.0, 0.02],
+    &[5.0, 10.0],
+    &[5.0, 8.0],
+];

@@ -341,17 +341,15 @@ impl<'p> Run<'p> {
         }
     }
 
-    /// Row multipliers by least squares at the point; zero when they come out too large.
+    /// Row multipliers by least squares at the point; zero when they come out too large or cannot be solved for.
     pub(super) fn estimate_multipliers(&mut self, session: &mut Session) {
         session.newton.fit(&self.form);
-        let settings = session.settings;
         let y = session.newton.least_squares_multipliers(
             &self.form,
+            session.settings,
             &self.gradient,
             &self.point,
             &self.at.jacobian,
-            settings.dual_regularisation_value,
-            settings.multiplier_limit,
         );
         match y {
             Some(y) => self.point.y = y,

@@ -11,6 +11,7 @@
 //! matrix of `kkt`; the residual is always that of the full system above, which is not symmetric and not scaled by
 //! the eliminated slacks (WB06 section 3.10).
 
+use std::iter::repeat;
 use std::time::Instant;
 
 use super::factorisation::{Change, Inertia, KktSolver};
@@ -68,6 +69,18 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     if all_finite(values) { largest_magnitude(values) } else { f64::INFINITY }
 }
 
+/// |r| / (|rhs| + min(|d|, 1e6 |rhs|)); infinite when the solution d is not finite.
+fn relative(residual: f64, size: f64, length: f64) -> f64 {
+    let scale = size + length.min(1e6 * size);
+    if !length.is_finite() {
+        f64::INFINITY
+    } else if scale > 0.0 {
+        residual / scale
+    } else {
+        0.0
+    }
+}
+
 /// Derivatives and slacks at the current point.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Linearisation {
@@ -89,7 +102,9 @@ pub(super) struct Solved {
 /// Clock of the linear algebra.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LinearTally {
+    /// Assembly and factorisation.
     pub factor_seconds: f64,
+    /// Substitutions, residuals and refinement.
     pub solve_seconds: f64,
     pub factorisations: usize,
     pub backsolves: usize,
@@ -187,33 +202,71 @@ impl NewtonSystem {
     }
 
     /// min |grad F + A^T y - z_L + z_U|^2 over y, by the regularised augmented system with H = I (WB06 section 3.6).
-    /// `None` when the factorisation fails or the result exceeds `limit`.
+    /// The inertia of that matrix is known, so a factorisation that counts another one is distrusted like one whose
+    /// solution has a large residual. `None` when no method solves it or the result exceeds the multipliers' limit.
     pub(super) fn least_squares_multipliers(
         &mut self,
         form: &Formulation,
+        settings: &NlpSettings,
         gradient: &[f64],
         point: &PrimalDual,
         jacobian: &[f64],
-        delta_c: f64,
-        limit: f64,
     ) -> Option<Vec<f64>> {
         self.diagonal.fill(1.0);
         self.delta_w = 0.0;
-        self.delta_c = delta_c;
-        let inertia = self.factor_with(form, None, jacobian, Change::Any)?;
-        if inertia.negative != form.m || inertia.zero > 0 {
-            return None;
-        }
+        self.delta_c = settings.dual_regularisation_value;
         let b: Vec<f64> = (0..form.length()).map(|j| -(gradient[j] - point.zl[j] + point.zu[j])).collect();
         let zero = vec![0.0; form.m];
         let (mut dw, mut y) = (vec![0.0; form.length()], vec![0.0; form.m]);
-        self.reduced_solve(form, &b, &zero, &mut dw, &mut y);
-        (largest(&y) <= limit).then_some(y)
+        let mut change = Change::Any;
+        loop {
+            let inertia = self.factor_with(form, None, jacobian, change)?;
+            change = Change::Diagonal;
+            if inertia.negative == form.m && inertia.zero == 0 {
+                let clock = Instant::now();
+                self.reduced_solve(form, &b, &zero, &mut dw, &mut y);
+                let residual = self.least_squares_residual(form, jacobian, &b, &dw, &y);
+                self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+                if residual <= settings.residual_limit {
+                    return (largest(&y) <= settings.multiplier_limit).then_some(y);
+                }
+            }
+            if !self.solver.distrust() {
+                return None;
+            }
+        }
+    }
+
+    /// Relative residual of dw + A^T y = b, A dw - delta_c y = 0, measured as that of the full system.
+    fn least_squares_residual(
+        &mut self,
+        form: &Formulation,
+        jacobian: &[f64],
+        b: &[f64],
+        dw: &[f64],
+        y: &[f64],
+    ) -> f64 {
+        let r = &mut self.residual;
+        r.w.copy_from_slice(dw);
+        r.y.fill(0.0);
+        form.add_both_products(jacobian, y, &mut r.w, dw, &mut r.y);
+        // Fixed variables do not move, whatever their gradient.
+        let mut size: f64 = 0.0;
+        for ((r, b), fixed) in r.w.iter_mut().zip(b).zip(form.fixed.iter().map(Option::is_some).chain(repeat(false))) {
+            *r = if fixed { 0.0 } else { b - *r };
+            size = size.max(if fixed { 0.0 } else { b.abs() });
+        }
+        for (i, r) in r.y.iter_mut().enumerate() {
+            let delta_c = if self.unregularised[form.n + i] { 0.0 } else { self.delta_c };
+            *r = if form.rows[i] == super::formulation::RowKind::Free { 0.0 } else { *r - delta_c * y[i] };
+        }
+        let error = largest(&r.w).max(largest(&r.y));
+        let length = largest(dw).max(largest(y));
+        relative(error, size, length)
     }
 
     /// Solves (W + d) dw + A^T dy = b, A dw - delta_c dy = c with the last factorisation.
     fn reduced_solve(&mut self, form: &Formulation, b: &[f64], c: &[f64], dw: &mut [f64], dy: &mut [f64]) {
-        let clock = Instant::now();
         let n = form.n;
         for j in 0..n {
             self.rhs[j] = if form.fixed[j].is_some() { 0.0 } else { b[j] };
@@ -228,7 +281,6 @@ impl NewtonSystem {
         for (k, a) in form.attached.iter().enumerate() {
             dw[n + k] = (b[n + k] - a.sign * dy[a.row]) / self.diagonal[n + k];
         }
-        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
         self.tally.backsolves += 1;
     }
 
@@ -312,8 +364,11 @@ impl NewtonSystem {
         rhs: &PrimalDual,
         out: &mut PrimalDual,
     ) -> f64 {
+        let clock = Instant::now();
         self.full_solve(form, point, at, rhs, out);
-        self.relative_residual(form, point, at, rhs, out)
+        let residual = self.relative_residual(form, point, at, rhs, out);
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        residual
     }
 
     /// Leaves the residual itself in `self.residual`.
@@ -326,15 +381,7 @@ impl NewtonSystem {
         out: &PrimalDual,
     ) -> f64 {
         self.full_residual(form, point, at, rhs, out);
-        let (size, length) = (rhs.largest(), out.largest());
-        let scale = size + length.min(1e6 * size);
-        if !length.is_finite() {
-            f64::INFINITY
-        } else if scale > 0.0 {
-            self.residual.largest() / scale
-        } else {
-            0.0
-        }
+        relative(self.residual.largest(), rhs.largest(), out.largest())
     }
 
     /// Solves the full system and refines; returns the relative residual of the solution.
@@ -348,7 +395,24 @@ impl NewtonSystem {
         out: &mut PrimalDual,
     ) -> Solved {
         let unrefined = self.unrefined_residual(form, point, at, rhs, out);
-        let solved = |refined| Solved { unrefined, refined };
+        let clock = Instant::now();
+        let refined = self.refine(form, settings, point, at, rhs, out, unrefined);
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        Solved { unrefined, refined }
+    }
+
+    /// Refines a solution whose residual is in `self.residual`; returns the relative residual then.
+    #[allow(clippy::too_many_arguments)] // the system, its right-hand side, its solution
+    fn refine(
+        &mut self,
+        form: &Formulation,
+        settings: &NlpSettings,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+        unrefined: f64,
+    ) -> f64 {
         let (mut best, mut ratio) = (f64::INFINITY, unrefined);
         let mut refinements = 0;
         loop {
@@ -359,15 +423,15 @@ impl NewtonSystem {
                         *x -= y;
                     }
                 }
-                return solved(best);
+                return best;
             }
             let stagnates = refinements > 0 && ratio > 0.5 * best;
             best = ratio;
             if ratio <= settings.residual_target || !ratio.is_finite() || stagnates {
-                return solved(best);
+                return best;
             }
             if refinements == settings.max_refinements {
-                return solved(best);
+                return best;
             }
             let residual = std::mem::take(&mut self.residual);
             let mut correction = std::mem::take(&mut self.correction);
@@ -377,6 +441,122 @@ impl NewtonSystem {
             out.add(&self.correction);
             refinements += 1;
             ratio = self.relative_residual(form, point, at, rhs, out);
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::nlp::linear_solver;
+    use crate::nlp::problem::{NonlinearProgram, SparsityPattern};
+
+    /// min x_1 + 2 x_2, x_1 + x_2 = 1.
+    struct Line {
+        jacobian: SparsityPattern,
+        hessian: SparsityPattern,
+    }
+
+    impl NonlinearProgram for Line {
+        fn variables(&self) -> usize {
+            2
+        }
+        fn rows(&self) -> usize {
+            1
+        }
+        fn variable_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+            lower.fill(f64::NEG_INFINITY);
+            upper.fill(f64::INFINITY);
+        }
+        fn row_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+            lower.fill(1.0);
+            upper.fill(1.0);
+        }
+        fn jacobian_pattern(&self) -> &SparsityPattern {
+            &self.jacobian
+        }
+        fn hessian_pattern(&self) -> &SparsityPattern {
+            &self.hessian
+        }
+        fn objective(&self, x: &[f64]) -> f64 {
+            x[0] + 2.0 * x[1]
+        }
+        fn gradient(&self, _x: &[f64], gradient: &mut [f64]) {
+            gradient.copy_from_slice(&[1.0, 2.0]);
+        }
+        fn constraints(&self, x: &[f64], values: &mut [f64]) {
+            values[0] = x[0] + x[1];
+        }
+        fn jacobian(&self, _x: &[f64], values: &mut [f64]) {
+            values.fill(1.0);
+        }
+        fn hessian(&self, _x: &[f64], _sigma: f64, _multipliers: &[f64], _values: &mut [f64]) {}
+    }
+
+    /// A factorisation that is wrong until it is distrusted.
+    struct Faulty {
+        exact: Box<dyn KktSolver>,
+        /// Factor on its solutions.
+        factor: f64,
+        /// Negative eigenvalues that it counts too many.
+        miscounted: usize,
+        has_another_method: bool,
+    }
+
+    impl KktSolver for Faulty {
+        fn factor(&mut self, values: &[f64], change: Change) -> Option<Inertia> {
+            let inertia = self.exact.factor(values, change)?;
+            Some(Inertia { negative: inertia.negative + self.miscounted, ..inertia })
+        }
+        fn solve(&mut self, rhs: &mut [f64]) {
+            self.exact.solve(rhs);
+            for x in rhs {
+                *x *= self.factor;
+            }
+        }
+        fn factor_entries(&self) -> usize {
+            self.exact.factor_entries()
+        }
+        fn distrust(&mut self) -> bool {
+            (self.factor, self.miscounted) = (1.0, 0);
+            std::mem::take(&mut self.has_another_method)
+        }
+    }
+
+    /// Multipliers by a faulty factorisation, and how often was factorised.
+    fn multipliers(factor: f64, miscounted: usize, has_another_method: bool) -> (Option<Vec<f64>>, usize) {
+        let pattern = |rows, column_starts: &[usize], row_indices: &[usize]| SparsityPattern {
+            rows,
+            columns: 2,
+            column_starts: column_starts.to_vec(),
+            row_indices: row_indices.to_vec(),
+        };
+        let line = Line { jacobian: pattern(1, &[0, 1, 2], &[0, 0]), hessian: pattern(2, &[0, 0, 0], &[]) };
+        let settings = NlpSettings::default();
+        let form = Formulation::new(&line, &settings).unwrap();
+        let matrix = KktMatrix::new(&form);
+        let exact = linear_solver::choose(&form, &matrix, &settings).unwrap();
+        let faulty = Faulty { exact, factor, miscounted, has_another_method };
+        let mut newton = NewtonSystem::new(matrix, Box::new(faulty));
+        newton.fit(&form);
+        let y = newton.least_squares_multipliers(&form, &settings, &[1.0, 2.0], &PrimalDual::zeros(&form), &[1.0, 1.0]);
+        (y, newton.tally.factorisations)
+    }
+
+    #[test]
+    fn least_squares_multipliers_are_those_of_a_factorisation_that_can_be_trusted() {
+        for (factor, miscounted, factorisations) in [(1.0, 0, 1), (1.001, 0, 2), (f64::NAN, 0, 2), (1.0, 1, 2)] {
+            let (y, times) = multipliers(factor, miscounted, true);
+            assert!((y.unwrap()[0] + 1.5).abs() < 1e-7, "{factor} {miscounted}");
+            assert_eq!(times, factorisations, "{factor} {miscounted}");
+        }
+    }
+
+    #[test]
+    fn there_are_no_least_squares_multipliers_where_the_only_factorisation_is_wrong() {
+        for (factor, miscounted) in [(1.001, 0), (f64::NAN, 0), (1.0, 1)] {
+            assert_eq!(multipliers(factor, miscounted, false), (None, 1), "{factor} {miscounted}");
         }
     }
 }

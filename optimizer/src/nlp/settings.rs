@@ -111,7 +111,8 @@ pub struct NlpSettings {
     pub warm_multiplier_push: f64,
     /// First bound multipliers of a cold start. Default one.
     pub bound_multiplier_start: BoundMultiplierStart,
-    /// Least-squares row multipliers larger than this are replaced by zero. Default 1000 (WB06 lambda_max). From 0.
+    /// Least-squares row multipliers larger than this are replaced by zero, as are those whose system is not solved to
+    /// `residual_limit`. Default 1000 (WB06 lambda_max). From 0.
     pub multiplier_limit: f64,
 
     /// Gradient-based scaling at the start: objective and rows are scaled down until their largest derivative is

@@ -81,9 +81,9 @@ pub struct Timing {
     pub evaluation: f64,
     /// Analysis of the KKT structure.
     pub analysis: f64,
-    /// Numerical factorisations.
+    /// Assembly of the KKT matrix and its numerical factorisations.
     pub factorisation: f64,
-    /// Forward and backward substitutions.
+    /// Forward and backward substitutions, residuals and refinement.
     pub backsolves: f64,
     /// Everything.
     pub total: f64,
@@ -106,7 +106,7 @@ pub struct Counts {
     pub constraint_evaluations: usize,
     /// Stored entries of the factor.
     pub factor_entries: usize,
-    /// Times the multifrontal factorisation gave way to the supernodal one.
+    /// Times a factorisation broke down or was not trusted, and another method was asked.
     pub solver_fallbacks: usize,
 }
 

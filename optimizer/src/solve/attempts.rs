@@ -4,7 +4,7 @@
 use super::cold_guesses::ColdGuess;
 use super::run::{Context, Run};
 use super::warm_start::Start;
-use super::{Attempt, BasinChoice, IterationRecord, Phase, SolveError, SolveStatus};
+use super::{Attempt, BasinChoice, IterationRecord, LinearAlgebra, Phase, SolveError, SolveStatus};
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
 use crate::gait_problem::margins::{Margins, excess_between_points};
@@ -75,7 +75,7 @@ pub(super) struct Tried {
     /// Bounds that were tightened.
     pub(super) margins: Margins,
     pub(super) evaluation_s: f64,
-    pub(super) linear_algebra_s: f64,
+    pub(super) linear_algebra: LinearAlgebra,
 }
 
 impl Tried {
@@ -90,13 +90,15 @@ impl Tried {
             attempt: choice.attempt(strategy, run),
             margins,
             evaluation_s: run.evaluation_s,
-            linear_algebra_s: run.linear_algebra_s,
+            linear_algebra: run.linear_algebra,
             choice,
         }
     }
 }
 
-/// Tries a warm start, its bounds tightened as they were there.
+/// Tries a warm start, its bounds tightened as they were there. It has the iterations that any attempt has: what goes
+/// nowhere for long may converge all the same, and where no gait is found from it none is found soon otherwise
+/// (optimizer/README.md, warm starts that fail).
 pub(super) fn try_warm(
     context: &Context<'_>,
     start: Start,

@@ -33,8 +33,6 @@ pub enum GuessTiming {
     /// Both steps alike.
     #[default]
     Even,
-    /// The step on the prosthesis rises early onto its toe, the other late.
-    EarlyRise,
     /// When each stance foot rises onto its toe: 0, early in its step (at 0.15 of the stride after the first strike), to 1, late
     /// (at 0.36).
     Rises {
@@ -46,10 +44,12 @@ pub enum GuessTiming {
 }
 
 impl GuessTiming {
+    /// The step on the prosthesis rises early onto its toe, the other late.
+    pub const EARLY_RISE: Self = Self::Rises { right: 0.0, left: 1.0 };
+
     pub(super) fn fractions(self) -> StrideTiming {
         match self {
             Self::Even => EVEN_TIMING,
-            Self::EarlyRise => [0.0, 0.04, 0.06, 0.15, 0.5, 0.54, 0.56, 0.86, 1.0],
             Self::Rises { right, left } => {
                 [0.0, 0.04, 0.06, 0.15 + 0.21 * right, 0.5, 0.54, 0.56, 0.65 + 0.21 * left, 1.0]
             }
@@ -133,7 +133,7 @@ impl ColdGuess {
         strategy: CostStrategy::Usual,
     };
     /// With muscles mostly the basin with the lowest objective and a stiff swing knee.
-    pub const EARLY_RISE: Self = Self { timing: GuessTiming::EarlyRise, curvature_from: 0.3, ..Self::NATURAL };
+    pub const EARLY_RISE: Self = Self { timing: GuessTiming::EARLY_RISE, curvature_from: 0.3, ..Self::NATURAL };
 
     /// What a cold start tries: the first [`SolveOptions::cold_guesses`](super::SolveOptions) in any case, the
     /// others one after the other while none has converged, [perturbed](Self::perturbed) ones where more are asked for.
@@ -247,14 +247,17 @@ impl ColdGuess {
             ColdRoute::PlainOptimum => "cold, from the optimum without muscles",
         }
         .to_owned();
-        if self.timing == GuessTiming::EarlyRise {
+        let early_rise = self.timing == GuessTiming::EARLY_RISE;
+        if early_rise {
             label.push_str(", early rise");
         }
         if let Some(strategy) = self.strategy.in_words() {
             label.push_str(", ");
             label.push_str(strategy);
         }
-        if let GuessTiming::Rises { right, left } = self.timing {
+        if let GuessTiming::Rises { right, left } = self.timing
+            && !early_rise
+        {
             let when = |rise: f64| match rise {
                 0.0 => "early".to_owned(),
                 1.0 => "late".to_owned(),
@@ -264,7 +267,7 @@ impl ColdGuess {
                 label.push_str(part);
             }
         }
-        let normal = if self.timing == GuessTiming::EarlyRise { Self::EARLY_RISE } else { Self::NATURAL };
+        let normal = if early_rise { Self::EARLY_RISE } else { Self::NATURAL };
         for (name, value, usual, unit) in [
             ("knee flexion x", self.knee_flexion, normal.knee_flexion, ""),
             ("stride time ", self.stride_time_s, normal.stride_time_s, " s"),
@@ -306,7 +309,13 @@ mod tests {
     }
 
     #[test]
+    fn an_early_rise_is_early_on_the_right_and_late_on_the_left() {
+        assert_eq!(GuessTiming::EARLY_RISE.fractions(), [0.0, 0.04, 0.06, 0.15, 0.5, 0.54, 0.56, 0.86, 1.0]);
+    }
+
+    #[test]
     fn a_label_says_what_was_perturbed() {
+        assert_eq!(ColdGuess::CATALOGUE[4].label(), "cold, muscle tracking, early rise");
         assert_eq!(ColdGuess::CATALOGUE[12].label(), "cold, direct, rises late right, early left");
         assert_eq!(
             ColdGuess::perturbed(0).label(),

@@ -92,6 +92,51 @@ pub struct Optimality {
     pub barrier: f64,
 }
 
+/// What the linear algebra of a solve took, over all its attempts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
+pub struct LinearAlgebra {
+    /// Analysing the matrices' structure, once a phase, s.
+    pub seconds_analysis: f64,
+    /// Assembling and factorising, s.
+    pub seconds_factorisation: f64,
+    /// Substitutions, residuals and refinement, s.
+    pub seconds_solves: f64,
+    /// Numerical factorisations.
+    pub factorisations: usize,
+    /// Forward-backward substitutions, those of refinement included.
+    pub substitutions: usize,
+    /// Times a factorisation broke down or was not trusted, and another method was asked.
+    pub fallbacks: usize,
+}
+
+impl LinearAlgebra {
+    /// Adds what one phase took.
+    pub(super) fn add_phase(&mut self, result: &NlpResult) {
+        self.add(&Self {
+            seconds_analysis: result.timing.analysis,
+            seconds_factorisation: result.timing.factorisation,
+            seconds_solves: result.timing.backsolves,
+            factorisations: result.counts.factorisations,
+            substitutions: result.counts.backsolves,
+            fallbacks: result.counts.solver_fallbacks,
+        });
+    }
+
+    /// Adds what another attempt took.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.seconds_analysis += other.seconds_analysis;
+        self.seconds_factorisation += other.seconds_factorisation;
+        self.seconds_solves += other.seconds_solves;
+        self.factorisations += other.factorisations;
+        self.substitutions += other.substitutions;
+        self.fallbacks += other.fallbacks;
+    }
+
+    fn seconds(&self) -> f64 {
+        self.seconds_analysis + self.seconds_factorisation + self.seconds_solves
+    }
+}
+
 /// The figures of one solve: a contract for scripts (`gaitwright solve --json`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolveReport {
@@ -120,10 +165,14 @@ pub struct SolveReport {
     pub tightened_bounds: usize,
     /// Wall time, s.
     pub seconds_total: f64,
-    /// Of which evaluating functions and derivatives.
+    /// Evaluating functions and derivatives, s. This and what follows are sums over the attempts: of attempts side by side
+    /// they may be more than the wall time.
     pub seconds_evaluation: f64,
-    /// Of which factorising and solving.
+    /// Linear algebra, s.
     pub seconds_linear_algebra: f64,
+    /// Its parts; `None` in records of versions that did not say.
+    #[serde(default)]
+    pub linear_algebra: Option<LinearAlgebra>,
     /// Number of variables.
     pub variables: usize,
     /// Number of equality rows.
@@ -191,7 +240,7 @@ pub struct SolveOutcome {
 pub(super) struct Tally {
     pub(super) iterations: usize,
     pub(super) evaluation_s: f64,
-    pub(super) linear_algebra_s: f64,
+    pub(super) linear_algebra: LinearAlgebra,
     pub(super) attempts: Vec<Attempt>,
 }
 
@@ -232,7 +281,8 @@ pub(super) fn outcome(
         tightened_bounds: margins.count(),
         seconds_total: context.started.elapsed().as_secs_f64(),
         seconds_evaluation: tally.evaluation_s,
-        seconds_linear_algebra: tally.linear_algebra_s,
+        seconds_linear_algebra: tally.linear_algebra.seconds(),
+        linear_algebra: Some(tally.linear_algebra),
         variables: programme.variables(),
         equalities,
         inequalities: programme.rows() - equalities,
@@ -276,5 +326,44 @@ fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {
         let variable = violation.variable.unwrap_or(0);
         let (label, unit) = programme.layout.variable_label(variable);
         Violation { row: label, amount: violation.amount * programme.layout.scale[variable], unit: unit.to_owned() }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::{LinearAlgebra, SolveReport};
+    use serde_json::{Value, json};
+
+    fn older() -> Value {
+        json!({
+            "status": "converged", "started_from": "cold", "iterations": 3, "objective": 0.06, "cost_of_transport": 0.05,
+            "gait_rmse_rad": 0.5, "gait_rmse_parts_rad": [0.1, 0.1, 0.1, 0.1, 0.1], "max_violation": 1e-9,
+            "seconds_total": 1.0, "seconds_evaluation": 0.1, "seconds_linear_algebra": 0.8, "variables": 8,
+            "equalities": 4, "inequalities": 2, "speed_m_s": 1.0, "stride_length_m": 1.1,
+            "durations_s": [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1], "vhip_m_s": [1.0, 1.0, 1.0, 1.0]
+        })
+    }
+
+    #[test]
+    fn a_report_of_an_older_version_is_read_and_says_nothing_of_the_parts() {
+        let report: SolveReport = serde_json::from_value(older()).unwrap();
+        assert_eq!((report.seconds_linear_algebra, report.linear_algebra), (0.8, None));
+    }
+
+    #[test]
+    fn attempts_add_up() {
+        let one = LinearAlgebra {
+            seconds_analysis: 0.25,
+            seconds_factorisation: 0.5,
+            seconds_solves: 0.125,
+            factorisations: 3,
+            substitutions: 7,
+            fallbacks: 1,
+        };
+        let mut sum = one;
+        sum.add(&one);
+        assert_eq!(sum.seconds(), 2.0 * one.seconds());
+        assert_eq!((sum.factorisations, sum.substitutions, sum.fallbacks), (6, 14, 2));
     }
 }

@@ -1,7 +1,7 @@
 //! One attempt in progress: its phases, and what they cost.
 
 use super::cold_guesses::{ColdGuess, ColdRoute};
-use super::{CancelToken, GaitProblem, IterationRecord, Phase, SolveError, SolveOptions};
+use super::{CancelToken, GaitProblem, IterationRecord, LinearAlgebra, Phase, SolveError, SolveOptions};
 use crate::cold_start;
 use crate::gait_problem::GaitProgramme;
 use crate::nlp::{
@@ -43,7 +43,7 @@ pub(super) struct Run<'a> {
     pub(super) guess: usize,
     pub(super) iterations: usize,
     pub(super) evaluation_s: f64,
-    pub(super) linear_algebra_s: f64,
+    pub(super) linear_algebra: LinearAlgebra,
     /// Why a phase could not begin; empty when all could.
     pub(super) reason: String,
 }
@@ -58,7 +58,7 @@ impl<'a> Run<'a> {
             guess: 0,
             iterations: 0,
             evaluation_s: 0.0,
-            linear_algebra_s: 0.0,
+            linear_algebra: LinearAlgebra::default(),
             reason: String::new(),
         }
     }
@@ -115,7 +115,7 @@ impl<'a> Run<'a> {
         };
         self.iterations += result.iterations;
         self.evaluation_s += result.timing.evaluation;
-        self.linear_algebra_s += result.timing.analysis + result.timing.factorisation + result.timing.backsolves;
+        self.linear_algebra.add_phase(&result);
         Ok(result)
     }
 

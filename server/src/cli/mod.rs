@@ -6,6 +6,7 @@ mod config;
 mod convert;
 mod emg;
 mod gait_file;
+mod lineage;
 mod logging;
 mod numbers;
 mod out_file;

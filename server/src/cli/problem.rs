@@ -1,6 +1,7 @@
 //! What `solve` and `sweep` share: flags of the gait problem, warm-start files, cancellation.
 
 use super::body::{Body, Switch};
+use super::lineage::{Lineage, Start, basin_of_answer};
 use super::numbers::iterations;
 use super::output::tell;
 use super::serve::interrupted;
@@ -8,11 +9,14 @@ use crate::document;
 use crate::error::Error;
 use crate::studies::device;
 use clap::Args;
+use gait_optimizer::nlp::NlpSettings;
 use gait_optimizer::{
-    CancelToken, Device, GaitProblem, GaitSettings, Mesh, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
-    WarmStart,
+    CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherBasin, ReferenceGait, SolveOptions, SolveOutcome,
+    TunedBounds,
 };
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Files that describe what differs from the built-in problem.
@@ -28,6 +32,10 @@ pub(super) struct ProblemFiles {
     /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
+    /// Settings of the interior point (JSON, only what differs from the defaults), as in {"tau_min": 0.995,
+    /// "linear_solver": "delayed_pivots"}; a name that it does not know is answered with those that it does.
+    #[arg(long, value_name = "FILE")]
+    solver_settings: Option<PathBuf>,
 }
 
 impl ProblemFiles {
@@ -48,9 +56,29 @@ impl ProblemFiles {
         })
     }
 
+    /// The usual options, with the settings of the interior point that were given.
+    pub(super) fn options(&self) -> Result<SolveOptions, Error> {
+        match &self.solver_settings {
+            Some(path) => options_with_solver(&read(path)?)
+                .map_err(|e| Error::Malformed(format!("{}: not settings of the solver: {e}", path.display()))),
+            None => Ok(SolveOptions::default()),
+        }
+    }
+
     pub(super) fn reference(&self) -> Result<ReferenceGait, Error> {
         reference_of(self.reference.as_deref())
     }
+}
+
+/// Options whose solver is that of a document.
+fn options_with_solver(text: &str) -> Result<SolveOptions, Error> {
+    // By itself first: what cannot be read is then told with its field and its place.
+    document::read::<NlpSettings>(text.as_bytes())?;
+    let solver: Value = document::read(text.as_bytes())?;
+    let options: SolveOptions =
+        serde_json::from_value(json!({ "solver": solver })).map_err(|e| Error::Malformed(e.to_string()))?;
+    options.validate()?;
+    Ok(options)
 }
 
 /// The reference gait of a file, or the built-in one.
@@ -98,12 +126,12 @@ impl ProblemFlags {
 
     /// The files that are read.
     pub(super) fn inputs(&self) -> Vec<&Path> {
-        let ProblemFiles { device, settings, reference } = &self.files;
-        [device, settings, reference, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
+        let ProblemFiles { device, settings, reference, solver_settings } = &self.files;
+        [device, settings, reference, solver_settings, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {
-        let mut options = SolveOptions { time_limit_s: self.time_limit_s, ..SolveOptions::default() };
+        let mut options = SolveOptions { time_limit_s: self.time_limit_s, ..self.files.options()? };
         options.tolerance = self.tolerance.unwrap_or(options.tolerance);
         options.max_iterations = self.max_iterations.unwrap_or(options.max_iterations);
         options.validate()?;
@@ -111,11 +139,15 @@ impl ProblemFlags {
     }
 
     /// The start that was given; `basin` chooses another one than the answer of the solve that wrote the file.
-    pub(super) fn warm_start(&self, basin: Option<usize>) -> Result<Option<WarmStart>, Error> {
+    pub(super) fn warm_start(&self, basin: Option<usize>) -> Result<Option<Start>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let outcome: SolveOutcome = read_document(path, "a file of `gaitwright solve --out`", |_| Ok(()))?;
-        let answers = outcome.report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin);
-        let Some(basin) = basin.filter(|basin| Some(*basin) != answers) else { return Ok(Some(outcome.warm_start)) };
+        let what = "a file of `gaitwright solve --out`";
+        let outcome: SolveOutcome = read_document(path, what, |_| Ok(()))?;
+        let Kept { lineage } = read_document(path, what, |_| Ok(()))?;
+        let answers = basin_of_answer(&outcome.report);
+        let Some(basin) = basin.filter(|basin| Some(*basin) != answers) else {
+            return Ok(Some(Start::answer(outcome, lineage)));
+        };
         let mut known: Vec<usize> = answers.into_iter().chain(outcome.other_basins.iter().map(|o| o.basin)).collect();
         known.sort_unstable();
         let other = outcome.other_basins.into_iter().find(|other| other.basin == basin);
@@ -123,8 +155,18 @@ impl ProblemFlags {
             let known = known.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
             Error::Malformed(format!("--warm-basin {basin} is not in {}; there are: {known}", path.display()))
         };
-        other.map(|other| Some(other.warm_start)).ok_or_else(refused)
+        let start = |other: OtherBasin| {
+            Start::cold(other.warm_start, (Some(other.basin), other.objective, other.gait_rmse_rad))
+        };
+        other.map(|other| Some(start(other))).ok_or_else(refused)
     }
+}
+
+/// What a file of `solve --out` says of its lineage; older ones say nothing.
+#[derive(Deserialize)]
+struct Kept {
+    #[serde(default)]
+    lineage: Option<Lineage>,
 }
 
 pub(super) fn read(path: &Path) -> Result<String, Error> {

@@ -1,6 +1,7 @@
 //! `gaitwright solve`: one gait.
 
 use super::Ended;
+use super::lineage::{Lineage, Start, basin_of_answer};
 use super::numbers::whole;
 use super::out_file::OutFile;
 use super::output::data;
@@ -12,7 +13,8 @@ use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::{
-    BasinChoice, ColdGuess, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, TunedBounds, solve,
+    BasinChoice, ColdGuess, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
+    TunedBounds, solve,
 };
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -44,7 +46,7 @@ pub(super) struct Solve {
         value_name = "FILE",
         conflicts_with_all = [
             "subject", "height_m", "mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
-            "max_iterations", "time_limit_s", "bounds", "cold_guesses", "nearest_within"
+            "max_iterations", "time_limit_s", "solver_settings", "bounds", "cold_guesses", "nearest_within"
         ]
     )]
     problem: Option<PathBuf>,
@@ -58,7 +60,7 @@ pub(super) struct Solve {
     /// the lowest.
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     nearest_within: Option<f64>,
-    /// Write the whole outcome (figures, gait, multipliers, gaits of other basins) as JSON.
+    /// Write the whole outcome (figures, gait, multipliers, gaits of other basins, what it came from) as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the figures as one JSON object.
@@ -77,22 +79,30 @@ pub(super) struct Solve {
 struct Figures<'a> {
     #[serde(flatten)]
     report: &'a SolveReport,
+    lineage: &'a Lineage,
     #[serde(skip_serializing_if = "Option::is_none")]
     certificate: Option<&'a Certificate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     explanation: Option<&'a Explanation>,
 }
 
+/// What is written of a solve.
+#[derive(Debug, Serialize)]
+struct Kept<'a> {
+    #[serde(flatten)]
+    outcome: &'a SolveOutcome,
+    lineage: &'a Lineage,
+}
+
 impl Solve {
-    fn input(&self) -> Result<SolveInput, Error> {
+    fn input(&self) -> Result<(GaitProblem, SolveOptions, Option<Start>), Error> {
         if let Some(path) = &self.problem {
-            return read_document(path, "what a trial solved", SolveInput::check);
+            let SolveInput { problem, options, warm_start } =
+                read_document(path, "what a trial solved", SolveInput::check)?;
+            return Ok((problem, options, warm_start.map(Start::unknown)));
         }
-        Ok(SolveInput {
-            problem: self.flags.problem(TunedBounds::parse(&self.bounds)?)?,
-            options: self.options()?,
-            warm_start: self.flags.warm_start(self.warm_basin)?,
-        })
+        let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
+        Ok((problem, self.options()?, self.flags.warm_start(self.warm_basin)?))
     }
 
     fn options(&self) -> Result<SolveOptions, Error> {
@@ -106,7 +116,8 @@ impl Solve {
     }
 
     pub(super) async fn run(self) -> Result<Ended, Error> {
-        let SolveInput { problem, mut options, warm_start: warm } = self.input()?;
+        let (problem, mut options, start) = self.input()?;
+        let warm = start.as_ref().map(|start| start.point.clone());
         // The result does not depend on it.
         options.threads = cores_or(None).min(MOST_THREADS);
         // Before there is a file to leave behind.
@@ -136,6 +147,7 @@ impl Solve {
         .await
         .map_err(|e| Error::Internal(e.to_string()))??;
         bar.finish_and_clear();
+        let lineage = Lineage::of(&outcome, start.as_ref());
         let converged = outcome.report.status == SolveStatus::Converged;
         let certificate = if self.certify && converged {
             let gait = outcome.gait.clone();
@@ -148,12 +160,13 @@ impl Solve {
         if self.json {
             let figures = Figures {
                 report: &outcome.report,
+                lineage: &lineage,
                 certificate: certificate.as_ref(),
                 explanation: explanation.as_ref(),
             };
             data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
-            data(&for_people(&outcome, explanation.as_ref()))?;
+            data(&for_people(&outcome, &lineage, start.as_ref(), explanation.as_ref()))?;
             if let Some(certificate) = &certificate {
                 data(&super::certify::for_people(certificate))?;
             }
@@ -162,7 +175,8 @@ impl Solve {
             return Ok(Ended::Interrupted);
         }
         if let Some(out) = out {
-            out.write(&serde_json::to_string(&outcome).map_err(|e| Error::Internal(e.to_string()))?)?;
+            let kept = Kept { outcome: &outcome, lineage: &lineage };
+            out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
         }
         Ok(Ended::Done)
     }
@@ -180,7 +194,12 @@ pub(super) fn status_word(status: SolveStatus) -> &'static str {
     }
 }
 
-fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> String {
+fn for_people(
+    outcome: &SolveOutcome,
+    lineage: &Lineage,
+    start: Option<&Start>,
+    explanation: Option<&Explanation>,
+) -> String {
     let r = &outcome.report;
     let mut lines = vec![
         format!("{} after {} iterations, {:.2} s", status_word(r.status), r.iterations, r.seconds_total),
@@ -193,6 +212,8 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
             r.variables, r.equalities, r.inequalities
         ),
     ];
+    lines.extend(linear_algebra_in_words(r));
+    lines.extend(lineage_in_words(r, lineage, start));
     lines.extend(basins_in_words(r));
     for violation in outcome.violations.iter().take(10) {
         lines.push(format!("  not met: {} by {:.3e} {}", violation.row, violation.amount, violation.unit));
@@ -203,10 +224,45 @@ fn for_people(outcome: &SolveOutcome, explanation: Option<&Explanation>) -> Stri
     lines.join("\n")
 }
 
+/// Where the time of all attempts went.
+fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
+    let Some(algebra) = &report.linear_algebra else { return Vec::new() };
+    let fallbacks = match algebra.fallbacks {
+        0 => "no fallback".to_owned(),
+        1 => "1 fallback".to_owned(),
+        many => format!("{many} fallbacks"),
+    };
+    vec![
+        format!(
+            "  time               evaluation {:.2} s, factorisation {:.2} s, solves {:.2} s, analysis {:.2} s",
+            report.seconds_evaluation, algebra.seconds_factorisation, algebra.seconds_solves, algebra.seconds_analysis
+        ),
+        format!(
+            "  linear algebra     {} factorisations, {} substitutions, {fallbacks}",
+            algebra.factorisations, algebra.substitutions
+        ),
+    ]
+}
+
+/// Which gait it is, and which it came from.
+fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&Start>) -> Vec<String> {
+    let basin = lineage.basin.map_or_else(String::new, |basin| format!(" (basin {basin})"));
+    let mut lines = vec![format!("  gait               {}{basin}", lineage.id)];
+    let given = start.map(|start| &start.gait);
+    if let (StartedFrom::ColdAfterWarm, Some(given)) = (report.started_from, given) {
+        lines.push(format!("  started from       its own guesses: nothing converged from {}", given.in_words()));
+    }
+    for (generation, ancestor) in lineage.ancestors.iter().enumerate() {
+        let which = if generation == 0 { "started from" } else { "which came from" };
+        lines.push(format!("  {which:<19}{}", ancestor.in_words()));
+    }
+    lines
+}
+
 /// The local optima that were found, where there are several, each as its first attempt left it: before any bound was
 /// tightened.
 fn basins_in_words(report: &SolveReport) -> Vec<String> {
-    let answer = report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin);
+    let answer = basin_of_answer(report);
     let mut lines: Vec<String> = Vec::new();
     for attempt in &report.attempts {
         let Some(basin) = attempt.basin.filter(|basin| *basin > lines.len()) else { continue };

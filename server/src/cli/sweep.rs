@@ -44,7 +44,11 @@ impl Sweep {
     pub(super) async fn run(self) -> Result<Ended, Error> {
         let actions = actions(&self.actions)?;
         let problem = self.flags.problem(TunedBounds::default())?;
-        let (warm, options) = (self.flags.warm_start(None)?, self.flags.options()?);
+        let (start, options) = (self.flags.warm_start(None)?, self.flags.options()?);
+        if let Some(start) = &start {
+            tell(&format!("every row starts from {}", start.gait.in_words()));
+        }
+        let warm = start.map(|start| start.point);
         let mut inputs = self.flags.inputs();
         inputs.push(&self.actions);
         // Before there is a file to leave behind.

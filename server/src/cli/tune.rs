@@ -49,6 +49,7 @@ impl Tune {
         let subject = self.body.subject()?;
         let (device, reference, gait_settings) =
             (self.files.device()?, self.files.reference()?, self.files.settings()?);
+        let solve_options = self.files.options()?;
         let workers = cores_or(self.workers);
         let store = Store::open(&self.database).await?;
         let mut writer = store.write().await?;
@@ -61,6 +62,7 @@ impl Tune {
             device_id: Some(device.id),
             reference_gait_id: Some(reference.id),
             gait_settings: Box::new(gait_settings),
+            solve_options,
             muscles: self.muscles.is_on(),
             trial_budget: self.trials,
             parallel_trials: u32::try_from(workers).unwrap_or(1),

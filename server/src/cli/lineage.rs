@@ -1,0 +1,143 @@
+//! Which gait a gait came from. Studies name the trial that a trial started from; a file of `solve --out` names the gaits
+//! before its own, so that the basin of the first cold start is known however many warm starts later.
+
+use gait_optimizer::{SolveOutcome, SolveReport, StartedFrom, WarmStart};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// Digits of an identifier: enough for a name, which is all that it is.
+const DIGITS: usize = 16;
+
+/// A gait by where its solve ended: the same point has the same identifier, in files of any version.
+pub(super) fn identifier(end: &WarmStart) -> String {
+    let mut hash = Sha256::new();
+    for value in &end.point.x {
+        hash.update(value.to_le_bytes());
+    }
+    let mut digits = hex::encode(hash.finalize());
+    digits.truncate(DIGITS);
+    digits
+}
+
+/// A gait that another one came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Ancestor {
+    /// Its identifier.
+    pub(super) id: String,
+    /// Its basin, as the solve that found it numbers them.
+    #[serde(default)]
+    pub(super) basin: Option<usize>,
+    /// Its objective, under the bounds of its own solve.
+    #[serde(default)]
+    pub(super) objective: Option<f64>,
+    /// Its Gait RMSE, rad.
+    #[serde(default)]
+    pub(super) gait_rmse_rad: Option<f64>,
+}
+
+impl Ancestor {
+    /// In words: `gait 0123456789abcdef (basin 2, objective 0.06341, Gait RMSE 1.0938 rad)`.
+    pub(super) fn in_words(&self) -> String {
+        let known = [
+            self.basin.map(|basin| format!("basin {basin}")),
+            self.objective.map(|objective| format!("objective {objective:.5}")),
+            self.gait_rmse_rad.map(|rmse| format!("Gait RMSE {rmse:.4} rad")),
+        ];
+        let known: Vec<String> = known.into_iter().flatten().collect();
+        if known.is_empty() { format!("gait {}", self.id) } else { format!("gait {} ({})", self.id, known.join(", ")) }
+    }
+}
+
+/// The gait of a solve, and those it came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Lineage {
+    /// Identifier of the answer.
+    pub(super) id: String,
+    /// Its basin, as this solve numbers them; none where the solve did not converge.
+    pub(super) basin: Option<usize>,
+    /// What it came from by warm starts, the nearest first; empty after a cold start, also one that a failed warm start was
+    /// followed by.
+    #[serde(default)]
+    pub(super) ancestors: Vec<Ancestor>,
+}
+
+impl Lineage {
+    /// That of an outcome; `start` is what its solve was given to start from.
+    pub(super) fn of(outcome: &SolveOutcome, start: Option<&Start>) -> Self {
+        let ancestors = match outcome.report.started_from {
+            StartedFrom::Warm => {
+                start.into_iter().flat_map(|s| [&s.gait].into_iter().chain(&s.before)).cloned().collect()
+            }
+            StartedFrom::Cold | StartedFrom::ColdAfterWarm => Vec::new(),
+        };
+        Self { id: identifier(&outcome.warm_start), basin: basin_of_answer(&outcome.report), ancestors }
+    }
+}
+
+/// A warm start, and the gait that it is.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    pub(super) point: WarmStart,
+    pub(super) gait: Ancestor,
+    /// What that gait came from, the nearest first.
+    before: Vec<Ancestor>,
+}
+
+impl Start {
+    /// A point of which nothing else is known.
+    pub(super) fn unknown(point: WarmStart) -> Self {
+        let gait = Ancestor { id: identifier(&point), basin: None, objective: None, gait_rmse_rad: None };
+        Self { point, gait, before: Vec::new() }
+    }
+
+    /// The answer of a solve; `said` is the lineage in its file.
+    pub(super) fn answer(outcome: SolveOutcome, said: Option<Lineage>) -> Self {
+        let report = &outcome.report;
+        let figures = (basin_of_answer(report), report.objective, report.gait_rmse_rad);
+        let mut start = Self::cold(outcome.warm_start, figures);
+        // What is said of another gait is not said of this one.
+        start.before = said.filter(|said| said.id == start.gait.id).map_or_else(Vec::new, |said| said.ancestors);
+        start
+    }
+
+    /// A gait with basin, objective and Gait RMSE that a cold start found.
+    pub(super) fn cold(point: WarmStart, (basin, objective, rmse): (Option<usize>, f64, f64)) -> Self {
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        let (objective, gait_rmse_rad) = (finite(objective), finite(rmse));
+        let gait = Ancestor { id: identifier(&point), basin, objective, gait_rmse_rad };
+        Self { point, gait, before: Vec::new() }
+    }
+}
+
+/// The basin of the answer of a solve.
+pub(super) fn basin_of_answer(report: &SolveReport) -> Option<usize> {
+    report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gait_optimizer::nlp::WarmPoint;
+    use gait_optimizer::{Margins, Mesh};
+
+    fn end(x: &[f64]) -> WarmStart {
+        let point = WarmPoint { x: x.to_vec(), ..WarmPoint::default() };
+        WarmStart { muscles: false, mesh: Mesh { ds2: 4, ds3: 4, ss2: 6, ss1: 6 }, point, margins: Margins::default() }
+    }
+
+    #[test]
+    fn a_gait_is_known_by_its_point() {
+        let id = identifier(&end(&[0.5, -1.0]));
+        assert_eq!(id.len(), DIGITS);
+        assert_eq!(identifier(&end(&[0.5, -1.0])), id);
+        assert_ne!(identifier(&end(&[0.5, -1.0 - f64::EPSILON])), id);
+    }
+
+    #[test]
+    fn an_ancestor_says_what_is_known_of_it() {
+        let start = Start::cold(end(&[0.5]), (Some(2), 0.063_41, f64::NAN));
+        let id = &start.gait.id;
+        assert_eq!(start.gait.in_words(), format!("gait {id} (basin 2, objective 0.06341)"));
+        assert_eq!(Start::unknown(end(&[0.5])).gait.in_words(), format!("gait {id}"));
+    }
+}
