@@ -449,7 +449,7 @@ impl NewtonSystem {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::nlp::linear_solver;
+    use crate::nlp::factorisation;
     use crate::nlp::problem::{NonlinearProgram, SparsityPattern};
 
     /// min x_1 + 2 x_2, x_1 + x_2 = 1.
@@ -536,7 +536,7 @@ mod tests {
         let settings = NlpSettings::default();
         let form = Formulation::new(&line, &settings).unwrap();
         let matrix = KktMatrix::new(&form);
-        let exact = linear_solver::choose(&form, &matrix, &settings).unwrap();
+        let exact = factorisation::choose(&form, &matrix, &settings).unwrap();
         let faulty = Faulty { exact, factor, miscounted, has_another_method };
         let mut newton = NewtonSystem::new(matrix, Box::new(faulty));
         newton.fit(&form);

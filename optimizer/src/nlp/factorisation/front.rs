@@ -277,7 +277,9 @@ impl Front {
         pairs.sort_unstable();
         pairs.dedup();
         self.partners = vec![Vec::new(); variables];
-        pairs.into_iter().for_each(|(variable, partner)| self.partners[variable].push(partner));
+        for (variable, partner) in pairs {
+            self.partners[variable].push(partner);
+        }
         // Free variables and deferred rows couple with any variable.
         let deferred = (0..variables).flat_map(|v| (0..self.first_other()).map(move |slot| (v, slot)));
         let own = offsets.iter().filter(|&&offset| (self.coupling..self.row_coupling).contains(&offset));
