@@ -138,7 +138,8 @@ fn nlp_swing_ups_of_a_cart_pole_are_solved() {
 fn nlp_inaccurate_fronts_are_noticed_and_pivots_delayed() {
     for (steps, optimum, iterations) in SWING_UPS {
         let problem = SwingUp::with_ill_conditioned_fronts(steps);
-        let fallbacks = swing_up(&problem, LinearSolver::Auto, optimum, iterations);
+        // Doubtful factors are part of the path until they are noticed: it is not the one of the others.
+        let fallbacks = swing_up(&problem, LinearSolver::Auto, optimum, iterations + iterations / 10);
         assert!(fallbacks > 0 || steps == 100, "{steps} steps: {fallbacks} fallbacks");
         swing_up(&problem, LinearSolver::DelayedPivots, optimum, iterations);
     }
