@@ -115,20 +115,20 @@ fn nlp_sparse_problems_keep_their_iteration_counts_with_every_solver() {
 const SWING_UPS: [(usize, f64, usize); 4] =
     [(100, 11181.317719, 88), (200, 22245.725103, 111), (220, 24463.895135, 107), (300, 33336.600907, 119)];
 
-fn swing_up(problem: &SwingUp, linear_solver: LinearSolver, optimum: f64, iterations: usize) -> usize {
+fn swing_up(problem: &SwingUp, linear_solver: LinearSolver, (optimum, within): (f64, f64), iterations: usize) -> usize {
     let settings = NlpSettings { linear_solver, ..NlpSettings::default() };
     let r = solve(problem, &StartPoint::Cold(problem.start()), &settings, &mut |_| {}, &|| false).unwrap();
     let name = format!("optimum {optimum}, {linear_solver:?}");
     assert_eq!(r.status, NlpStatus::Converged, "{name}");
     assert!(r.iterations <= iterations + iterations / 10, "{name}: {} iterations", r.iterations);
-    assert!((r.objective - optimum).abs() < 1e-9 * optimum, "{name}: {}", r.objective);
+    assert!((r.objective - optimum).abs() < within * optimum, "{name}: {}", r.objective);
     r.counts.solver_fallbacks
 }
 
 #[test]
 fn nlp_swing_ups_of_a_cart_pole_are_solved() {
     for (steps, optimum, iterations) in SWING_UPS {
-        swing_up(&SwingUp::new(steps), LinearSolver::Auto, optimum, iterations);
+        swing_up(&SwingUp::new(steps), LinearSolver::Auto, (optimum, 1e-9), iterations);
     }
 }
 
@@ -138,9 +138,10 @@ fn nlp_swing_ups_of_a_cart_pole_are_solved() {
 fn nlp_inaccurate_fronts_are_noticed_and_pivots_delayed() {
     for (steps, optimum, iterations) in SWING_UPS {
         let problem = SwingUp::with_ill_conditioned_fronts(steps);
-        // Doubtful factors are part of the path until they are noticed: it is not the one of the others.
-        let fallbacks = swing_up(&problem, LinearSolver::Auto, optimum, iterations + iterations / 10);
+        // Doubtful factors are part of the path until they are noticed: it may be longer and end in another optimum near by
+        // (24463.146 at 220 steps).
+        let fallbacks = swing_up(&problem, LinearSolver::Auto, (optimum, 1e-4), iterations + iterations / 10);
         assert!(fallbacks > 0 || steps == 100, "{steps} steps: {fallbacks} fallbacks");
-        swing_up(&problem, LinearSolver::DelayedPivots, optimum, iterations);
+        swing_up(&problem, LinearSolver::DelayedPivots, (optimum, 1e-9), iterations);
     }
 }
