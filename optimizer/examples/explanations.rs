@@ -108,7 +108,8 @@ fn print(
         lines.push((one.bound.clone(), to, not_with, one.undecided, one.starts, one.solves, &one.warm_start));
     }
     for joint in &explanation.together {
-        let list = |value: &dyn Fn(&RelaxedBound) -> String| joint.bounds.iter().map(value).collect::<Vec<_>>().join(" ");
+        let list =
+            |value: &dyn Fn(&RelaxedBound) -> String| joint.bounds.iter().map(value).collect::<Vec<_>>().join(" ");
         let to = joint.bounds.iter().map(|one| Some((one.bound.clone(), one.to?))).collect();
         let not_with = list(&|one| format!("{}={}", one.bound, one.not_with));
         let names = list(&|one| one.bound.clone());

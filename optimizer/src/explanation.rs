@@ -238,7 +238,8 @@ impl Search<'_> {
         };
         let unmet = self.searched(BoundSet::ALL.without(set))?;
         // Where those loosened to their usual values only are nearer to a gait, that is about these, not about the conflict.
-        let violations = unmet.last().map_or_else(Vec::new, |unmet| unmet.violations.iter().take(VIOLATIONS).cloned().collect());
+        let violations =
+            unmet.last().map_or_else(Vec::new, |unmet| unmet.violations.iter().take(VIOLATIONS).cloned().collect());
         Ok(Conflict {
             bounds: self.given(set),
             without: without.bounds().map(|bound| TunedBounds::NAMES[bound].to_owned()).collect(),

@@ -67,7 +67,17 @@ pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Viol
     };
     let relaxed = |place: usize, to: Option<f64>, not_with: f64| {
         let ((bound, meaning), from) = (named(place), bounds[place]);
-        Relaxation { bound, meaning, from, to, not_with, undecided: to.is_none(), solves: 8, starts: 3, warm_start: None }
+        Relaxation {
+            bound,
+            meaning,
+            from,
+            to,
+            not_with,
+            undecided: to.is_none(),
+            solves: 8,
+            starts: 3,
+            warm_start: None,
+        }
     };
     let (bound, meaning) = named(CLEARANCE);
     let conflict = Conflict {

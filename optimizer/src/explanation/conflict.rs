@@ -40,8 +40,8 @@ impl BoundSet {
 /// are met.
 ///
 /// Bounds are added in the given order until they are not met any more: the last one belongs to the conflict; then, from it,
-/// in the same order again. Only one set that is not met is asked about for each bound of the conflict (they take far
-/// longer than the others), and those that come first in the order are preferred.
+/// in the same order again. Sets that are not met take far longer than the others: at most one is asked about for each bound of
+/// the conflict beside itself, and only itself where its bounds come first in the order.
 pub(super) fn conflict<E>(
     order: &[usize],
     mut is_met: impl FnMut(BoundSet) -> Result<bool, E>,
@@ -148,10 +148,10 @@ mod tests {
     const IN_ORDER: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 
     #[test]
-    fn a_pair_takes_one_set_that_is_not_met_beside_its_own() {
+    fn one_set_that_is_not_met_is_asked_about_for_each_bound_beside_the_conflict_itself() {
         let (pair, not_met) = found(&[0b0100_1000], &IN_ORDER);
         assert_eq!(pair, Some(BoundSet(0b0100_1000)));
-        assert_eq!(not_met, [BoundSet(0b0111_1111), BoundSet(0b0100_1000)]);
+        assert_eq!(not_met, [0b0111_1111, 0b0100_1111, 0b0100_1000].map(BoundSet));
         let (pair, not_met) = found(&[0b0100_1000], &[6, 3, 0, 1, 2, 4, 5, 7]);
         assert_eq!((pair, not_met.len()), (Some(BoundSet(0b0100_1000)), 1), "suspects first: its own alone");
     }

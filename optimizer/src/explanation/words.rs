@@ -152,7 +152,8 @@ impl JointRelaxation {
     /// What it achieves.
     pub fn in_words(&self) -> String {
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
-        let named = |value: &dyn Fn(&super::RelaxedBound) -> String| list(&self.bounds.iter().map(value).collect::<Vec<_>>());
+        let named =
+            |value: &dyn Fn(&super::RelaxedBound) -> String| list(&self.bounds.iter().map(value).collect::<Vec<_>>());
         let in_unit = |meaning: &str, value: f64| format!("{value}{}", parts(meaning).1);
         let not_with = named(&|one| format!("{} = {}", one.bound, in_unit(&one.meaning, one.not_with)));
         if self.bounds.iter().any(|one| one.to.is_none()) {
@@ -303,7 +304,10 @@ mod tests {
     #[test]
     fn conflicts_of_any_number_of_bounds_are_put_into_words() {
         let alone = conflict(&[(1, 10.0)]).in_words();
-        assert!(alone.starts_with("a2 = 10 rad/s² (coordinate acceleration) cannot be met, whatever the other"), "{alone}");
+        assert!(
+            alone.starts_with("a2 = 10 rad/s² (coordinate acceleration) cannot be met, whatever the other"),
+            "{alone}"
+        );
         assert!(alone.ends_with("With it at its loosest as well there is one."), "{alone}");
         let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words();
         assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5 °"), "{three}");
