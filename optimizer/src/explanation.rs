@@ -18,7 +18,7 @@ mod words;
 use at_limit::domains_at_limit;
 use bound::{Level, least_move, loosened, loosest, step};
 use conflict::{BoundSet, conflict, remedies};
-use solves::{Solves, Stop, Unmet};
+use solves::{Solves, Starts, Stop, Unmet};
 pub use words::verdict;
 
 /// The most bounds that are made to give way together.
@@ -221,12 +221,14 @@ impl Search<'_> {
 
     /// How far the bounds of a set have to be loosened so that there is a gait, if that is any help.
     fn level(&mut self, set: BoundSet) -> Result<Option<Level>, Stop> {
-        for level in [Level::Usual, Level::Loosest] {
-            if self.solves.is_met(&loosened(&self.problem.bounds, set, level)?)? {
-                return Ok(Some(level));
-            }
+        let before = self.solves.count;
+        if self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Usual)?, Starts::All)? {
+            return Ok(Some(Level::Usual));
         }
-        Ok(None)
+        // Cold guesses that found none there find none with the loosest: those are further from what walks.
+        let starts = if self.solves.count > before { Starts::Nearest } else { Starts::All };
+        let loosest = self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Loosest)?, starts)?;
+        Ok(loosest.then_some(Level::Loosest))
     }
 
     fn described(&self, set: BoundSet, without: BoundSet) -> Result<Conflict, Stop> {
@@ -273,7 +275,7 @@ impl Search<'_> {
                 let tight = if level == Level::Usual { given } else { loosened(&given, set, Level::Usual)? };
                 let solves = &mut self.solves;
                 let (nearest, none) = least_move(&tight, &loose, |bounds| {
-                    let gait = solves.solve(bounds)?;
+                    let gait = solves.solve(bounds, Starts::All)?;
                     let found = gait.is_some();
                     warm_start = gait.or(warm_start.take());
                     Ok::<_, Stop>(found)

@@ -8,8 +8,8 @@ use crate::solve::{
 };
 
 /// Cold guesses that are tried side by side where the nearest gait leads to none, before it is said that none was found: of the
-/// catalogue, those that found most gaits close to where there are none any more.
-const COLD: [ColdGuess; 2] = [ColdGuess::CATALOGUE[2], ColdGuess::EARLY_RISE];
+/// catalogue, those without which gaits were missed close to where there are none any more.
+const COLD: [ColdGuess; 3] = [ColdGuess::NATURAL, ColdGuess::EARLY_RISE, ColdGuess::CATALOGUE[2]];
 /// Iterations of a phase of one of these solves, cold and warm: gaits that converge take fewer, and most that do not would
 /// go on for many more.
 const MAX_ITERATIONS: usize = 400;
@@ -29,6 +29,15 @@ impl<E: Into<SolveError>> From<E> for Stop {
     fn from(error: E) -> Self {
         Self::Failed(error.into())
     }
+}
+
+/// What a gait is looked for from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Starts {
+    /// The nearest gait that is known, then cold.
+    All,
+    /// The nearest gait that is known, where one is.
+    Nearest,
 }
 
 /// Bounds with which no gait was found, and where the search for one ended.
@@ -85,7 +94,7 @@ impl<'a> Solves<'a> {
 
     /// Whether a gait is known or found with these bounds. What was found once is remembered: with looser bounds than
     /// those of a gait there is one, with tighter ones than those with which none was found none is looked for.
-    pub(super) fn is_met(&mut self, bounds: &TunedBounds) -> Result<bool, Stop> {
+    pub(super) fn is_met(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<bool, Stop> {
         if self.met.iter().any(|(known, _)| is_as_loose(bounds, known)) {
             return Ok(true);
         }
@@ -101,7 +110,7 @@ impl<'a> Solves<'a> {
             self.met.push((*bounds, gait));
             return Ok(true);
         }
-        Ok(self.solve(bounds)?.is_some())
+        Ok(self.solve(bounds, starts)?.is_some())
     }
 
     fn with(&self, bounds: &TunedBounds) -> GaitProblem {
@@ -109,9 +118,10 @@ impl<'a> Solves<'a> {
     }
 
     /// A gait with these bounds: from the nearest that is known, at once or in two steps, then cold.
-    pub(super) fn solve(&mut self, bounds: &TunedBounds) -> Result<Option<WarmStart>, Stop> {
+    pub(super) fn solve(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<Option<WarmStart>, Stop> {
         let mut unmet = Unmet::new(bounds);
         let nearest = self.met.iter().min_by(|a, b| way(&a.0, bounds).total_cmp(&way(&b.0, bounds))).cloned();
+        let cold = starts == Starts::All || nearest.is_none();
         if let Some((from, gait)) = nearest {
             if self.warm(bounds, &gait, &mut unmet)? {
                 return Ok(self.latest());
@@ -125,9 +135,11 @@ impl<'a> Solves<'a> {
                 return Ok(self.latest());
             }
         }
-        let outcome = solve_from_guesses(&self.with(bounds), &COLD, &self.options, &mut |_| {}, self.cancel)?;
-        if self.is_gait(bounds, outcome, &mut unmet)? {
-            return Ok(self.latest());
+        if cold {
+            let outcome = solve_from_guesses(&self.with(bounds), &COLD, &self.options, &mut |_| {}, self.cancel)?;
+            if self.is_gait(bounds, outcome, &mut unmet)? {
+                return Ok(self.latest());
+            }
         }
         self.unmet.push(unmet);
         Ok(None)
@@ -164,7 +176,7 @@ impl<'a> Solves<'a> {
         if let Some((_, gait)) = self.met.iter().find(|(known, _)| known == bounds) {
             return Ok(Some(gait.clone()));
         }
-        if let Some(gait) = self.solve(bounds)? {
+        if let Some(gait) = self.solve(bounds, Starts::All)? {
             return Ok(Some(gait));
         }
         Ok(self.met.iter().find(|(known, _)| is_as_loose(bounds, known)).map(|(_, gait)| gait.clone()))
