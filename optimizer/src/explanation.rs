@@ -79,8 +79,8 @@ pub struct Conflict {
     /// Wishes that are part of what is fixed, where that contradicts itself.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wishes: Vec<String>,
-    /// What these bounds make impossible: violated where the search for a gait came nearest, all other tuned bounds at
-    /// their loosest, worst first.
+    /// What these bounds make impossible: violated where the search for a gait came nearest, all other tuned bounds
+    /// loosened, worst first; a stationary point of the violation before others.
     pub violations: Vec<Violation>,
     /// From how many starts a gait was looked for.
     pub starts: usize,
@@ -239,9 +239,9 @@ impl Search<'_> {
             Vec::new()
         };
         let unmet = self.searched(BoundSet::ALL.without(set))?;
-        // Where those loosened to their usual values only are nearer to a gait, that is about these, not about the conflict.
+        let nearest = unmet.iter().min_by(|a, b| a.nearness(b));
         let violations =
-            unmet.last().map_or_else(Vec::new, |unmet| unmet.violations.iter().take(VIOLATIONS).cloned().collect());
+            nearest.map_or_else(Vec::new, |unmet| unmet.violations.iter().take(VIOLATIONS).cloned().collect());
         Ok(Conflict {
             bounds: self.given(set),
             without: without.bounds().map(|bound| TunedBounds::NAMES[bound].to_owned()).collect(),

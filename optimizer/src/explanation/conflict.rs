@@ -101,13 +101,12 @@ pub(super) fn remedies<E>(
         tried = Vec::new();
         for loosened in left {
             let known = found.conflicts.iter().map(|(conflict, _)| *conflict).find(|c| c.is_disjoint(loosened));
-            let conflict = match known {
-                Some(conflict) => conflict,
-                None => {
-                    let Some(conflict) = conflict_without(loosened)? else { continue };
-                    found.conflicts.push((conflict, loosened));
-                    conflict
-                }
+            let conflict = if let Some(conflict) = known {
+                conflict
+            } else {
+                let Some(conflict) = conflict_without(loosened)? else { continue };
+                found.conflicts.push((conflict, loosened));
+                conflict
             };
             tried.extend(conflict.bounds().map(|bound| loosened.with(bound)));
         }

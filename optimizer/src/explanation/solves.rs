@@ -6,6 +6,7 @@ use crate::solve::{
     CONVERGED_VIOLATION, CancelToken, ColdGuess, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus,
     Violation, WarmStart, solve_from_guesses, solve_from_warm_start,
 };
+use std::cmp::Ordering;
 
 /// Cold guesses that are tried side by side where the nearest gait leads to none, before it is said that none was found: of the
 /// catalogue, those without which gaits were missed close to where there are none any more.
@@ -59,15 +60,24 @@ impl Unmet {
         Self { bounds: *bounds, violations: Vec::new(), rank, starts: 0, undecided: false }
     }
 
+    /// Less: it came nearer to a gait, a stationary point of the violation before others.
+    pub(super) fn nearness(&self, other: &Self) -> Ordering {
+        compared(self.rank, other.rank)
+    }
+
     fn take_in(&mut self, outcome: SolveOutcome) {
         let gave_up = |status: SolveStatus| status != SolveStatus::Infeasible;
         self.starts += outcome.report.attempts.len();
         self.undecided |= outcome.report.attempts.iter().any(|attempt| gave_up(attempt.status));
         let rank = (gave_up(outcome.report.status), outcome.report.max_violation);
-        if rank.0.cmp(&self.rank.0).then(rank.1.total_cmp(&self.rank.1)).is_lt() {
+        if compared(rank, self.rank).is_lt() {
             (self.rank, self.violations) = (rank, outcome.violations);
         }
     }
+}
+
+fn compared(a: (bool, f64), b: (bool, f64)) -> Ordering {
+    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
 }
 
 /// The solves of one explanation.
