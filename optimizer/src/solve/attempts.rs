@@ -1,7 +1,7 @@
 //! What a solve tries: a warm start, then cold guesses side by side; which attempt is the answer; and what becomes of it
 //! between its mesh points.
 
-use super::cold_guesses::{ColdGuess, GuessTiming};
+use super::cold_guesses::ColdGuess;
 use super::run::{Context, Run};
 use super::warm_start::Start;
 use super::{Attempt, BasinChoice, IterationRecord, Phase, SolveError, SolveStatus};
@@ -229,27 +229,9 @@ pub(super) fn try_guesses(
     done.into_iter().flatten().collect()
 }
 
-/// Attempts that end at a stationary point of the violation before the others are spared: each takes a thousand iterations.
-/// So many where they end at the same one, with guesses of different timing among them ...
-const AGREEING_INFEASIBLE: usize = 3;
-/// ... and so many in any case. At the edge of where there are gaits, guesses of one timing end at one point, and another
-/// guess finds a gait.
-const MOST_INFEASIBLE: usize = 6;
-/// Stationary points whose violations differ by less, as a share, are taken for one.
-const SAME_VIOLATION: f64 = 0.1;
-
-/// Whether guesses that ended at stationary points of the violation, with these timings and violations, show well enough that
-/// there is no gait.
-fn is_given_up(infeasible: &[(GuessTiming, f64)]) -> bool {
-    infeasible.len() >= MOST_INFEASIBLE
-        || infeasible.iter().any(|(_, least)| {
-            let alike: Vec<_> = infeasible
-                .iter()
-                .filter(|(_, violation)| violation >= least && *violation <= (1.0 + SAME_VIOLATION) * least)
-                .collect();
-            alike.len() >= AGREEING_INFEASIBLE && alike.iter().any(|(timing, _)| *timing != alike[0].0)
-        })
-}
+/// Attempts that end at a stationary point of the violation before the others are spared: each takes a thousand
+/// iterations, and bounds that have a gait rarely end there from so many guesses.
+const MOST_INFEASIBLE: usize = 3;
 
 /// Tries the guesses that are asked for side by side, what is left of the catalogue while nothing has come of any.
 pub(super) fn try_catalogue(
@@ -261,15 +243,12 @@ pub(super) fn try_catalogue(
     let guesses = ColdGuess::first(asked_for.max(ColdGuess::CATALOGUE.len()), muscles);
     let (first, others) = guesses.split_at(asked_for);
     let mut tried = try_guesses(context, first, 0, observer)?;
-    let mut timings: Vec<GuessTiming> = first.iter().map(|guess| guess.timing).collect();
     for guess in others.iter().filter(|guess| context.options.retry && ColdGuess::CATALOGUE.contains(guess)) {
-        let ends = timings.iter().zip(&tried).filter(|(_, t)| t.choice.status == SolveStatus::Infeasible);
-        let infeasible: Vec<_> = ends.map(|(timing, t)| (*timing, t.choice.violation)).collect();
-        if tried.iter().any(Tried::is_final) || is_given_up(&infeasible) {
+        let infeasible = tried.iter().filter(|t| t.choice.status == SolveStatus::Infeasible).count();
+        if tried.iter().any(Tried::is_final) || infeasible >= MOST_INFEASIBLE {
             break;
         }
         tried.extend(try_guesses(context, std::slice::from_ref(guess), tried.len(), observer)?);
-        timings.push(guess.timing);
     }
     Ok(tried)
 }
@@ -302,23 +281,5 @@ pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
         BasinChoice::NearestToReference { within_percent } => {
             least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// As they ended with a4 = 0.5 and a7 = 14.5 (guesses of one timing, another finds a gait), with a2 = 20 and a7 = 8.6
-    /// (two points) and with a6 = 0 and a7 = 6.4 (none).
-    #[test]
-    fn guesses_of_one_timing_that_agree_are_not_enough() {
-        let (even, early) = (GuessTiming::Even, GuessTiming::EarlyRise);
-        let edge = [(even, 2.25e-3), (even, 2.05e-3), (even, 2.13e-3)];
-        assert!(!is_given_up(&edge));
-        assert!(!is_given_up(&[(early, 2.7e-3), (even, 7.95e-3), (even, 7.95e-3), (early, 2.7e-3)]));
-        assert!(is_given_up(&[(even, 3.07e-3), (early, 3.09e-3), (even, 3.12e-3)]));
-        assert!(is_given_up(&[edge, edge].concat()), "six are enough in any case");
-        assert!(!is_given_up(&[]));
     }
 }
