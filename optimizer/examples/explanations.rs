@@ -1,7 +1,7 @@
 //! Explanations of bounds without a gait, each checked by solving with what it names.
 //!
 //! `cargo run --release -p gait-optimizer --example explanations -- [--subject 1] [--muscles off] [--actions 10] [--seed 1]
-//! [--threads 1]`: draws bounds far tighter than Table I, two at a time, until so many have no gait; explains each, then
+//! [--threads 1] [--bounds "a4=0.5,a7=5;a2=10"]`: draws bounds far tighter than Table I, two at a time, until so many have no gait (or takes those that are given); explains each, then
 //! solves with every relaxation that is said to help (it has to converge, every constraint met) and prints one line per
 //! relaxation. Ends with an error when one does not hold.
 
@@ -9,7 +9,7 @@ mod arguments;
 mod splitmix;
 
 use arguments::argument;
-use gait_optimizer::explanation::explain;
+use gait_optimizer::explanation::{Explanation, RelaxedBound, explain};
 use gait_optimizer::{
     CancelToken, GaitProblem, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
@@ -38,14 +38,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let run = |problem: &GaitProblem, warm: Option<&WarmStart>| -> Result<SolveOutcome, Box<dyn Error>> {
         Ok(solve(problem, warm, &options, &mut |_| {}, &CancelToken::new())?)
     };
-    println!("action,status,worst_violation,where,bound,from,to,not_with,check_status,check_violation");
+    println!("action,conflict,missed,where,relaxed,to,not_with,undecided,starts,solves,check_status,check_violation");
     let (mut drawn, mut explained, mut wrong) = (0, 0, 0);
-    while explained < actions {
-        let mut bounds = TunedBounds::default();
-        for _ in 0..2 {
-            let bound = random.below(8);
-            bounds.set(TunedBounds::NAMES[bound], TIGHT[bound][random.below(TIGHT[bound].len())])?;
-        }
+    let given = argument("--bounds", "");
+    let mut given = given.split(';').filter(|bounds| !bounds.is_empty());
+    let only_given = given.clone().next().is_some();
+    while only_given || explained < actions {
+        let bounds = match given.next() {
+            Some(bounds) => TunedBounds::parse(bounds)?,
+            None if only_given => break,
+            None => drawn_bounds(&mut random)?,
+        };
         if bounds.validate().is_err() {
             continue;
         }
@@ -54,33 +57,82 @@ fn main() -> Result<(), Box<dyn Error>> {
         let outcome = run(&problem, None)?;
         let report = &outcome.report;
         eprintln!("{bounds:?}: {:?}, {} iterations, {:.0} s", report.status, report.iterations, report.seconds_total);
+        let begun = std::time::Instant::now();
         let Some(explanation) = explain(&problem, (&outcome).into(), &options, &mut |_| {}, &CancelToken::new())?
         else {
             continue;
         };
         explained += 1;
+        eprintln!("    explained in {:.0} s", begun.elapsed().as_secs_f64());
+        for sentence in explanation.sentences() {
+            eprintln!("    {sentence}");
+        }
         let given = bounds.to_array().into_iter().zip(TunedBounds::default().to_array());
         let tightened = TunedBounds::NAMES.iter().zip(given).filter(|(_, (own, usual))| own != usual);
         let action = tightened.map(|(name, (own, _))| format!("{name}={own}")).collect::<Vec<_>>().join(" ");
-        let worst = explanation.violations.first();
-        let place = worst.map_or(String::new(), |v| format!("{:.2e} {},{}", v.amount, v.unit, v.row));
-        let status = format!("{:?}", explanation.status);
-        if explanation.relaxations.is_empty() {
-            println!("{action},{status},{place},none,,,,,");
-        }
-        for relaxation in &explanation.relaxations {
-            print!("{action},{status},{place},{},{}", relaxation.bound, relaxation.from);
-            let Some(to) = relaxation.to else {
-                println!(",,{},,", relaxation.not_with);
-                continue;
-            };
-            let mut relaxed = problem.clone();
-            relaxed.bounds.set(&relaxation.bound, to)?;
-            let check = run(&relaxed, relaxation.warm_start.as_ref())?.report;
-            wrong += usize::from(check.status != SolveStatus::Converged);
-            println!(",{to},{},{:?},{:.1e}", relaxation.not_with, check.status, check.max_violation);
-        }
+        wrong += print(&problem, &action, &explanation, &options)?;
     }
     eprintln!("{explained} of {drawn} drawn have no gait; {wrong} relaxations do not hold");
     if wrong > 0 { Err("an explanation names a relaxation with which no gait converges".into()) } else { Ok(()) }
+}
+
+/// Two bounds far tighter than usual, or one.
+fn drawn_bounds(random: &mut SplitMix) -> Result<TunedBounds, Box<dyn Error>> {
+    let mut bounds = TunedBounds::default();
+    for _ in 0..2 {
+        let bound = random.below(8);
+        bounds.set(TunedBounds::NAMES[bound], TIGHT[bound][random.below(TIGHT[bound].len())])?;
+    }
+    Ok(bounds)
+}
+
+/// Prints a line for each relaxation, after solving with it where it is said to help: how many do not hold.
+fn print(
+    problem: &GaitProblem,
+    action: &str,
+    explanation: &Explanation,
+    options: &SolveOptions,
+) -> Result<usize, Box<dyn Error>> {
+    let conflicts = explanation.conflicts.iter().map(|conflict| {
+        let names: Vec<&str> = conflict.bounds.iter().map(|bound| bound.bound.as_str()).collect();
+        if names.is_empty() { "what is fixed".to_owned() } else { names.join(" ") }
+    });
+    let conflict = if explanation.gait_found { "none".to_owned() } else { conflicts.collect::<Vec<_>>().join(" | ") };
+    let worst = explanation.conflicts.first().and_then(|conflict| conflict.violations.first());
+    let place = worst.map_or(",".to_owned(), |v| format!("{:.2e} {},{:?}", v.amount, v.unit, v.row));
+    let begin = format!("{action},{conflict},{place}");
+    let mut lines = Vec::new();
+    for one in &explanation.relaxations {
+        let to = one.to.map(|to| vec![(one.bound.clone(), to)]);
+        let not_with = format!("{}={}", one.bound, one.not_with);
+        lines.push((one.bound.clone(), to, not_with, one.undecided, one.starts, one.solves, &one.warm_start));
+    }
+    for joint in &explanation.together {
+        let list =
+            |value: &dyn Fn(&RelaxedBound) -> String| joint.bounds.iter().map(value).collect::<Vec<_>>().join(" ");
+        let to = joint.bounds.iter().map(|one| Some((one.bound.clone(), one.to?))).collect();
+        let not_with = list(&|one| format!("{}={}", one.bound, one.not_with));
+        let names = list(&|one| one.bound.clone());
+        lines.push((names, to, not_with, joint.undecided, joint.starts, joint.solves, &joint.warm_start));
+    }
+    if lines.is_empty() {
+        println!("{begin},none,,,,,,,");
+    }
+    let mut wrong = 0;
+    for (names, to, not_with, undecided, starts, solves, warm_start) in lines {
+        let Some(to) = to else {
+            println!("{begin},{names},,{not_with},{undecided},{starts},{solves},,");
+            continue;
+        };
+        let mut relaxed = problem.clone();
+        for (bound, value) in &to {
+            relaxed.bounds.set(bound, *value)?;
+        }
+        let check = solve(&relaxed, warm_start.as_ref(), options, &mut |_| {}, &CancelToken::new())?.report;
+        wrong += usize::from(check.status != SolveStatus::Converged);
+        let to = to.iter().map(|(bound, value)| format!("{bound}={value}")).collect::<Vec<_>>().join(" ");
+        let (status, violation) = (check.status, check.max_violation);
+        println!("{begin},{names},{to},{not_with},{undecided},{starts},{solves},{status:?},{violation:.1e}");
+    }
+    Ok(wrong)
 }

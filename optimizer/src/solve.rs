@@ -83,6 +83,24 @@ pub fn solve(
     finish(&context, tried, chosen, started_from)
 }
 
+/// Solves one gait problem from an earlier solve only, as it is at its mesh points.
+///
+/// # Errors
+/// [`SolveError`] when the input is invalid or the warm start is of another problem.
+pub(crate) fn solve_from_warm_start(
+    problem: &GaitProblem,
+    warm_start: &WarmStart,
+    options: &SolveOptions,
+    cancel: &CancelToken,
+) -> Result<SolveOutcome, SolveError> {
+    options.validate()?;
+    let programme = problem.programme(problem.muscles)?;
+    let start = on_mesh_of(problem, &programme, warm_start)?;
+    let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let tried = try_warm(&context, start, &mut |_| {})?;
+    finish(&context, vec![tried], 0, StartedFrom::Warm)
+}
+
 /// Solves one gait problem cold from the given guesses only, as it is at its mesh points: for studies of basins and of
 /// the solver.
 ///

@@ -1,7 +1,7 @@
 //! What an explanation finds out, without solving, and what there is to explain.
 
 use gait_learner::SearchSpace;
-use gait_optimizer::explanation::{BoundAtLimit, Explanation, Relaxation};
+use gait_optimizer::explanation::{BoundAtLimit, Conflict, Explanation, GivenBound, Relaxation};
 use gait_optimizer::{CancelToken, SolveError, SolveStatus, TunedBounds, Violation};
 use gaitwright::workers::{Explain, Unexplained};
 use serde_json::json;
@@ -67,11 +67,34 @@ pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Viol
     };
     let relaxed = |place: usize, to: Option<f64>, not_with: f64| {
         let ((bound, meaning), from) = (named(place), bounds[place]);
-        Relaxation { bound, meaning, from, to, not_with, undecided: to.is_none(), solves: 8, warm_start: None }
+        Relaxation {
+            bound,
+            meaning,
+            from,
+            to,
+            not_with,
+            undecided: to.is_none(),
+            solves: 8,
+            starts: 3,
+            warm_start: None,
+        }
+    };
+    let (bound, meaning) = named(CLEARANCE);
+    let conflict = Conflict {
+        bounds: vec![GivenBound { bound, meaning, value: bounds[CLEARANCE] }],
+        without: Vec::new(),
+        wishes: Vec::new(),
+        violations: violations.to_vec(),
+        starts: 5,
+        undecided: false,
     };
     Explanation {
         status,
         violations: violations.to_vec(),
+        conflicts: vec![conflict],
+        gait_found: false,
+        together: Vec::new(),
+        missed: None,
         at_limit: vec![at_limit(CLEARANCE, "SS2_R"), at_limit(TORSO, "stride")],
         relaxations: vec![relaxed(CLEARANCE, Some(0.03), bounds[CLEARANCE]), relaxed(TORSO, None, 1.0)],
     }

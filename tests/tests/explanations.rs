@@ -78,6 +78,9 @@ async fn when_a_study_has_ended_every_trial_without_a_gait_is_explained_in_order
     let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();
     assert_eq!(explained_in_order(&service).await, expected);
     assert_eq!(found["violations"][0]["row"], "SS2_R point 3, C3 swing foot clearance");
+    let conflict = &found["conflicts"][0];
+    assert_eq!((&conflict["bounds"][0]["bound"], &conflict["starts"]), (&json!("a5"), &json!(5)));
+    assert_eq!((&found["gait_found"], &found["together"]), (&json!(false), &json!([])));
     assert_eq!((&found["relaxations"][0]["bound"], &found["relaxations"][0]["to"]), (&json!("a5"), &json!(0.03)));
     assert_eq!(found["program"], Actor::program().as_str());
     assert_eq!(found["problem_sha256"].as_str().unwrap().len(), 64);

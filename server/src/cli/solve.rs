@@ -137,7 +137,7 @@ impl Solve {
             };
             let outcome = solve(&problem, warm.as_ref(), &options, &mut observer, &cancel)?;
             let explanation = if explain {
-                let mut progress = |bound: &str| shown.set_message(format!("what if {bound} gave way?"));
+                let mut progress = |question: &str| shown.set_message(question.to_owned());
                 explanation::explain(&problem, (&outcome).into(), &options, &mut progress, &cancel)?
             } else {
                 None

@@ -65,6 +65,35 @@ pub struct BoundAtLimit {
     pub domains: Vec<String>,
 }
 
+/// A tuned bound as it is given.
+#[derive(Debug, ToSchema)]
+pub struct GivenBound {
+    /// `a1` to `a8`.
+    pub bound: String,
+    /// What it limits, with its unit.
+    pub meaning: String,
+    /// Its value.
+    pub value: f64,
+}
+
+/// Tuned bounds that contradict each other: no gait was found with all of them, one was without any one of them, every
+/// other tuned bound being at its loosest.
+#[derive(Debug, ToSchema)]
+pub struct Conflict {
+    /// Those bounds; none: what is fixed contradicts itself.
+    pub bounds: Vec<GivenBound>,
+    /// Bounds of the other conflicts that had given way when this one was left; absent: none.
+    pub without: Option<Vec<String>>,
+    /// Wishes that are part of what is fixed, where that contradicts itself; absent: none.
+    pub wishes: Option<Vec<String>>,
+    /// What is violated where the search for a gait came nearest, all other tuned bounds at their loosest, worst first.
+    pub violations: Vec<Violation>,
+    /// From how many starts a gait was looked for.
+    pub starts: u64,
+    /// A solve gave up: that there is no gait is not known then.
+    pub undecided: bool,
+}
+
 /// What relaxing one tuned bound alone achieves.
 #[derive(Debug, ToSchema)]
 pub struct Relaxation {
@@ -78,10 +107,41 @@ pub struct Relaxation {
     pub to: Option<f64>,
     /// The loosest value tried with which none did.
     pub not_with: f64,
-    /// A solve without a gait gave up: that there is no gait is not known then.
+    /// A solve with it gave up: that there is no gait is not known then.
     pub undecided: bool,
     /// Solves that this took.
     pub solves: u64,
+    /// From how many starts a gait with `not_with` was looked for; 0: unknown.
+    pub starts: u64,
+}
+
+/// How far one of several bounds gives way.
+#[derive(Debug, ToSchema)]
+pub struct RelaxedBound {
+    /// `a1` to `a8`.
+    pub bound: String,
+    /// What it limits, with its unit.
+    pub meaning: String,
+    /// Its value.
+    pub from: f64,
+    /// The value nearest to it, of those tried together, with which a gait converged; null: not even with the loosest.
+    pub to: Option<f64>,
+    /// The loosest value tried, together with those of the others, with which none did.
+    pub not_with: f64,
+}
+
+/// What relaxing several tuned bounds together achieves, where no single one helps: each by the same share of the way to
+/// its loosest.
+#[derive(Debug, ToSchema)]
+pub struct JointRelaxation {
+    /// Those bounds, one of each conflict.
+    pub bounds: Vec<RelaxedBound>,
+    /// A solve with `not_with` gave up: that there is no gait is not known then.
+    pub undecided: bool,
+    /// Solves that this took.
+    pub solves: u64,
+    /// From how many starts a gait with `not_with` was looked for.
+    pub starts: u64,
 }
 
 /// One iteration of a solve.

@@ -14,7 +14,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use gait_optimizer::explanation::{BoundAtLimit, Relaxation};
+use gait_optimizer::explanation::{BoundAtLimit, Conflict, JointRelaxation, Relaxation};
 use gait_optimizer::{SolveStatus, Violation};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -31,12 +31,22 @@ pub(super) struct TrialExplanation {
     /// What the last iterate violates, worst first.
     #[schema(value_type = Vec<schema::Violation>)]
     violations: Vec<Violation>,
-    /// The tuned bounds that it runs into.
+    /// The tuned bounds that contradict each other; further ones where no single bound resolves the first. Explanations of
+    /// earlier versions have none.
+    #[schema(value_type = Vec<schema::Conflict>)]
+    conflicts: Vec<Conflict>,
+    /// The search for a conflict found a gait with the bounds as they are: the solve missed it.
+    gait_found: bool,
+    /// The tuned bounds that the last iterate runs into.
     #[schema(value_type = Vec<schema::BoundAtLimit>)]
     at_limit: Vec<BoundAtLimit>,
-    /// What relaxing each of them alone achieves: the smallest relaxation first, those that do not help last.
+    /// What relaxing each bound of the first conflict alone achieves: the smallest relaxation first, those that do not help
+    /// last.
     #[schema(value_type = Vec<schema::Relaxation>)]
     relaxations: Vec<Relaxation>,
+    /// What relaxing several together achieves, where no single one helps.
+    #[schema(value_type = Vec<schema::JointRelaxation>)]
+    together: Vec<JointRelaxation>,
     /// Which version of the program found it out.
     program: String,
     /// SHA-256 of what it was made from: the trial's `problem.json`.
@@ -52,8 +62,11 @@ impl TrialExplanation {
             sentences: explanation.sentences(),
             status: explanation.status,
             violations: explanation.violations,
+            conflicts: explanation.conflicts,
+            gait_found: explanation.gait_found,
             at_limit: explanation.at_limit,
             relaxations: explanation.relaxations,
+            together: explanation.together,
             program,
             problem_sha256,
             created_at,

@@ -1,0 +1,208 @@
+//! Which tuned bounds are in conflict, and which have to give way: a search over sets of bounds that knows nothing of gaits.
+//!
+//! A set is met when there is a gait with its bounds as they are given and all others at their loosest. Whoever answers must
+//! be consistent: what is met stays so when bounds are left out, what is not when others are added.
+
+/// How many tuned bounds there are.
+const COUNT: usize = 8;
+
+/// Some of the tuned bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub(super) struct BoundSet(u8);
+
+impl BoundSet {
+    pub(super) const EMPTY: Self = Self(0);
+    pub(super) const ALL: Self = Self(u8::MAX);
+
+    pub(super) fn with(self, bound: usize) -> Self {
+        Self(self.0 | 1 << bound)
+    }
+
+    pub(super) fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
+    pub(super) fn contains(self, bound: usize) -> bool {
+        self.0 & 1 << bound != 0
+    }
+
+    pub(super) fn is_disjoint(self, other: Self) -> bool {
+        self.0 & other.0 == 0
+    }
+
+    /// Its bounds in action order.
+    pub(super) fn bounds(self) -> impl Iterator<Item = usize> {
+        (0..COUNT).filter(move |bound| self.contains(*bound))
+    }
+}
+
+/// An irreducible conflict among bounds: together they are not met, and are when any one is left out. `None`: all together
+/// are met.
+///
+/// Bounds are added in the given order until they are not met any more: the last one belongs to the conflict; then, from it,
+/// in the same order again. Sets that are not met take far longer than the others: at most one is asked about for each bound of
+/// the conflict beside itself, and only itself where its bounds come first in the order.
+pub(super) fn conflict<E>(
+    order: &[usize],
+    mut is_met: impl FnMut(BoundSet) -> Result<bool, E>,
+) -> Result<Option<BoundSet>, E> {
+    let (mut members, mut candidates) = (BoundSet::EMPTY, order);
+    while is_met(members)? {
+        let mut together = members;
+        let mut last = None;
+        for (place, bound) in candidates.iter().enumerate() {
+            together = together.with(*bound);
+            if !is_met(together)? {
+                last = Some((place, *bound));
+                break;
+            }
+        }
+        let Some((place, bound)) = last else { return Ok(None) };
+        members = members.with(bound);
+        candidates = &candidates[..place];
+    }
+    Ok(Some(members))
+}
+
+/// What was found out about giving way.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct Remedies {
+    /// The sets that give a gait when they are as loose as possible: of the smallest number of bounds that does.
+    pub(super) help: Vec<BoundSet>,
+    /// Those that do not, smaller ones first.
+    pub(super) do_not_help: Vec<BoundSet>,
+    /// Further conflicts, each with what was loosened when it was left.
+    pub(super) conflicts: Vec<(BoundSet, BoundSet)>,
+}
+
+/// Sets of at most `largest` bounds to loosen, all others as they are given, so that there is a gait; `first` is a
+/// conflict. Of every conflict one bound has to give way (Reiter 1987, hitting sets breadth first), so nothing else is asked about.
+pub(super) fn remedies<E>(
+    first: BoundSet,
+    largest: usize,
+    mut gives_a_gait: impl FnMut(BoundSet) -> Result<bool, E>,
+    mut conflict_without: impl FnMut(BoundSet) -> Result<Option<BoundSet>, E>,
+) -> Result<Remedies, E> {
+    let mut found = Remedies::default();
+    let mut tried: Vec<BoundSet> = first.bounds().map(|bound| BoundSet::EMPTY.with(bound)).collect();
+    for size in 1..=largest {
+        let mut left = Vec::new();
+        for loosened in tried {
+            if gives_a_gait(loosened)? {
+                found.help.push(loosened);
+            } else {
+                left.push(loosened);
+            }
+        }
+        found.do_not_help.extend(&left);
+        if !found.help.is_empty() || size == largest {
+            break;
+        }
+        tried = Vec::new();
+        for loosened in left {
+            let known = found.conflicts.iter().map(|(conflict, _)| *conflict).find(|c| c.is_disjoint(loosened));
+            let conflict = if let Some(conflict) = known {
+                conflict
+            } else {
+                let Some(conflict) = conflict_without(loosened)? else { continue };
+                found.conflicts.push((conflict, loosened));
+                conflict
+            };
+            tried.extend(conflict.bounds().map(|bound| loosened.with(bound)));
+        }
+        tried.sort();
+        tried.dedup();
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::convert::Infallible;
+
+    /// Met when no conflict lies within.
+    fn met(conflicts: &[u8], set: BoundSet) -> bool {
+        conflicts.iter().all(|conflict| conflict & !set.0 != 0)
+    }
+
+    fn answer<T>(result: Result<T, Infallible>) -> T {
+        result.unwrap_or_else(|never| match never {})
+    }
+
+    fn found(conflicts: &[u8], order: &[usize]) -> (Option<BoundSet>, Vec<BoundSet>) {
+        let mut not_met = Vec::new();
+        let result = answer(conflict(order, |set| {
+            let met = met(conflicts, set);
+            if !met && !not_met.contains(&set) {
+                not_met.push(set);
+            }
+            Ok(met)
+        }));
+        (result, not_met)
+    }
+
+    const IN_ORDER: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+
+    #[test]
+    fn one_set_that_is_not_met_is_asked_about_for_each_bound_beside_the_conflict_itself() {
+        let (pair, not_met) = found(&[0b0100_1000], &IN_ORDER);
+        assert_eq!(pair, Some(BoundSet(0b0100_1000)));
+        assert_eq!(not_met, [0b0111_1111, 0b0100_1111, 0b0100_1000].map(BoundSet));
+        let (pair, not_met) = found(&[0b0100_1000], &[6, 3, 0, 1, 2, 4, 5, 7]);
+        assert_eq!((pair, not_met.len()), (Some(BoundSet(0b0100_1000)), 1), "suspects first: its own alone");
+    }
+
+    #[test]
+    fn nothing_in_conflict_and_a_conflict_of_nothing_differ() {
+        assert_eq!(found(&[], &IN_ORDER).0, None);
+        assert_eq!(found(&[0], &IN_ORDER).0, Some(BoundSet::EMPTY));
+    }
+
+    proptest! {
+        /// Whatever the conflicts and the order: the one that is found is among them and holds no smaller one; and the
+        /// remedies are all the smallest sets that hit every conflict, and only they.
+        #[test]
+        fn conflicts_are_irreducible_and_remedies_hit_them_all(
+            conflicts in prop::collection::vec(1u8..=255, 1..5),
+            order in Just(IN_ORDER.to_vec()).prop_shuffle(),
+        ) {
+            let first = found(&conflicts, &order).0.unwrap();
+            prop_assert!(!met(&conflicts, first));
+            for bound in first.bounds() {
+                prop_assert!(met(&conflicts, first.without(BoundSet::EMPTY.with(bound))));
+            }
+            let gives_a_gait = |loosened| met(&conflicts, BoundSet::ALL.without(loosened));
+            let remedies = answer(remedies(first, 8, |loosened| Ok(gives_a_gait(loosened)), |loosened| {
+                let kept: Vec<usize> = order.iter().copied().filter(|bound| !loosened.contains(*bound)).collect();
+                Ok(found(&conflicts, &kept).0)
+            }));
+            let size = |set: &BoundSet| set.0.count_ones();
+            let hits: Vec<BoundSet> = (0..=255).map(BoundSet).filter(|set| gives_a_gait(*set)).collect();
+            let smallest = hits.iter().map(size).min().unwrap();
+            let expected: Vec<BoundSet> = hits.into_iter().filter(|set| size(set) == smallest).collect();
+            prop_assert_eq!(&remedies.help, &expected);
+            prop_assert!(remedies.do_not_help.iter().all(|set| !gives_a_gait(*set)));
+            for (conflict, loosened) in remedies.conflicts {
+                prop_assert!(conflict.is_disjoint(loosened) && !met(&conflicts, conflict));
+            }
+        }
+
+        #[test]
+        fn no_larger_remedies_are_tried_than_asked_for(conflicts in prop::collection::vec(1u8..=255, 1..8)) {
+            let first = found(&conflicts, &IN_ORDER).0.unwrap();
+            let mut largest = 0;
+            let remedies = answer(remedies(first, 2, |loosened| {
+                largest = largest.max(loosened.0.count_ones());
+                Ok(met(&conflicts, BoundSet::ALL.without(loosened)))
+            }, |loosened| {
+                let kept: Vec<usize> = IN_ORDER.into_iter().filter(|bound| !loosened.contains(*bound)).collect();
+                Ok(found(&conflicts, &kept).0)
+            }));
+            prop_assert!(largest <= 2);
+            prop_assert!(remedies.help.iter().all(|set| met(&conflicts, BoundSet::ALL.without(*set))));
+        }
+    }
+}
