@@ -2,7 +2,7 @@
 //! of `Layout`, for solvers outside this crate that are to start from the same point.
 //!
 //! `cargo run --release -p gait-optimizer --example dump_start -- [--subject 1|2] [--a5 0.013] [--guess 1]` (number of the
-//! guess in the catalogue)
+//! guess: the catalogue's, then perturbed ones)
 
 use gait_optimizer::{ColdGuess, GaitProblem, Subject};
 use std::error::Error;
@@ -21,8 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             other => return Err(format!("unknown argument {other}").into()),
         }
     }
-    let Some(guess) = ColdGuess::CATALOGUE.get(guess.wrapping_sub(1)) else {
-        return Err(format!("--guess: 1 to {}", ColdGuess::CATALOGUE.len()).into());
+    let Some(guess) = ColdGuess::numbered(guess) else {
+        return Err(format!("--guess: 1 to {}", ColdGuess::MOST).into());
     };
     let mut problem = GaitProblem::new(Subject::builtin(subject)?, false)?;
     problem.bounds.a5 = a5;

@@ -1,7 +1,7 @@
 //! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guess 1] [--mesh 4,4,6,6] [--solver '{"tau_min": 0.995}'] [--trace]` (one guess of the catalogue, as the other side has
+//! [--guess 1] [--mesh 4,4,6,6] [--solver '{"tau_min": 0.995}'] [--trace]` (one guess, as the other side has
 //! one start; the service tries two; `--trace` prints a line per iteration on stderr). Where the time went: `report` has the
 //! parts that were measured, `seconds_other` is the rest (preparing the start, line search, barrier). `peak_resident_mb` is
 //! of the whole process, "unknown" where the system does not say it.
@@ -45,12 +45,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let problem = GaitProblem { settings, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
-    let Some(guess) = ColdGuess::CATALOGUE.get(guess.wrapping_sub(1)) else {
-        return Err(format!("--guess: 1 to {}", ColdGuess::CATALOGUE.len()).into());
+    let Some(guess) = ColdGuess::numbered(guess) else {
+        return Err(format!("--guess: 1 to {}", ColdGuess::MOST).into());
     };
     let outcome = solve_from_guesses(
         &problem,
-        std::slice::from_ref(guess),
+        std::slice::from_ref(&guess),
         &options,
         &mut |record| {
             let phase = serde_json::json!(record.phase);

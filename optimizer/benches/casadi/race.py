@@ -152,7 +152,7 @@ def main():
     parser.add_argument("--phases", default="same", choices=["same", "own"], help="settings of IPOPT in its phases")
     parser.add_argument("--runs", type=int, default=3, help="from each start")
     parser.add_argument("--backend", default="vm", choices=["vm", "c"])
-    parser.add_argument("--guess", type=int, nargs="+", default=[1], help="of our catalogue; both sides start from it")
+    parser.add_argument("--guess", type=int, nargs="+", default=[1], help="1 to 64; both sides start from it")
     parser.add_argument("--threads", type=int, default=1, help="of ours; IPOPT's linear algebra has one")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a single run is given up")
     parser.add_argument("--json", help="file for all figures")
@@ -186,6 +186,14 @@ def main():
     for key in ("wall", "cpu"):
         ratios = [start[key] for start in starts]
         print(f"CasADi + IPOPT / ours, {key}, geometric mean of the starts: {statistics.geometric_mean(ratios):.2f}")
+    for side in ("ours", "casadi"):
+        mine = [start[side] for start in starts if not start[side]["not solved"]]
+        if mine:
+            walls, objectives = [m["wall"] for m in mine], [m["objective"] for m in mine]
+            print(
+                f"{side:7} over {len(mine)} of {len(starts)} starts: wall, median {statistics.median(walls):.2f} s, "
+                f"objective, median {statistics.median(objectives):.8f}, lowest {min(objectives):.8f}"
+            )
     if arguments.json:
         document = {"machine": header, "arguments": vars(arguments), "runs": runs, "starts": starts}
         Path(arguments.json).write_text(json.dumps(document, indent=2) + "\n")

@@ -166,6 +166,14 @@ impl ColdGuess {
         catalogue.chain((0..Self::MOST).map(Self::perturbed)).take(count).collect()
     }
 
+    /// Guess number 1, 2, ...: the catalogue, with and without muscles, then perturbed ones; `None` for 0 and beyond
+    /// [`MOST`](Self::MOST).
+    pub fn numbered(number: usize) -> Option<Self> {
+        let index = number.checked_sub(1).filter(|index| *index < Self::MOST)?;
+        let perturbed = || Self::perturbed(index - Self::CATALOGUE.len());
+        Some(Self::CATALOGUE.get(index).copied().unwrap_or_else(perturbed))
+    }
+
     /// A guess with another timing, stride, knee and beginning of the constraints' curvature. The numbers fill their ranges
     /// evenly, whatever their count: multiples of the powers of one irrational number, modulo 1 (Roberts 2018, *The
     /// unreasonable effectiveness of quasirandom sequences*).
@@ -311,6 +319,15 @@ mod tests {
     #[test]
     fn an_early_rise_is_early_on_the_right_and_late_on_the_left() {
         assert_eq!(GuessTiming::EARLY_RISE.fractions(), [0.0, 0.04, 0.06, 0.15, 0.5, 0.54, 0.56, 0.86, 1.0]);
+    }
+
+    #[test]
+    fn guesses_are_numbered_through_the_catalogue_and_the_perturbed_ones() {
+        let last = ColdGuess::CATALOGUE.len();
+        assert_eq!(ColdGuess::numbered(1), Some(ColdGuess::CATALOGUE[0]));
+        assert_eq!(ColdGuess::numbered(last), ColdGuess::CATALOGUE.last().copied());
+        assert_eq!(ColdGuess::numbered(last + 1), Some(ColdGuess::perturbed(0)));
+        assert_eq!((ColdGuess::numbered(0), ColdGuess::numbered(ColdGuess::MOST + 1)), (None, None));
     }
 
     #[test]
