@@ -102,15 +102,15 @@ struct Ladder {
     /// Which holds the present factor.
     in_use: usize,
     fallbacks: usize,
-    /// Matrices in a row that did not end with the method they began with.
-    in_vain: usize,
-    /// Where the next matrices begin, and how many of them.
-    detour: (usize, usize),
+    /// Matrices in a row that were distrusted.
+    doubts: usize,
+    /// Matrices that the most trusted method has still to factorise without asking the others.
+    trusted_only: usize,
 }
 
-/// Matrices in a row that go further down the ladder before the next ones begin where they ended, and how many do.
-const IN_VAIN: usize = 3;
-const DETOUR: usize = 20;
+/// Matrices in a row that are distrusted before the next ones go to the most trusted method at once, and how many do.
+const DOUBTS: usize = 3;
+const TRUSTED_ONLY: usize = 20;
 
 impl Ladder {
     fn new(methods: Vec<Box<dyn KktSolver>>) -> Self {
@@ -120,26 +120,9 @@ impl Ladder {
             first: 0,
             in_use: 0,
             fallbacks: 0,
-            in_vain: 0,
-            detour: (0, 0),
+            doubts: 0,
+            trusted_only: 0,
         }
-    }
-
-    /// Where a new matrix begins.
-    fn begin(&mut self) -> usize {
-        let (at, left) = self.detour;
-        if left > 0 {
-            self.detour.1 -= 1;
-            return at;
-        }
-        let last = self.in_use.max(self.first);
-        self.in_vain = if last > 0 { self.in_vain + 1 } else { 0 };
-        if self.in_vain < IN_VAIN {
-            return 0;
-        }
-        self.in_vain = 0;
-        self.detour = (last, DETOUR - 1);
-        last
     }
 }
 
@@ -148,7 +131,14 @@ impl KktSolver for Ladder {
         // What was distrusted stays so while only the diagonal changes.
         if change == Change::Any {
             self.up_to_date.fill(false);
-            self.first = self.begin();
+            if self.trusted_only == 0 {
+                self.doubts = if self.first > 0 { self.doubts + 1 } else { 0 };
+                if self.doubts == DOUBTS {
+                    (self.doubts, self.trusted_only) = (0, TRUSTED_ONLY);
+                }
+            }
+            self.first = if self.trusted_only > 0 { self.methods.len() - 1 } else { 0 };
+            self.trusted_only = self.trusted_only.saturating_sub(1);
         }
         for (k, method) in self.methods.iter_mut().enumerate().skip(self.first) {
             if !method.suits(values) {
