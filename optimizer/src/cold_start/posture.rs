@@ -23,6 +23,9 @@ const PASSES: usize = 8;
 /// Stop when no coordinate moves more than this, m or rad: the next pass would move less than a tenth of it.
 const STEP_TOLERANCE: f64 = 0.02;
 
+/// Gap and residual of a QP's solution: a hundredth of the step that ends the passes.
+const GUESS_TOLERANCE: f64 = 1e-4;
+
 /// One instant of the stride: the points of the domains that share it.
 struct Instant {
     /// (domain, point).
@@ -280,7 +283,14 @@ fn linearised_step(
         }
         c.resize(n, 0.0);
     }
-    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(100).build().ok()?;
+    let settings = DefaultSettingsBuilder::default()
+        .verbose(false)
+        .max_iter(100)
+        .tol_gap_abs(GUESS_TOLERANCE)
+        .tol_gap_rel(GUESS_TOLERANCE)
+        .tol_feas(GUESS_TOLERANCE)
+        .build()
+        .ok()?;
     let cones = [SupportedConeT::ZeroConeT(ne), SupportedConeT::NonnegativeConeT(ni)];
     let mut solver = DefaultSolver::new(&p.matrix(n, n), &c, &rows.matrix(ne + ni, n), &rhs, &cones, settings).ok()?;
     solver.solve();

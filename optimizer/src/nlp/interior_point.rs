@@ -91,6 +91,9 @@ fn unscaled_violation(c: &[f64], scale: &[f64]) -> f64 {
 /// Whether a feasibility phase may end at this w.
 pub(super) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
 
+/// The refusal in one iteration at which the factorisation is asked whether its count of eigenvalues can be trusted: most
+/// iterations with a refusal have one, and a wrong one costs no more than a regularisation that was not needed.
+const DOUBTED_REFUSAL: usize = 2;
 /// Primal steps below this are short (see `NlpSettings::short_step_limit`).
 const SHORT_STEP: f64 = 0.05;
 
@@ -295,7 +298,7 @@ impl<'p> Run<'p> {
         }
         self.correction.begin(settings, self.mu);
         let mut change = Change::Any;
-        let mut trusts_refusals = false;
+        let mut refusals = 0;
         loop {
             let (dw, dc) = (self.correction.delta_w, self.correction.delta_c);
             let inertia = session.newton.factor(&self.form, &self.point, &self.at, (dw, dc), change);
@@ -321,7 +324,8 @@ impl<'p> Run<'p> {
                 }
                 Some(i) if i.zero == 0 && i.negative > self.form.m => {
                     // Growth that spoils solutions spoils the count as well. More regularisation only makes it smaller.
-                    let distrusts = !trusts_refusals
+                    refusals += 1;
+                    let distrusts = refusals == DOUBTED_REFUSAL
                         && session.newton.unrefined_residual(
                             &self.form,
                             &self.point,
@@ -330,7 +334,6 @@ impl<'p> Run<'p> {
                             &mut self.direction,
                         ) > settings.residual_limit
                         && session.newton.distrust();
-                    trusts_refusals = !distrusts;
                     distrusts || self.correction.increase(settings)
                 }
                 _ => self.correction.singular(settings, self.mu),

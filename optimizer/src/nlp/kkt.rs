@@ -8,6 +8,7 @@
 //! d: barrier terms, objective curvature and delta_w of x; e: what the eliminated attached variables and delta_c
 //! leave in a row, e_i = sum_k a_k^2 / d_k + delta_c.
 
+use super::factorisation::all_finite;
 use super::formulation::{Formulation, RowKind, entries};
 
 /// Pattern, values and where each part goes.
@@ -20,6 +21,10 @@ pub(super) struct KktMatrix {
     hessian_position: Vec<usize>,
     jacobian_position: Vec<usize>,
     diagonal_position: Vec<usize>,
+    /// What the Hessian puts on the diagonal of x.
+    hessian_diagonal: Vec<f64>,
+    /// Whether everything off the diagonal is finite.
+    finite: bool,
 }
 
 impl KktMatrix {
@@ -57,39 +62,52 @@ impl KktMatrix {
             column_starts.push(row_indices.len());
         }
         let values = vec![0.0; row_indices.len()];
-        Self { order, column_starts, row_indices, values, hessian_position, jacobian_position, diagonal_position }
+        Self {
+            order,
+            column_starts,
+            row_indices,
+            values,
+            hessian_position,
+            jacobian_position,
+            diagonal_position,
+            hessian_diagonal: vec![0.0; n],
+            finite: true,
+        }
     }
 
-    /// Fills the values; `diagonal` has the length of w and must be positive on attached variables. Returns whether
-    /// all values are finite.
-    pub(super) fn assemble(
-        &mut self,
-        form: &Formulation,
-        hessian: Option<&[f64]>,
-        jacobian: &[f64],
-        diagonal: &[f64],
-        delta_c: f64,
-    ) -> bool {
-        self.values.fill(0.0);
+    /// Fills in the derivatives; the diagonal is that of the Hessian.
+    pub(super) fn assemble(&mut self, hessian: Option<&[f64]>, jacobian: &[f64]) {
+        let values = &mut self.values;
+        values.fill(0.0);
         if let Some(hessian) = hessian {
             for (v, &q) in hessian.iter().zip(&self.hessian_position) {
-                self.values[q] = *v;
+                values[q] = *v;
             }
         }
         for (v, &q) in jacobian.iter().zip(&self.jacobian_position) {
-            self.values[q] = *v;
+            values[q] = *v;
         }
-        for j in 0..form.n {
-            self.values[self.diagonal_position[j]] += if form.fixed[j].is_some() { 1.0 } else { diagonal[j] };
+        self.finite = all_finite(values);
+        for (v, &q) in self.hessian_diagonal.iter_mut().zip(&self.diagonal_position) {
+            *v = values[q];
         }
-        for i in 0..form.m {
-            let e = if form.rows[i] == RowKind::Free { 1.0 } else { delta_c };
-            self.values[self.diagonal_position[form.n + i]] = -e;
+    }
+
+    /// Sets the diagonal of what was assembled; `diagonal` has the length of w and must be positive on attached
+    /// variables. Returns whether all values are finite.
+    pub(super) fn set_diagonal(&mut self, form: &Formulation, diagonal: &[f64], delta_c: f64) -> bool {
+        let values = &mut self.values;
+        let (of_x, of_rows) = self.diagonal_position.split_at(form.n);
+        for (((h, d), fixed), &q) in self.hessian_diagonal.iter().zip(diagonal).zip(&form.fixed).zip(of_x) {
+            values[q] = h + if fixed.is_some() { 1.0 } else { *d };
+        }
+        for (row, &q) in form.rows.iter().zip(of_rows) {
+            values[q] = if *row == RowKind::Free { -1.0 } else { -delta_c };
         }
         for (a, d) in form.attached.iter().zip(&diagonal[form.n..]) {
-            self.values[self.diagonal_position[form.n + a.row]] -= 1.0 / d;
+            values[of_rows[a.row]] -= 1.0 / d;
         }
-        self.values.iter().all(|v| v.is_finite())
+        self.finite && self.diagonal_position.iter().all(|&q| values[q].is_finite())
     }
 }
 

@@ -192,7 +192,10 @@ impl NewtonSystem {
         change: Change,
     ) -> Option<Inertia> {
         let clock = Instant::now();
-        let finite = self.matrix.assemble(form, hessian, jacobian, &self.diagonal, self.delta_c);
+        if change == Change::Any {
+            self.matrix.assemble(hessian, jacobian);
+        }
+        let finite = self.matrix.set_diagonal(form, &self.diagonal, self.delta_c);
         let inertia = if finite { self.solver.factor(&self.matrix.values, change) } else { None };
         self.unregularised.fill(false);
         self.solver.mark_neglected(&mut self.unregularised);

@@ -13,6 +13,8 @@
 // Vector code is compiled for a machine's instructions only where it is inlined into the dispatched call.
 #![allow(clippy::inline_always)]
 
+use std::collections::HashMap;
+
 use super::block_columns::BlockColumns;
 use super::dense_kernels::{LANES, padded};
 
@@ -182,6 +184,16 @@ impl Front {
         front.flops = 2.0 * (square(rows) * (variables + 2 * size) as f64 + rows as f64 * square(size))
             + (0..front.pivot_slots() - front.spare()).map(|k| square(size - k)).sum::<f64>();
         front
+    }
+
+    /// Orders the rows of stage 1 by their number of couplings with other pivots: rows that determine few variables do so
+    /// before the others, which would fill them. `couplings`: pairs of pivots, each once.
+    pub(super) fn put_sparse_rows_first(&mut self, couplings: impl Iterator<Item = [usize; 2]>) {
+        let mut couplings_of: HashMap<usize, usize> = HashMap::new();
+        for i in couplings.flatten() {
+            *couplings_of.entry(i).or_default() += 1;
+        }
+        self.rows.sort_by_key(|i| couplings_of.get(i).copied());
     }
 
     /// Spare slots, at the beginning.

@@ -283,6 +283,8 @@ fn analyse(
         }
         let mut front = Front::new(pivots, border, kinds, &touched, room);
         u32::try_from(front.length).ok()?;
+        let within = entries[f].iter().filter(|entry| front_of[entry.2] == f);
+        front.put_sparse_rows_first(within.map(|entry| [entry.1, entry.2]));
         for (i, place) in front.places() {
             places[i] = place;
         }

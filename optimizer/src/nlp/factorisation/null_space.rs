@@ -177,7 +177,6 @@ pub(super) fn eliminate<S: Simd>(
                 work.terms.push((position, 0.5 * h));
             }
         }
-        work.terms.sort_unstable_by_key(|term| term.0);
         for &(from, to) in &front.ranges {
             subtract_columns_within(simd, column, x, wide, &work.terms, from, to);
         }

@@ -1,0 +1,57 @@
+//! Bounds that no gait meets: how the solver ends on a spread of them. One fault of the linear algebra or of the feasibility phase
+//! shows here first, as ends that only gave up.
+
+#![allow(clippy::unwrap_used)]
+
+use gait_optimizer::{
+    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveStatus, Subject, TunedBounds,
+    solve_from_guesses,
+};
+
+/// Far tighter than Table I (Li et al. 2022), each of them a bound or two that leave no gait.
+const WITHOUT_A_GAIT: [&str; 12] = [
+    "a2=10",
+    "a1=2,a5=0.15",
+    "a2=10,a8=5",
+    "a2=20,a4=0.35",
+    "a4=0.35,a5=0.3",
+    "a4=0.35,a6=0.02",
+    "a6=0,a7=5",
+    "a4=0.35,a7=10",
+    "a4=0.5,a7=5",
+    "a5=0.3,a6=0",
+    "a5=0.3,a7=5",
+    "a2=10,a4=0.35",
+];
+
+/// Ends that may give up instead of saying that there is nothing.
+const MAY_GIVE_UP: usize = 1;
+
+#[test]
+fn nearly_every_start_on_bounds_without_a_gait_ends_at_a_stationary_point_of_the_violation() {
+    let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
+    let options = SolveOptions { threads: 2, ..SolveOptions::default() };
+    let mut gave_up = Vec::new();
+    for words in WITHOUT_A_GAIT.into_iter().take(if long { 12 } else { 6 }) {
+        let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
+        problem.bounds = TunedBounds::parse(words).unwrap();
+        if !long {
+            problem.settings = GaitSettings { mesh: Mesh { ds2: 3, ds3: 3, ss2: 4, ss1: 4 }, ..problem.settings };
+        }
+        let outcome =
+            solve_from_guesses(&problem, &[ColdGuess::NATURAL], &options, &mut |_| {}, &CancelToken::new()).unwrap();
+        let report = outcome.report;
+        println!(
+            "{words}: {:?} after {} iterations, {:.1} s, violation {:.2e}",
+            report.status, report.iterations, report.seconds_total, report.max_violation
+        );
+        assert_ne!(report.status, SolveStatus::Converged, "{words}");
+        assert!(report.max_violation > 1e-4, "{words}: {}", report.max_violation);
+        if report.status == SolveStatus::Infeasible {
+            assert!(!outcome.violations.is_empty(), "{words}: nothing is named");
+        } else {
+            gave_up.push(words);
+        }
+    }
+    assert!(gave_up.len() <= MAY_GIVE_UP, "gave up on {gave_up:?}");
+}
