@@ -85,7 +85,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0.013,0.5,50,40\n20,90,0.3,1.4,0,0.5,5,5\n";
     std::fs::write(folder.join("actions.csv"), actions).unwrap();
     let sweep = ["sweep", "--actions", "actions.csv", "--out", "out.csv", "--warm", "gait.json", "--max-iterations"];
-    let output = gaitwright(folder, &[&sweep[..], &["60"], &COARSE].concat());
+    let output = gaitwright(folder, &[&sweep[..], &["200"], &COARSE].concat());
     assert!(output.stdout.is_empty());
     let table = std::fs::read_to_string(folder.join("out.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
@@ -97,7 +97,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     assert_eq!(cli::files(folder), ["actions.csv", "gait.json", "many.json", "out.csv"]);
 
     // A gait of the other variant is refused in words, once for the whole table.
-    let output = cli::run(BINARY, folder, &[&sweep[..], &["60", "--muscles", "on"]].concat());
+    let output = cli::run(BINARY, folder, &[&sweep[..], &["200", "--muscles", "on"]].concat());
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
     assert!(text.contains("it is without muscles, the problem is with muscles"), "{text}");
