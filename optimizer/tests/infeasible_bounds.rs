@@ -25,7 +25,7 @@ const WITHOUT_A_GAIT: [&str; 12] = [
 ];
 
 /// Ends that may give up instead of saying that there is nothing: one of the twelve does (a4=0.5 a7=5), and paths differ by
-/// rounding. A fault of the linear algebra that was there once made it three.
+/// rounding.
 const MAY_GIVE_UP: usize = 2;
 
 #[test]

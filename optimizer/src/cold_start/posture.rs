@@ -23,7 +23,7 @@ const PASSES: usize = 8;
 /// Stop when no coordinate moves more than this, m or rad: the next pass would move less than a tenth of it.
 const STEP_TOLERANCE: f64 = 0.02;
 
-/// Gap and residual of a QP's solution: a hundredth of the step that ends the passes.
+/// Gap and residual of a QP's solution: a two-hundredth of the step that ends the passes.
 const GUESS_TOLERANCE: f64 = 1e-4;
 
 /// One instant of the stride: the points of the domains that share it.

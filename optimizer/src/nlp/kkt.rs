@@ -23,7 +23,7 @@ pub(super) struct KktMatrix {
     diagonal_position: Vec<usize>,
     /// What the Hessian puts on the diagonal of x.
     hessian_diagonal: Vec<f64>,
-    /// Whether everything off the diagonal is finite.
+    /// Whether all derivatives are finite.
     finite: bool,
 }
 
