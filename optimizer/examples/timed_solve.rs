@@ -1,15 +1,15 @@
 //! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
 //!
 //! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guess 1] [--mesh 4,4,6,6] [--solver '{"tau_min": 0.995}'] [--trace]` (one guess, as the other side has
-//! one start; the service tries two; `--trace` prints a line per iteration on stderr). Where the time went: `report` has the
+//! [--guess 1] [--mesh 4,4,6,6] [--bounds a4=0.5,a7=5] [--solver '{"tau_min": 0.995}'] [--trace]` (one guess, as the other
+//! side has one start; the service tries two; `--trace` prints a line per iteration on stderr). Where the time went: `report` has the
 //! parts that were measured, `seconds_other` is the rest (preparing the start, line search, barrier). `peak_resident_mb` is
 //! of the whole process, "unknown" where the system does not say it.
 
 mod peak_memory;
 
 use gait_optimizer::{
-    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve_from_guesses,
+    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, TunedBounds, solve_from_guesses,
 };
 use peak_memory::peak_resident_mb;
 use std::error::Error;
@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut settings = GaitSettings::reference_problem();
     let mut options = SolveOptions::default();
     let mut guess: usize = 1;
+    let mut bounds = TunedBounds::default();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
@@ -39,11 +40,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 options.solver =
                     serde_json::from_value::<SolveOptions>(serde_json::json!({ "solver": solver }))?.solver;
             }
+            "--bounds" => bounds = TunedBounds::parse(&value()?)?,
             "--threads" => options.threads = value()?.parse()?,
             other => return Err(format!("unknown argument {other}").into()),
         }
     }
-    let problem = GaitProblem { settings, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
+    let problem = GaitProblem { settings, bounds, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
     let Some(guess) = ColdGuess::numbered(guess) else {
         return Err(format!("--guess: 1 to {}", ColdGuess::MOST).into());

@@ -138,14 +138,14 @@ fn activations_do_not_alternate_with_the_default_weights() {
 #[test]
 fn cold_starts_take_no_more_iterations_than_before() {
     let known = [
-        ((1, false, ColdGuess::NATURAL), 101),
-        ((1, false, ColdGuess::EARLY_RISE), 121),
-        ((2, false, ColdGuess::NATURAL), 108),
-        ((2, false, ColdGuess::EARLY_RISE), 108),
-        ((1, true, ColdGuess::NATURAL), 176),
-        ((1, true, ColdGuess::EARLY_RISE), 167),
-        ((2, true, ColdGuess::NATURAL), 173),
-        ((2, true, ColdGuess::EARLY_RISE), 173),
+        ((1, false, ColdGuess::NATURAL), 92),
+        ((1, false, ColdGuess::EARLY_RISE), 97),
+        ((2, false, ColdGuess::NATURAL), 84),
+        ((2, false, ColdGuess::EARLY_RISE), 101),
+        ((1, true, ColdGuess::NATURAL), 147),
+        ((1, true, ColdGuess::EARLY_RISE), 160),
+        ((2, true, ColdGuess::NATURAL), 166),
+        ((2, true, ColdGuess::EARLY_RISE), 167),
     ];
     let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
     let (mut taken, mut expected) = (0, 0);

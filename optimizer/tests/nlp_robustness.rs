@@ -371,3 +371,29 @@ fn nlp_an_empty_problem_is_solved() {
     let r = cold(&problem);
     assert_eq!((r.status, r.objective), (NlpStatus::Converged, 3.0));
 }
+
+/// With regularised rows a direction may ascend at a feasible point for no other reason than a wrong multiplier.
+#[test]
+fn nlp_a_wrong_multiplier_alone_is_no_wrong_inertia() {
+    let problem = Small::new("square over a point", &[0.0], &[EQ], &[], |x| (0.5 * square(x[0] + 1.0), vec![x[0]]));
+    let warm = WarmPoint {
+        x: vec![0.0],
+        row_multipliers: vec![-2.0],
+        lower_multipliers: vec![0.0],
+        upper_multipliers: vec![0.0],
+        ..WarmPoint::default()
+    };
+    let settings = NlpSettings { dual_regularisation: DualRegularisation::Always, ..NlpSettings::default() };
+    let mut regularised = 0.0_f64;
+    let result = solve(
+        &problem,
+        &StartPoint::Warm(warm),
+        &settings,
+        &mut |record| regularised = regularised.max(record.delta_w),
+        &|| false,
+    )
+    .unwrap();
+    assert_eq!((result.status, result.counts.solver_fallbacks, regularised), (NlpStatus::Converged, 0, 0.0));
+    assert!(result.iterations <= 2, "{}", result.iterations);
+    assert!((result.row_multipliers[0] + 1.0).abs() < 1e-6, "{:?}", result.row_multipliers);
+}

@@ -26,21 +26,23 @@ CRATE = HERE.parent.parent
 REFERENCE = CRATE / "data" / "reference_gait.csv"
 FIXTURES = CRATE / "tests" / "data"
 
-TRACKING = {"w": [0.0, 10.0], "relaxed": True}
+TRACKING = {"relaxed": True}
 COST = {"w": [1.0, 0.0], "relaxed": False, "tol": 1e-6, "constr_viol_tol": 1e-7}
 ROUGH = {"tol": 1e-2, "constr_viol_tol": 1e-3, "compl_inf_tol": 1e-2}
 FIRM = {"tol": 1e-3, "constr_viol_tol": 1e-5, "acceptable_tol": 1e-2, "acceptable_iter": 5}
-# By name: those of the crate, and those that this implementation had of its own.
+PUSHED = {"bound_push": 0.1, "bound_frac": 0.1}
+# By name: those of the crate, which do not track again with muscles, and those that this implementation had of its own.
 PHASES = {
     "same": {
-        "tracking": TRACKING | ROUGH | {"muscles": False, "mu_init": 1e-3},
-        "muscle_tracking": TRACKING | ROUGH | {"muscles": True, "mu_init": 1e-2},
-        "cost": COST | {"mu_init": 1e-5},
+        "tracking": TRACKING | ROUGH | PUSHED | {"w": [0.0, 3.0], "mu_init": 1e-3},
+        "cost": COST | PUSHED | {"mu_init": 1e-6},
+        "muscle_cost": COST | PUSHED | {"mu_init": 1e-5},
     },
     "own": {
-        "tracking": TRACKING | FIRM | {"muscles": False, "mu_init": 1e-3},
-        "muscle_tracking": TRACKING | FIRM | {"muscles": True, "mu_init": 1e-2},
+        "tracking": TRACKING | FIRM | {"w": [0.0, 10.0], "mu_init": 1e-3},
+        "muscle_tracking": TRACKING | FIRM | {"w": [0.0, 10.0], "mu_init": 1e-2},
         "cost": COST | {"mu_init": 1e-4},
+        "muscle_cost": COST | {"mu_init": 1e-4},
     },
 }
 
@@ -93,6 +95,7 @@ class Solver:
             "sb": "yes",
         }
         names = ("mu_init", "tol", "constr_viol_tol", "compl_inf_tol", "acceptable_tol", "acceptable_iter")
+        names += ("bound_push", "bound_frac")
         ipopt |= {key: phase[key] for key in names if key in phase}
         ipopt |= extra or {}
         options = {
@@ -154,8 +157,9 @@ def solve(options):
         started = time.perf_counter()
         x = muscle_guess.guess(plain.gait, last.gait, x)
         guess_s = time.perf_counter() - started
-        x, phases["muscle_tracking"] = last.solve(x, settings["muscle_tracking"], quiet=quiet)
-    x, phases["cost"] = last.solve(x, settings["cost"], quiet=quiet)
+        if "muscle_tracking" in settings:
+            x, phases["muscle_tracking"] = last.solve(x, settings["muscle_tracking"], quiet=quiet)
+    x, phases["cost"] = last.solve(x, settings["muscle_cost" if last is not plain else "cost"], quiet=quiet)
     mcot, reg, _ = last.cost(x)
     final = phases["cost"]
     return {

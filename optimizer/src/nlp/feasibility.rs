@@ -13,6 +13,10 @@ use super::settings::BoundMultiplierStart;
 /// Bound multipliers above this start anew after the phase (IPOPT `bound_mult_reset_threshold`).
 const MULTIPLIER_RESET: f64 = 1e3;
 
+/// Up to a hundred times the tolerance a violation may be what the phase's own end has left over; of a rough tolerance that
+/// would be a violation that nothing can lower.
+const NEAR_TOLERANCE: f64 = 1e-4;
+
 /// Elastics (p, n) minimising rho (p + n) - mu (ln p + ln n) subject to c = p - n (WB06 eqs. 32, 33).
 fn best_elastics(c: f64, mu: f64, rho: f64) -> (f64, f64) {
     // The smaller of the two is computed without cancellation.
@@ -126,7 +130,8 @@ pub(super) fn restore(run: &mut Run, session: &mut Session) -> Option<Ending> {
         return Some(Ending::Stalled);
     }
 
-    let feasible = run.program_violation() <= settings.violation_tolerance.max(100.0 * settings.tolerance);
+    let near = 100.0 * settings.tolerance.min(NEAR_TOLERANCE);
+    let feasible = run.program_violation() <= settings.violation_tolerance.max(near);
     let progress = run.theta() <= settings.required_reduction * theta;
     match ending {
         Ending::Left => {}

@@ -94,6 +94,10 @@ pub(super) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
 /// The refusal in one iteration at which the factorisation is asked whether its count of eigenvalues can be trusted: most
 /// iterations with a refusal have one, and a wrong one costs no more than a regularisation that was not needed.
 const DOUBTED_REFUSAL: usize = 2;
+/// Share of an ascent that the rows may account for before it is theirs (see [`Run::curves_downwards`]).
+const ROWS_SHARE: f64 = 0.1;
+/// Share of the sum of its terms' sizes below which an ascent is rounding.
+const CANCELLATION: f64 = 1e-8;
 /// Primal steps below this are short (see `NlpSettings::short_step_limit`).
 const SHORT_STEP: f64 = 0.05;
 
@@ -316,11 +320,15 @@ impl<'p> Run<'p> {
                         &mut self.direction,
                     );
                     let distrusts = solved.unrefined > settings.residual_limit && session.newton.distrust();
-                    if !distrusts && solved.refined <= settings.residual_limit {
+                    let solves = !distrusts && solved.refined <= settings.residual_limit;
+                    if solves && self.curves_downwards() {
+                        session.newton.distrust() || self.correction.increase(settings)
+                    } else if solves {
                         self.correction.accept(settings);
                         return true;
+                    } else {
+                        distrusts || self.correction.singular(settings, self.mu)
                     }
-                    distrusts || self.correction.singular(settings, self.mu)
                 }
                 Some(i) if i.zero == 0 && i.negative > self.form.m => {
                     // Growth that spoils solutions spoils the count as well. More regularisation only makes it smaller.
@@ -341,6 +349,22 @@ impl<'p> Run<'p> {
             if !go_on {
                 return false;
             }
+        }
+    }
+
+    /// Whether the direction d shows that the factorisation miscounted, K = W + Sigma + `delta_w` I having negative curvature
+    /// where the right inertia excludes it: with `delta_c` > 0 K + A^T A / `delta_c` is positive definite, where A d =
+    /// `delta_c` dy - c and d^T K d = (c - `delta_c` dy)^T (y + dy) - grad phi^T d; without, K is in the null space of A, which d
+    /// is in but for what c counts.
+    fn curves_downwards(&self) -> bool {
+        let (slope, size) = self.slope_and_size();
+        slope > CANCELLATION * size && {
+            let delta_c = self.correction.delta_c;
+            let of_row = |((c, y), dy): ((&f64, &f64), &f64)| {
+                if delta_c > 0.0 { c * (y - dy) - delta_c * dy * y + c * c / delta_c } else { (c * (y + dy)).abs() }
+            };
+            let of_rows: f64 = self.c.iter().zip(&self.point.y).zip(&self.direction.y).map(of_row).sum();
+            of_rows < ROWS_SHARE * slope
         }
     }
 
@@ -445,7 +469,7 @@ impl<'p> Run<'p> {
                 let crawls = settings.short_step_limit > 0
                     && short_steps >= settings.short_step_limit
                     && self.phase() == Phase::Regular
-                    && largest(&self.c) > settings.tolerance.sqrt()
+                    && largest(&self.c) > settings.tolerance
                     && session.counts.feasibility_phases < settings.max_feasibility_phases;
                 if !crawls {
                     continue;
@@ -461,8 +485,11 @@ impl<'p> Run<'p> {
             match self.phase() {
                 Phase::Feasibility => {
                     elastic_resets += 1;
-                    if elastic_resets > 1 || !feasibility::reset_elastics(self) {
+                    if elastic_resets > 2 {
                         return Ending::Stalled;
+                    }
+                    if elastic_resets > 1 || !feasibility::reset_elastics(self) {
+                        self.recentre(session);
                     }
                 }
                 Phase::Regular => {

@@ -17,7 +17,8 @@ pub(super) struct Search {
     correction: PrimalDual,
     /// The point before a soft step.
     before: PrimalDual,
-    /// Shortened steps in a row.
+    /// Two for each shortened step, one back for each full one: where they alternate, points may alternate, too, each better
+    /// than the other by no more than the filter's margin.
     shortened: usize,
     watch: Option<Watch>,
     /// Where the watchdog goes back to.
@@ -125,7 +126,7 @@ impl Run<'_> {
                 return true;
             }
         }
-        if settings.watchdog_trigger > 0 && self.search.shortened >= settings.watchdog_trigger {
+        if settings.watchdog_trigger > 0 && self.search.shortened >= 2 * settings.watchdog_trigger {
             self.search.shortened = 0;
             self.search.watched_point.copy_from(&self.point);
             self.search.watched_direction.copy_from(&self.direction);
@@ -156,7 +157,8 @@ impl Run<'_> {
             let (theta, phi, finite) = self.try_step(alpha, false);
             if finite {
                 if let Some(kind) = self.judge(&reference, alpha, theta, phi) {
-                    self.search.shortened = if trials > 1 { self.search.shortened + 1 } else { 0 };
+                    self.search.shortened =
+                        if trials > 1 { self.search.shortened + 2 } else { self.search.shortened.saturating_sub(1) };
                     self.correction.observe(settings, trials);
                     self.finish(session, &reference, kind, alpha, tau, trials);
                     return true;
@@ -167,7 +169,7 @@ impl Run<'_> {
                     && let Some((kind, alpha, extra)) =
                         self.second_order_correction(session, &reference, alpha, tau, theta)
                 {
-                    self.search.shortened = 0;
+                    self.search.shortened = self.search.shortened.saturating_sub(1);
                     self.correction.observe(settings, 1);
                     self.finish(session, &reference, kind, alpha, tau, trials + extra);
                     return true;
@@ -204,13 +206,20 @@ impl Run<'_> {
 
     /// grad phi^T dw.
     fn slope(&self) -> f64 {
-        let mut slope = 0.0;
+        self.slope_and_size().0
+    }
+
+    /// grad phi^T dw, and the sum of its terms' sizes, which says how exact it is.
+    pub(super) fn slope_and_size(&self) -> (f64, f64) {
+        let (mut slope, mut size) = (0.0, 0.0);
         for j in 0..self.form.length() {
             let barrier = self.mu / self.at.slack_upper[j] - self.mu / self.at.slack_lower[j];
             let damping = DAMPING * self.mu * self.form.single_side(j);
-            slope += (self.gradient[j] + barrier + damping) * self.direction.w[j];
+            let term = (self.gradient[j] + barrier + damping) * self.direction.w[j];
+            slope += term;
+            size += term.abs();
         }
-        slope
+        (slope, size)
     }
 
     /// Evaluates theta and phi at w + alpha dw (dw: the correction's when `corrected`).

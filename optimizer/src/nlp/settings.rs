@@ -152,8 +152,8 @@ pub struct NlpSettings {
 
     /// Second-order corrections per iteration. Default 4 (WB06 p^max).
     pub max_second_order_corrections: usize,
-    /// Shortened steps in a row that start the watchdog, which takes full steps without asking and goes back if none of
-    /// them is acceptable. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
+    /// Shortened steps that start the watchdog, which takes full steps without asking and goes back if none of them is
+    /// acceptable. Each full step takes half a shortened one back. Default 10 (IPOPT `watchdog_shortened_iter_trigger`); 0: never.
     pub watchdog_trigger: usize,
     /// Full steps the watchdog may try. Default 3 (IPOPT `watchdog_trial_iter_max`).
     pub watchdog_trials: usize,

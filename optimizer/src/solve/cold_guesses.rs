@@ -112,7 +112,7 @@ pub struct ColdGuess {
     pub stride_length_m: f64,
     /// Shares of the domains.
     pub timing: GuessTiming,
-    /// First barrier parameter of the cost phase.
+    /// First barrier parameter of the cost phase with muscles; without, it begins with a tenth.
     pub barrier: f64,
     /// Scaled violation from which on the constraints' curvature counts (`NlpSettings::curvature_from_violation`).
     pub curvature_from: f64,

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct SolveOptions {
     /// Scaled optimality tolerance.
     pub tolerance: f64,
-    /// Most iterations of the final phase.
+    /// Most iterations of each phase; those that track the reference have 200 at most.
     pub max_iterations: usize,
     /// Most seconds of wall time for the whole solve; `None`: no limit.
     pub time_limit_s: Option<f64>,

@@ -1,7 +1,8 @@
 //! The settings of the interior point that a caller may choose for gait problems.
 //!
 //! The phases of a solve decide the others, by the rest of the options and the guess in progress: tolerances, limits, barrier
-//! parameters and strategy, distance of a warm start from its bounds, when the rows' curvature counts, threads.
+//! parameters and strategy, distance of a warm start from its bounds (and of a cost phase after a tracking phase that did not
+//! converge), when the rows' curvature counts, threads.
 
 use crate::nlp::{BoundMultiplierStart, NlpSettings};
 use crate::subject::ModelError;
@@ -28,11 +29,13 @@ const DECIDED_BY_PHASES: [&str; 14] = [
     "threads",
 ];
 
-/// What suits gait problems: bound multipliers begin on the central path, the unregularised matrix is not tried again at
-/// once after it had the wrong inertia, and a second-order correction that did not help is not corrected again (a tenth of the
-/// iterations and a fifth of the substitutions of 40 cold starts without muscles).
+/// What suits gait problems: cold starts keep well away from their bounds, bound multipliers begin on the central path, the
+/// unregularised matrix is not tried again at once after it had the wrong inertia, and a second-order correction that did not
+/// help is not corrected again (a tenth of the iterations and a fifth of the substitutions of 40 cold starts without muscles).
 pub(super) fn default() -> NlpSettings {
     NlpSettings {
+        bound_push: 0.1,
+        bound_fraction: 0.1,
         bound_multiplier_start: BoundMultiplierStart::Centred,
         regularisation_memory: 4,
         max_second_order_corrections: 1,
