@@ -163,14 +163,14 @@ fn a_gait_names_those_it_came_from() {
 fn settings_of_the_solver_are_taken_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    std::fs::write(folder.join("solver.json"), r#"{"kappa_mu": 0.9, "theta_mu": 1.05}"#).unwrap();
+    std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01, "bound_fraction": 0.01}"#).unwrap();
     let solve = ["solve", "--json", "--cold-guesses", "1"];
     let gait = |flags: &[&str]| {
         let figures = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
         assert_eq!(figures["status"], "converged");
         figures["lineage"]["id"].as_str().unwrap().to_owned()
     };
-    // The barrier parameter falls otherwise, so the way is another one, and at least the last bits of where it ends.
+    // The start is nearer to its bounds, so the way is another one, and at least the last bits of where it ends.
     let usual = gait(&[]);
     assert_ne!(gait(&["--solver-settings", "solver.json"]), usual);
     assert_eq!(gait(&[]), usual);

@@ -1,5 +1,6 @@
 //! One attempt in progress: its phases, and what they cost.
 
+use super::attempts::CONVERGED_VIOLATION;
 use super::cold_guesses::{ColdGuess, ColdRoute};
 use super::{CancelToken, GaitProblem, IterationRecord, LinearAlgebra, Phase, SolveError, SolveOptions};
 use crate::cold_start;
@@ -24,6 +25,8 @@ const ROUGH_VIOLATION: f64 = 1e-3;
 /// Most iterations of a phase that tracks the reference. It takes some ten; on bounds with hardly a gait it may take a
 /// thousand, and the cost phase goes on from wherever it is.
 const MOST_TRACKING_ITERATIONS: usize = 200;
+/// Share of the violation allowed in an answer that is allowed before it is moved into its bounds.
+const VIOLATION_SHARE: f64 = 0.3;
 /// First barrier parameter of a cost phase that may not choose its own.
 const MU_COST: f64 = 1e-4;
 /// Distance from its bounds, relative and as a share of their width, that a point keeps on to which a phase goes.
@@ -215,10 +218,15 @@ impl<'a> Run<'a> {
     }
 
     /// With the tolerance of the answer. The answer is moved back into its bounds, which rows answer with up to a hundred
-    /// times the way: bounds are widened by little beside the tolerance.
+    /// times the way: bounds are widened by little beside the tolerance, and the violation leaves room for what that adds.
     fn last_phase(&self, settings: &NlpSettings) -> NlpSettings {
         let tolerance = self.context.options.tolerance;
-        NlpSettings { tolerance, bound_relaxation: settings.bound_relaxation.min(0.01 * tolerance), ..*settings }
+        NlpSettings {
+            tolerance,
+            violation_tolerance: settings.violation_tolerance.min(VIOLATION_SHARE * CONVERGED_VIOLATION),
+            bound_relaxation: settings.bound_relaxation.min(0.01 * tolerance),
+            ..*settings
+        }
     }
 }
 
