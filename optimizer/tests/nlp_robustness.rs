@@ -397,3 +397,23 @@ fn nlp_a_wrong_multiplier_alone_is_no_wrong_inertia() {
     assert!(result.iterations <= 2, "{}", result.iterations);
     assert!((result.row_multipliers[0] + 1.0).abs() < 1e-6, "{:?}", result.row_multipliers);
 }
+
+/// Where a row is violated, curvature downwards along the way back to it is no wrong inertia: that of [-1 1; 1 0] is right.
+#[test]
+fn nlp_an_ascent_that_a_violated_row_asks_for_is_no_wrong_inertia() {
+    let problem = Small::new("hill through a point", &[1.0], &[EQ], &[], |x| (-0.5 * square(x[0]), vec![x[0]]));
+    for dual_regularisation in [DualRegularisation::Always, DualRegularisation::WhenSingular] {
+        let settings = NlpSettings { dual_regularisation, ..NlpSettings::default() };
+        let mut regularised = 0.0_f64;
+        let result = solve(
+            &problem,
+            &StartPoint::Cold(vec![1.0]),
+            &settings,
+            &mut |record| regularised = regularised.max(record.delta_w),
+            &|| false,
+        )
+        .unwrap();
+        assert_eq!((result.status, result.counts.solver_fallbacks, regularised), (NlpStatus::Converged, 0, 0.0));
+        assert!(result.x[0].abs() < 1e-6 && result.iterations <= 2, "{} {}", result.x[0], result.iterations);
+    }
+}

@@ -17,6 +17,9 @@ const MULTIPLIER_RESET: f64 = 1e3;
 /// would be a violation that nothing can lower.
 const NEAR_TOLERANCE: f64 = 1e-4;
 
+/// A phase that converged without progress has proven a violation beyond so many times what is allowed.
+const LEFT_OVER: f64 = 10.0;
+
 /// Elastics (p, n) minimising rho (p + n) - mu (ln p + ln n) subject to c = p - n (WB06 eqs. 32, 33).
 fn best_elastics(c: f64, mu: f64, rho: f64) -> (f64, f64) {
     // The smaller of the two is computed without cancellation.
@@ -137,7 +140,7 @@ pub(super) fn restore(run: &mut Run, session: &mut Session) -> Option<Ending> {
         Ending::Left => {}
         // Feasible, yet the filter does not want it: its entries are older than this point's merit.
         Ending::Converged | Ending::Stalled if feasible && progress => run.filter.clear(),
-        Ending::Converged if !feasible => {
+        Ending::Converged if !feasible || run.program_violation() > LEFT_OVER * settings.violation_tolerance => {
             run.point.y.copy_from_slice(&phase.point.y);
             return Some(Ending::Infeasible);
         }

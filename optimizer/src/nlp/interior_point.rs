@@ -96,6 +96,8 @@ pub(super) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
 const DOUBTED_REFUSAL: usize = 2;
 /// Share of an ascent that the rows may account for before it is theirs (see [`Run::curves_downwards`]).
 const ROWS_SHARE: f64 = 0.1;
+/// What rows without a regularisation count as having there.
+const LITTLE_REGULARISATION: f64 = 1e-9;
 /// Share of the sum of its terms' sizes below which an ascent is rounding.
 const CANCELLATION: f64 = 1e-8;
 /// Primal steps below this are short (see `NlpSettings::short_step_limit`).
@@ -321,7 +323,7 @@ impl<'p> Run<'p> {
                     );
                     let distrusts = solved.unrefined > settings.residual_limit && session.newton.distrust();
                     let solves = !distrusts && solved.refined <= settings.residual_limit;
-                    if solves && self.curves_downwards() {
+                    if solves && self.curves_downwards(&session.newton) {
                         session.newton.distrust() || self.correction.increase(settings)
                     } else if solves {
                         self.correction.accept(settings);
@@ -352,19 +354,24 @@ impl<'p> Run<'p> {
         }
     }
 
-    /// Whether the direction d shows that the factorisation miscounted, K = W + Sigma + `delta_w` I having negative curvature
-    /// where the right inertia excludes it: with `delta_c` > 0 K + A^T A / `delta_c` is positive definite, where A d =
-    /// `delta_c` dy - c and d^T K d = (c - `delta_c` dy)^T (y + dy) - grad phi^T d; without, K is in the null space of A, which d
-    /// is in but for what c counts.
-    fn curves_downwards(&self) -> bool {
+    /// Whether the direction d shows that the factorisation miscounted. With the right inertia and regularised rows
+    /// K + A^T A / `delta_c` is positive definite, K = W + Sigma + `delta_w` I; along d, with A d = `delta_c` dy - c and
+    /// d^T K d = (c - `delta_c` dy)^T (y + dy) - grad phi^T d, it is the rows' part below less the slope. Rows that are not
+    /// regularised, where A d = -c and K has to be positive in their null space only, count as if they were by little: what
+    /// they violate excuses any curvature.
+    fn curves_downwards(&self, newton: &NewtonSystem) -> bool {
         let (slope, size) = self.slope_and_size();
         slope > CANCELLATION * size && {
-            let delta_c = self.correction.delta_c;
-            let of_row = |((c, y), dy): ((&f64, &f64), &f64)| {
-                if delta_c > 0.0 { c * (y - dy) - delta_c * dy * y + c * c / delta_c } else { (c * (y + dy)).abs() }
+            let of_row = |i: usize| {
+                let (c, y, dy) = (self.c[i], self.point.y[i], self.direction.y[i]);
+                let delta_c = newton.row_regularisation(&self.form, i);
+                if delta_c > 0.0 {
+                    c * (y - dy) - delta_c * dy * y + c * c / delta_c
+                } else {
+                    c * (y + dy) + c * c / LITTLE_REGULARISATION
+                }
             };
-            let of_rows: f64 = self.c.iter().zip(&self.point.y).zip(&self.direction.y).map(of_row).sum();
-            of_rows < ROWS_SHARE * slope
+            (0..self.form.m).map(of_row).sum::<f64>() < ROWS_SHARE * slope
         }
     }
 
