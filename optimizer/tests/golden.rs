@@ -134,7 +134,8 @@ fn activations_do_not_alternate_with_the_default_weights() {
 }
 
 /// What cold starts took in the mean of four accuracies of the linear algebra, by subject, variant and guess: rounding alone
-/// moves one of them by a third and all eight together by a sixteenth.
+/// moves one of them by a third and all eight together by a sixteenth. Of the version before the posture of a cold start had a
+/// pass less: all eight together took 1,014, and 966 with the usual accuracy since.
 #[test]
 fn cold_starts_take_no_more_iterations_than_before() {
     let known = [

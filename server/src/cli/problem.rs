@@ -105,7 +105,7 @@ pub(super) struct ProblemFlags {
     /// Scaled optimality tolerance.
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     tolerance: Option<f64>,
-    /// Most iterations of each phase.
+    /// Most iterations of each phase; those that track the reference have 200 at most.
     #[arg(long, value_name = "NUMBER", value_parser = iterations, allow_negative_numbers = true)]
     max_iterations: Option<usize>,
     /// Most seconds for one solve.
