@@ -7,27 +7,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: [(i64, &str, &str); 19] = [
-    (1, "studies", include_str!("../../../migrations/0001_studies.sql")),
-    (2, "audit", include_str!("../../../migrations/0002_audit.sql")),
-    (3, "access", include_str!("../../../migrations/0003_access.sql")),
-    (4, "scripts", include_str!("../../../migrations/0004_scripts.sql")),
-    (5, "blind", include_str!("../../../migrations/0005_blind.sql")),
-    (6, "results", include_str!("../../../migrations/0006_results.sql")),
-    (7, "consent", include_str!("../../../migrations/0007_consent.sql")),
-    (8, "certificates", include_str!("../../../migrations/0008_certificates.sql")),
-    (9, "comparisons", include_str!("../../../migrations/0009_comparisons.sql")),
-    (30, "rater_undo", include_str!("../../../migrations/0030_rater_undo.sql")),
-    (31, "seals", include_str!("../../../migrations/0031_seals.sql")),
-    (36, "lab_sessions", include_str!("../../../migrations/0036_lab_sessions.sql")),
-    (37, "lab_recordings", include_str!("../../../migrations/0037_lab_recordings.sql")),
-    (38, "subject_muscles", include_str!("../../../migrations/0038_subject_muscles.sql")),
-    (39, "sessions_by_link", include_str!("../../../migrations/0039_sessions_by_link.sql")),
-    (40, "remarks", include_str!("../../../migrations/0040_remarks.sql")),
-    (41, "lab_answers", include_str!("../../../migrations/0041_lab_answers.sql")),
-    (42, "safety_reviews", include_str!("../../../migrations/0042_safety_reviews.sql")),
-    (43, "explanations", include_str!("../../../migrations/0043_explanations.sql")),
-];
+const FILES: &[(i64, &str, &str)] = &[(1, "baseline", include_str!("../../../migrations/0001_baseline.sql"))];
 
 /// Version of the form of a record that this program writes.
 pub const FORM: i64 = FILES[FILES.len() - 1].0;
@@ -39,8 +19,8 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
     back_up_before(pool, path, found).await?;
     let migrations = FILES
-        .into_iter()
-        .map(|(version, description, sql)| {
+        .iter()
+        .map(|&(version, description, sql)| {
             let description = Cow::Borrowed(description);
             Migration::new(version, description, MigrationType::Simple, sql.into_sql_str(), false)
         })
