@@ -73,6 +73,26 @@ pub struct Certificate {
     pub pushes: Option<Pushes>,
 }
 
+impl Certificate {
+    /// The certificate of what cannot be examined: it failed, for this reason.
+    pub fn of_unexaminable(reason: &str) -> Self {
+        Self { objections: vec![reason.to_owned()], ..Self::empty(Vec::new()) }
+    }
+
+    fn empty(checks: Vec<Check>) -> Self {
+        Self {
+            format_version: FORMAT_VERSION,
+            passed: false,
+            objections: Vec::new(),
+            checks,
+            fall: None,
+            return_map: None,
+            free_hip_return_map: None,
+            pushes: None,
+        }
+    }
+}
+
 /// Examines a gait. Deterministic; takes some seconds.
 ///
 /// # Errors
@@ -80,16 +100,7 @@ pub struct Certificate {
 pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
     gait.validate()?;
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
-    let mut certificate = Certificate {
-        format_version: FORMAT_VERSION,
-        passed: false,
-        objections: Vec::new(),
-        checks: residuals::residuals(&model, gait),
-        fall: None,
-        return_map: None,
-        free_hip_return_map: None,
-        pushes: None,
-    };
+    let mut certificate = Certificate::empty(residuals::residuals(&model, gait));
     if let Err(fall) = simulate(&model, gait, &mut certificate) {
         certificate.fall = Some(fall.to_string());
     }

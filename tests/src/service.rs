@@ -1,6 +1,6 @@
 //! A service on a temporary record.
 
-use crate::examined::Verdicts;
+use crate::examined::{Verdicts, certificate};
 use crate::explained::Clearance;
 use axum::Router;
 use axum::body::Body;
@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, Method, Request, StatusCode, header};
 use gait_optimizer::Gait;
 use gaitwright::http::{Access, AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
+use gaitwright::store::certificates::{self, CertificateOnRecord};
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Study, StudyState};
 use gaitwright::store::trials::Trial;
@@ -35,6 +36,8 @@ pub struct Service {
     /// Who may do what: everybody everything, unless a test says otherwise.
     pub access: Arc<Access>,
     work: JoinHandle<()>,
+    /// Passes every gait at once; none where the service certifies gaits itself.
+    certifier: Option<JoinHandle<()>>,
 }
 
 /// An answer of the service.
@@ -68,7 +71,7 @@ impl Service {
 
     /// Starts a service whose jobs go to an engine.
     pub async fn start_with(database: &Path, engine: Arc<dyn Dispatch>) -> Self {
-        Self::over(with_catalogue(database).await, engine, None)
+        Self::over(with_catalogue(database).await, engine, None).passing_every_gait()
     }
 
     /// Starts a service that examines gaits by itself, and explains at once why there are none.
@@ -96,7 +99,8 @@ impl Service {
 
     /// Starts a service on a record as it is, adding nothing to it.
     pub async fn start_as_is(database: &Path, solver: impl Evaluate, workers: usize) -> Self {
-        Self::over(Store::open(database).await.unwrap(), Arc::new(InProcess::new(workers, Arc::new(solver))), None)
+        let store = Store::open(database).await.unwrap();
+        Self::over(store, Arc::new(InProcess::new(workers, Arc::new(solver))), None).passing_every_gait()
     }
 
     fn over(store: Store, engine: Arc<dyn Dispatch>, after_solves: Option<AfterSolves>) -> Self {
@@ -105,13 +109,34 @@ impl Service {
             let director = director.clone();
             async move { Box::pin(director.run()).await.unwrap() }
         });
-        Self { store, director, access: Arc::new(Access::without_sign_in()), work }
+        Self { store, director, access: Arc::new(Access::without_sign_in()), work, certifier: None }
+    }
+
+    /// Passes every gait as it comes: people are asked about certified gaits only.
+    fn passing_every_gait(mut self) -> Self {
+        let (store, director) = (self.store.clone(), self.director.clone());
+        self.certifier = Some(tokio::spawn(async move {
+            let mut pulse = director.pulse();
+            loop {
+                if pass_every_gait(&store).await {
+                    director.changed();
+                }
+                if pulse.changed().await.is_err() {
+                    return;
+                }
+            }
+        }));
+        self
     }
 
     /// Stops it and closes the record.
     pub async fn stop(self) {
         self.director.stop();
         self.work.await.unwrap();
+        if let Some(certifier) = self.certifier {
+            certifier.abort();
+            let _ = certifier.await;
+        }
         self.store.close().await;
     }
 
@@ -156,7 +181,7 @@ impl Service {
     pub async fn wait_for(&self, study: StudyId, states: &[StudyState]) -> Study {
         for _ in 0..6000 {
             let present = self.get(study).await;
-            if states.contains(&present.state) {
+            if states.contains(&present.state) && self.is_certified(study).await {
                 return present;
             }
             tokio::time::sleep(Duration::from_millis(10)).await;
@@ -164,10 +189,17 @@ impl Service {
         panic!("the study did not reach {states:?}: {:?}", self.get(study).await);
     }
 
+    /// Whether every gait was passed, where this harness does so.
+    async fn is_certified(&self, study: StudyId) -> bool {
+        let certificates = certificates::of_study(&mut self.store.read().await.unwrap(), study).await.unwrap();
+        self.certifier.is_none() || !certificates.values().any(|found| *found == CertificateOnRecord::NotCertified)
+    }
+
     /// Waits until so many trials have ended.
     pub async fn wait_for_trials(&self, study: StudyId, ended: usize) {
         for _ in 0..6000 {
-            if self.trials(study).await.iter().filter(|t| !t.state.is_open()).count() >= ended {
+            let done = self.trials(study).await.iter().filter(|t| !t.state.is_open()).count();
+            if done >= ended && self.is_certified(study).await {
                 return;
             }
             tokio::time::sleep(Duration::from_millis(5)).await;
@@ -214,6 +246,25 @@ impl Service {
         let bytes = response.into_body().collect().await.unwrap().to_bytes();
         Answer { status, headers, text: String::from_utf8(bytes.to_vec()).unwrap() }
     }
+}
+
+/// Passes every gait that has no certificate. `false`: there was none.
+async fn pass_every_gait(store: &Store) -> bool {
+    let Ok(mut reader) = store.read().await else { return false };
+    let mut waiting = Vec::new();
+    for study in studies::page(&mut reader, None, 1000).await.unwrap() {
+        let found = certificates::of_study(&mut reader, study.id).await.unwrap();
+        waiting.extend(found.into_iter().filter(|(_, found)| *found == CertificateOnRecord::NotCertified));
+    }
+    drop(reader);
+    if waiting.is_empty() {
+        return false;
+    }
+    let Ok(mut writer) = store.write().await else { return false };
+    for (trial, _) in &waiting {
+        certificates::keep(&mut writer, *trial, &certificate(true)).await.unwrap();
+    }
+    commit(writer).await.is_ok()
 }
 
 /// A record with what every service begins with.

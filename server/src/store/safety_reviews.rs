@@ -124,3 +124,37 @@ fn from_row(row: &SqliteRow) -> StoreResult<SafetyReview> {
         created_at: row.try_get("created_at")?,
     })
 }
+
+/// How many safety reports, answers, retractions, unblindings and reviews a study has. All of these tables are append-only,
+/// so equal versions mean that nothing was said about safety in between.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SafetyVersion([i64; 8]);
+
+/// The present version.
+///
+/// # Errors
+/// What the database reports.
+pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyVersion> {
+    let row = sqlx::query(
+        "select (select count(*) from presentation_answers a join presentations p on p.id = a.presentation_id
+                 where p.study_id = ?1),
+                (select count(*) from presentation_retractions r join presentations p on p.id = r.presentation_id
+                 where p.study_id = ?1),
+                (select count(*) from remarks where study_id = ?1),
+                (select count(*) from remark_retractions r join remarks m on m.id = r.remark_id where m.study_id = ?1),
+                (select count(*) from lab_answers a join lab_sessions s on s.id = a.session_id where s.study_id = ?1),
+                (select count(*) from lab_answer_retractions r join lab_sessions s on s.id = r.session_id
+                 where s.study_id = ?1),
+                (select count(*) from lab_acts a join lab_sessions s on s.id = a.session_id
+                 where s.study_id = ?1 and a.act = 'unblinded'),
+                (select count(*) from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ?1)",
+    )
+    .bind(study)
+    .fetch_one(db)
+    .await?;
+    let mut counts = [0; 8];
+    for (place, count) in counts.iter_mut().enumerate() {
+        *count = row.try_get(place)?;
+    }
+    Ok(SafetyVersion(counts))
+}

@@ -5,9 +5,10 @@ use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
 use crate::store::feedback::{FeedbackRow, Said, Source, Voice, Whose};
+use crate::store::presentations::Said as Judgement;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies, trials};
-use crate::studies::objections::Objections;
+use crate::studies::preference::{self, Again, Statement};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -54,42 +55,21 @@ pub struct Answer {
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
 pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
     let study = studies::get(writer, study).await?;
-    if answer.trial_a == answer.trial_b {
-        let allowed = "another trial than trial_a: a gait cannot be compared with itself";
-        return Err(Error::invalid("trial_b", answer.trial_b.to_string(), allowed));
-    }
-    comparable(writer, study.id, "trial_a", answer.trial_a).await?;
-    comparable(writer, study.id, "trial_b", answer.trial_b).await?;
-    let objections = Objections::read(writer, study.id).await?;
-    for (field, id) in [("trial_a", answer.trial_a), ("trial_b", answer.trial_b)] {
-        objections.refuse(field, id)?;
-    }
     let voice = voice(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
     let said = match answer.answer {
-        Verdict::A => Said::Preference { winner: a, loser: b },
-        Verdict::B => Said::Preference { winner: b, loser: a },
-        Verdict::NoDifference => Said::Tie { a, b },
+        Verdict::A => Judgement::First,
+        Verdict::B => Judgement::Second,
+        Verdict::NoDifference => Judgement::NoDifference,
     };
-    let id = write(writer, study.id, &said, voice).await?;
+    let fields = ("trial_a", "trial_b");
+    let statement = Statement { study: study.id, pair: (a, b), fields, said, voice, again: Again::Refused };
+    let heard = preference::hear(writer, statement).await?;
+    let id = heard.ok_or_else(|| Error::Internal("a preference was not heard".to_owned()))?;
+    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail =
         json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": voice.author });
     audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
-    Ok(id)
-}
-
-/// Lets the learner hear something, and pages that are open.
-///
-/// # Errors
-/// A violated constraint or trigger, or what the database reports.
-pub(super) async fn write(
-    writer: &mut Writer,
-    study: StudyId,
-    said: &Said,
-    voice: Voice<'_>,
-) -> Result<FeedbackId, Error> {
-    let id = feedback::append(writer, study, said, voice).await?;
-    events::append(writer, study, "feedback_given", &json!({ "feedback_id": id })).await?;
     Ok(id)
 }
 

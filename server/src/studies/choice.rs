@@ -71,7 +71,7 @@ pub fn best_trial(standing: &Standing, belief: &Posterior) -> Result<Option<Tria
 /// # Errors
 /// As [`best_converged`].
 pub fn ranking(standing: &Standing, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(standing, belief, |trial| !standing.objections.closes(trial.id))
+    by_mean(standing, belief, |trial| !standing.grounds.objections.closes(trial.id))
 }
 
 /// Converged trials by posterior mean, the earliest of equals first.
@@ -106,7 +106,7 @@ pub fn ranking_to_show(standing: &Standing, beliefs: &Beliefs) -> Result<Vec<Tri
 /// tell.
 pub fn last_believed(standing: &Standing) -> Option<TrialId> {
     let best = standing.trials.last().and_then(|newest| newest.best_before).and_then(|best| standing.trial(best))?;
-    (best.state == TrialState::Converged && !standing.objections.closes(best.id)).then_some(best.id)
+    (best.state == TrialState::Converged && !standing.grounds.objections.closes(best.id)).then_some(best.id)
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

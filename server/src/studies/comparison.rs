@@ -1,10 +1,12 @@
 //! Whom to compare a new trial with, and what Gait RMSE answers.
 
 use super::standing::Standing;
+use super::walkable::{NotWalkable, WalkablePair, is_same_gait};
 use crate::store::TrialId;
 use crate::store::feedback::Said;
-use crate::store::trials::{Trial, TrialState};
+use crate::store::trials::Trial;
 use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};
+use std::collections::HashSet;
 
 /// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
 /// as the learner's settings say. `standing` is read before the new trial's result is in it.
@@ -33,33 +35,45 @@ pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> Said {
     }
 }
 
-/// Whether two trials gave the very same motion, as when a bound changed that no gait comes near: a person has nothing to
-/// compare then. So many figures agree to the last bit in no other case.
-fn is_same_gait(one: &Trial, other: &Trial) -> bool {
-    let figures = |trial: &Trial| {
-        let report = trial.report.as_ref()?;
-        let single = [report.objective, report.cost_of_transport, report.stride_length_m];
-        let all = single.iter().chain(&report.gait_rmse_parts_rad).chain(&report.durations_s).chain(&report.vhip_m_s);
-        Some(all.map(|figure| figure.to_bits()).collect::<Vec<_>>())
-    };
-    figures(one).is_some_and(|figures_of_one| figures(other) == Some(figures_of_one))
+/// What a study asks people now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Question {
+    /// Nothing.
+    None,
+    /// This pair: the newest gait first.
+    Pair(WalkablePair),
+    /// The gait of this trial is to be certified first.
+    AfterCertificate(TrialId),
 }
 
-/// The pair of trials that a person should compare now, if there is one: the newest converged trial with a
-/// partner that nobody has compared it with, and that is another gait.
+impl Question {
+    /// The pair, if there is one to be asked about now.
+    pub fn pair(self) -> Option<WalkablePair> {
+        match self {
+            Self::Pair(pair) => Some(pair),
+            Self::None | Self::AfterCertificate(_) => None,
+        }
+    }
+}
+
+/// The pair of gaits that a person should compare now, if there is one: the newest converged gait with a partner that
+/// nobody has compared it with, and that is another gait. Which pair it is does not depend on when certificates come.
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
+pub fn open_question(standing: &Standing) -> Result<Question, LearnerError> {
     let plan = &standing.study.plan;
     let log = standing.log();
-    let mut comparable = standing.comparable();
-    let Some(&newest) = log.visited.iter().rev().find(|action| comparable.contains(action)) else { return Ok(None) };
-    if let Some(own) = standing.trial_of(newest) {
-        comparable.retain(|action| {
-            *action == newest || !standing.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
-        });
-    }
+    let may_be_asked = |trial: &&Trial| standing.grounds.may_become_walkable(trial);
+    let mut candidates: HashSet<ActionIndex> =
+        standing.trials.iter().filter(may_be_asked).map(|trial| trial.action_index).collect();
+    let Some(&newest) = log.visited.iter().rev().find(|action| candidates.contains(action)) else {
+        return Ok(Question::None);
+    };
+    let Some(own) = standing.trial_of(newest) else { return Ok(Question::None) };
+    candidates.retain(|action| {
+        *action == newest || !standing.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
+    });
     // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
     // best one, and with it the question.
     let mut before = log.clone();
@@ -68,11 +82,19 @@ pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, 
         (_, None) => true,
     });
     let questions =
-        comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| comparable.contains(&a))?;
-    let converged = |action| standing.trial_of(action).filter(|t| t.state == TrialState::Converged).map(|t| t.id);
+        comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
     let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
-    let mut pairs = open.filter_map(|q| Some((converged(q.action)?, converged(q.against)?)));
-    Ok(pairs.find(|pair| !standing.objections.is_skipped(*pair)))
+    let mut pairs = open.filter_map(|q| Some((standing.trial_of(q.action)?, standing.trial_of(q.against)?)));
+    let Some((first, second)) = pairs.find(|(a, b)| !standing.grounds.objections.is_skipped((a.id, b.id))) else {
+        return Ok(Question::None);
+    };
+    Ok(match (standing.walkable(first), standing.walkable(second)) {
+        (Ok(a), Ok(b)) => WalkablePair::of((a, first), (b, second)).map_or(Question::None, Question::Pair),
+        (Err(NotWalkable::NotCertified { id, .. }), _) | (_, Err(NotWalkable::NotCertified { id, .. })) => {
+            Question::AfterCertificate(id)
+        }
+        _ => Question::None,
+    })
 }
 
 fn is_answered(log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {

@@ -15,9 +15,9 @@ use super::solve_input::SolveInput;
 use super::standing::Standing;
 use crate::error::Error;
 use crate::store::jobs::Lease;
-use crate::store::studies::{Study, StudyState};
+use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
-use crate::store::{Store, StoreError, StudyId, TrialId, commit, events, feedback, gaits, jobs, now, studies, trials};
+use crate::store::{Store, StoreError, StudyId, TrialId, commit, events, gaits, jobs, now, studies, trials};
 use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
 use gait_optimizer::SolveStatus;
 use serde_json::json;
@@ -146,6 +146,11 @@ impl Director {
         self.0.after_solves.as_ref().is_some_and(|(examiner, _)| examiner.ask(study, next))
     }
 
+    /// Asks for the gait of one trial to be certified. `false`: this process certifies none.
+    pub fn certify(&self, trial: TrialId) -> bool {
+        self.0.after_solves.as_ref().map(|(examiner, _)| examiner.ask_for(trial)).is_some()
+    }
+
     /// Whether a gait of a study is being examined, or waits for that.
     pub fn is_examining(&self, study: StudyId, gait: TrialId) -> bool {
         self.0.after_solves.as_ref().is_some_and(|(examiner, _)| examiner.is_at(study, gait))
@@ -270,6 +275,7 @@ impl Director {
             let mut reader = self.0.store.read().await?;
             let standing = Standing::read(&mut reader, study.clone()).await?;
             drop(reader);
+            self.certify_for_people(&standing);
             let beliefs = Arc::clone(&self.0.beliefs);
             let (standing, step) = tokio::task::spawn_blocking(move || {
                 let step = next_step(&standing, &beliefs);
@@ -288,6 +294,15 @@ impl Director {
                         return Ok(None);
                     }
                 }
+            }
+        }
+    }
+
+    /// Has the gaits certified that people will be asked about: nobody is asked before.
+    fn certify_for_people(&self, standing: &Standing) {
+        if standing.study.plan.feedback_mode != FeedbackMode::Automatic {
+            for trial in standing.trials.iter().filter(|trial| standing.waits_for_certificate(trial)) {
+                self.certify(trial.id);
             }
         }
     }
@@ -311,7 +326,7 @@ impl Director {
         let study = standing.study.id;
         let mut writer = self.0.store.write().await?;
         let current = studies::get(&mut writer, study).await?;
-        if current.state != StudyState::Running || feedback::version(&mut writer, study).await? != standing.version {
+        if current.state != StudyState::Running || !standing.is_current(&mut writer).await? {
             self.0.wake.notify_one();
             return Ok(false);
         }

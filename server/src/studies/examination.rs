@@ -60,9 +60,13 @@ pub async fn aside(store: &Store, actor: &Actor, trial: TrialId, examiner: &Arc<
     let examiner = Arc::clone(examiner);
     let told = behind_solves("examiner", move || examiner.examine(&gait))
         .map_err(|e| Error::Internal(format!("no thread for an examination: {e}")))?;
-    let found = told.await.map_err(|_| Error::Internal("the examination panicked".to_owned()))?;
+    let found = match told.await {
+        Ok(Ok(certificate)) => certificate,
+        Ok(Err(reason)) => Certificate::of_unexaminable(&reason.to_string()),
+        Err(_) => Certificate::of_unexaminable("the examination broke off"),
+    };
     let mut writer = store.write().await?;
-    record(&mut writer, actor, trial, &found?).await?;
+    record(&mut writer, actor, trial, &found).await?;
     Ok(commit(writer).await?)
 }
 

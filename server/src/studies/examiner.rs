@@ -25,11 +25,19 @@ pub(super) struct Examiner {
     asked: Notify,
 }
 
+/// What is examined next.
+enum Next {
+    Trial(TrialId),
+    Study(StudyId),
+}
+
 #[derive(Debug, Default)]
 struct State {
+    /// Trials whose gaits somebody asked for, for people to walk with or to be asked about; the newest comes first.
+    asked: BTreeSet<TrialId>,
     /// Studies with gaits to look at.
     waiting: BTreeSet<StudyId>,
-    /// What is no gait of the walker, as another worker may have sent it, and what the examination broke off at.
+    /// Gaits whose certificates could not be written.
     refused: BTreeSet<TrialId>,
 }
 
@@ -51,6 +59,14 @@ impl Examiner {
         true
     }
 
+    /// Asks for one gait, before those of studies that have ended.
+    pub(super) fn ask_for(&self, trial: TrialId) {
+        let mut state = self.state();
+        if !state.refused.contains(&trial) && state.asked.insert(trial) {
+            self.asked.notify_one();
+        }
+    }
+
     /// Whether a gait of a study is being examined, or waits for that.
     pub(super) fn is_at(&self, study: StudyId, gait: TrialId) -> bool {
         let state = self.state();
@@ -66,9 +82,21 @@ impl Examiner {
             if let Err(error) = self.hear_of_ended(&mut heard).await {
                 tracing::error!(%error, "cannot tell which studies have ended");
             }
-            let study = tokio::select! {
-                study = self.next_study() => study,
+            let next = tokio::select! {
+                next = self.next() => next,
                 _ = pulse.changed() => continue,
+            };
+            let study = match next {
+                Next::Study(study) => study,
+                Next::Trial(trial) => {
+                    if let Err(error) = self.certify(trial).await {
+                        tracing::error!(%trial, %error, "cannot certify a gait that people are waiting for");
+                        self.state().refused.insert(trial);
+                    }
+                    self.state().asked.remove(&trial);
+                    changed();
+                    continue;
+                }
             };
             match self.examine_next(study).await {
                 Ok(true) => {
@@ -91,13 +119,28 @@ impl Examiner {
         Ok(())
     }
 
-    /// The newest study comes first: it is the one that somebody is about to look at.
-    async fn next_study(&self) -> StudyId {
+    /// What somebody waits for comes first, then the newest study: it is the one that somebody is about to look at.
+    async fn next(&self) -> Next {
         loop {
-            if let Some(study) = self.state().waiting.last() {
-                return *study;
+            {
+                let state = self.state();
+                if let Some(trial) = state.asked.last() {
+                    return Next::Trial(*trial);
+                }
+                if let Some(study) = state.waiting.last() {
+                    return Next::Study(*study);
+                }
             }
             self.asked.notified().await;
+        }
+    }
+
+    /// Certifies the gait of a trial. What cannot be examined has failed, and its certificate says why.
+    async fn certify(&self, trial: TrialId) -> Result<(), Error> {
+        match examination::aside(&self.store, &Actor::program(), trial, &self.examine).await {
+            // There is nothing to certify, or the subject withdrew meanwhile.
+            Err(Error::Conflict(_) | Error::NotFound { .. }) => Ok(()),
+            other => other,
         }
     }
 
@@ -120,14 +163,7 @@ impl Examiner {
         let refused = self.state().refused.clone();
         let next = recommended::next_to_examine(&mut *self.store.read().await?, &ranking, &refused).await?;
         let Some(trial) = next else { return Ok(false) };
-        match examination::aside(&self.store, &Actor::program(), trial, &self.examine).await {
-            Err(error @ (Error::Store(_) | Error::Dispatch(_))) => return Err(error),
-            Err(error) => {
-                tracing::warn!(%trial, %error, "what a trial gave cannot be examined");
-                self.state().refused.insert(trial);
-            }
-            Ok(()) => {}
-        }
+        self.certify(trial).await?;
         Ok(true)
     }
 

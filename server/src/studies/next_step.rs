@@ -2,7 +2,7 @@
 
 use super::belief::Beliefs;
 use super::choice;
-use super::comparison;
+use super::comparison::{self, Question};
 use super::lifecycle::Act;
 use super::standing::Standing;
 use crate::error::Error;
@@ -25,10 +25,13 @@ pub(super) enum Step {
 pub(super) fn next_step(standing: &Standing, beliefs: &Beliefs) -> Result<Step, Error> {
     let study = &standing.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
-        let open = comparison::open_question(standing).map_err(Error::Learner)?.is_some();
-        match (study.state, open) {
-            (StudyState::Running, true) => return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into())),
-            (StudyState::Waiting, false) => return Ok(Step::Act(Act::Answered, String::new())),
+        match (study.state, comparison::open_question(standing).map_err(Error::Learner)?) {
+            (StudyState::Running, Question::Pair(_)) => {
+                return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into()));
+            }
+            (StudyState::Waiting, Question::None) => return Ok(Step::Act(Act::Answered, String::new())),
+            // A person is asked about the newest gait as soon as it is certified; nothing is planned before.
+            (_, Question::AfterCertificate(_)) => return Ok(Step::Nothing),
             _ => {}
         }
     }
@@ -68,7 +71,8 @@ pub(super) fn next_step(standing: &Standing, beliefs: &Beliefs) -> Result<Step, 
 
 /// The trials that would be proposed next, one for each answer to the question that waits for one.
 pub(super) fn likely_next(standing: &Standing) -> Result<Vec<NewTrial>, Error> {
-    let Some((a, b)) = comparison::open_question(standing).map_err(Error::Learner)? else { return Ok(Vec::new()) };
+    let question = comparison::open_question(standing).map_err(Error::Learner)?;
+    let Some((a, b)) = question.pair().map(|pair| pair.trials()) else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
     for said in [Said::Preference { winner: a, loser: b }, Said::Preference { winner: b, loser: a }, Said::Tie { a, b }]
     {

@@ -2,20 +2,18 @@
 //! one transaction.
 
 use super::comparison::{by_gait_rmse, partners};
+use super::preference::{self, PROGRAM};
 use super::standing::Standing;
 use super::trial_state::{self, Happening};
 use crate::error::Error;
-use crate::store::feedback::{Said, Source, Voice};
+use crate::store::feedback::Said;
 use crate::store::gaits::PackedGait;
 use crate::store::jobs::{Lease, Troubles};
 use crate::store::studies::FeedbackMode;
 use crate::store::trials::{TrialEnd, TrialState};
-use crate::store::{Store, TrialId, Writer, commit, events, feedback, gaits, jobs, results, studies, trials};
+use crate::store::{Store, TrialId, Writer, commit, events, gaits, jobs, results, studies, trials};
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use serde_json::json;
-
-/// Author of what the program itself says.
-const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"));
 
 /// Records a solve that ended by itself. `false`: the lease was not ours any more; what came is kept as evidence, and
 /// nobody hears of it.
@@ -49,7 +47,7 @@ pub async fn ended(
         let answers = answers(&standing, lease.trial, &end).await?;
 
         let mut writer = store.write().await?;
-        if feedback::version(&mut writer, lease.study).await? != standing.version {
+        if !standing.is_current(&mut writer).await? {
             continue;
         }
         let taken = jobs::finish(&mut writer, lease).await?;
@@ -63,12 +61,7 @@ pub async fn ended(
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;
         }
-        let label = Said::Label { trial: lease.trial, category: u32::from(state == TrialState::Converged) };
-        let voice = |source| Voice { source, author: PROGRAM, note: "" };
-        feedback::append(&mut writer, lease.study, &label, voice(Source::Convergence)).await?;
-        for answer in &answers {
-            feedback::append(&mut writer, lease.study, answer, voice(Source::GaitRmse)).await?;
-        }
+        preference::compute(&mut writer, lease.study, (lease.trial, state), &answers, PROGRAM).await?;
         tell(&mut writer, lease, state).await?;
         commit(writer).await?;
         return Ok(true);

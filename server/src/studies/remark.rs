@@ -1,10 +1,11 @@
 //! What staff say of two gaits that is no preference: one way in for the form and the REST interface.
 
-use super::answer::{comparable, voice};
+use super::answer::voice;
+use super::preference::{self, Again, Statement};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::store::feedback::{Source, Voice};
+use crate::store::feedback::Source;
 use crate::store::presentations::Said;
 use crate::store::remarks::{self, Remark};
 use crate::store::{RemarkId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
@@ -50,34 +51,29 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
             "cannot_tell, unsafe_first, unsafe_second, unsafe_both",
         ));
     }
-    if new.first == new.second {
-        return Err(Error::invalid("second", new.second.to_string(), "another trial than first"));
-    }
-    comparable(writer, study.id, "first", new.first).await?;
-    comparable(writer, study.id, "second", new.second).await?;
     let voice = voice(caller, new.source, new.author.as_deref(), &new.note)?;
-    let id = write(writer, study.id, (new.first, new.second), new.answer, voice).await?;
+    let statement = Statement {
+        study: study.id,
+        pair: (new.first, new.second),
+        fields: ("first", "second"),
+        said: new.answer,
+        voice,
+        again: Again::Refused,
+    };
+    let id = write(writer, statement).await?;
     let (first, second, author) = (new.first, new.second, voice.author);
     let detail = json!({ "study": study.id, "first": first, "second": second, "answer": new.answer, "author": author });
     audit::append(writer, &caller.actor, "remark.give", &format!("remark {id}"), &detail).await?;
     Ok(id)
 }
 
-/// Adds a remark, lets the learner hear of it, and pages that are open.
+/// Adds a remark, tells the learner what follows from it, and tells open pages.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
-pub(super) async fn write(
-    writer: &mut Writer,
-    study: StudyId,
-    pair: (TrialId, TrialId),
-    said: Said,
-    voice: Voice<'_>,
-) -> Result<RemarkId, Error> {
-    let heard = match said.heard(pair) {
-        Some(said) => Some(feedback::append(writer, study, &said, voice).await?),
-        None => None,
-    };
+/// As [`preference::hear`].
+pub(super) async fn write(writer: &mut Writer, statement: Statement<'_>) -> Result<RemarkId, Error> {
+    let heard = preference::hear(writer, statement).await?;
+    let Statement { study, pair, said, voice, .. } = statement;
     let id = remarks::insert(writer, &remarks::NewRemark { study, pair, said, voice, feedback: heard }).await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "remark_id": id })).await?;
     Ok(id)

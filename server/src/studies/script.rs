@@ -6,15 +6,16 @@
 use super::belief::Beliefs;
 use super::choice::{self, ChoiceError};
 use super::comparison::{by_gait_rmse, partners};
+use super::preference;
 use super::standing::Standing;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
-use crate::store::feedback::{Said, Source, Voice};
+use crate::store::feedback::Said;
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, Told, Trial, TrialState};
-use crate::store::{Connection, StudyId, TrialId, Writer, events, feedback, studies, trials};
+use crate::store::{Connection, StudyId, TrialId, Writer, events, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::sync::Arc;
@@ -229,13 +230,7 @@ pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &H
         return Ok(None);
     }
     trials::tell(writer, id, &heard.told).await?;
-    let label = Said::Label { trial: id, category: u32::from(heard.told.state == TrialState::Converged) };
-    let voice = Voice { source: Source::Convergence, author: &caller.name, note: "" };
-    feedback::append(writer, study, &label, voice).await?;
-    for answer in &heard.answers {
-        let voice = Voice { source: Source::GaitRmse, author: &caller.name, note: "" };
-        feedback::append(writer, study, answer, voice).await?;
-    }
+    preference::compute(writer, study, (id, heard.told.state), &heard.answers, &caller.name).await?;
     let payload = json!({ "trial_id": id, "number": present.number, "state": heard.told.state });
     events::append(writer, study, "trial_ended", &payload).await?;
     let detail = json!({ "study": study, "state": heard.told.state, "gait_rmse_rad": heard.told.gait_rmse_rad });
@@ -247,7 +242,7 @@ pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &H
 async fn is_current(writer: &mut Writer, standing: &Standing) -> Result<bool, Error> {
     let study = standing.study.id;
     let total = trials::counts(writer, study).await?.total;
-    Ok(feedback::version(writer, study).await? == standing.version
+    Ok(standing.is_current(writer).await?
         && total as usize == standing.trials.len()
         && studies::get(writer, study).await?.revision == standing.study.revision)
 }

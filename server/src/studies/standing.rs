@@ -1,10 +1,11 @@
 //! Where a study stands, as its learner sees it: the log of results and answers, by action.
 
-use super::objections::Objections;
+use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use crate::store::feedback::{FeedbackRow, LogVersion, Said, Source};
+use crate::store::safety_reviews::{self, SafetyVersion};
 use crate::store::studies::{FeedbackMode, Study};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, StoreResult, TrialId, feedback, trials};
+use crate::store::{Connection, StoreResult, TrialId, Writer, feedback, trials};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use std::collections::{HashMap, HashSet};
 
@@ -19,8 +20,10 @@ pub struct Standing {
     pub feedback: Vec<FeedbackRow>,
     /// The version of the feedback: a decision is written only if it is still current.
     pub version: LogVersion,
-    /// Gaits that nobody is asked about, and pairs that nobody is asked about again.
-    pub objections: Objections,
+    /// The version of what was said about safety: likewise.
+    pub safety: SafetyVersion,
+    /// Which gaits people may be asked about and given.
+    pub grounds: Grounds,
 }
 
 impl Standing {
@@ -30,10 +33,22 @@ impl Standing {
     /// What the database reports.
     pub async fn read(db: &mut Connection, study: Study) -> StoreResult<Self> {
         let version = feedback::version(db, study.id).await?;
+        let safety = safety_reviews::version(db, study.id).await?;
         let trials = trials::of_study(db, study.id).await?;
         let feedback = feedback::of_study(db, study.id, 0).await?;
-        let objections = Objections::read(db, study.id).await?;
-        Ok(Self { study, trials, feedback, version, objections })
+        let grounds = Grounds::read(db, study.id).await?;
+        Ok(Self { study, trials, feedback, version, safety, grounds })
+    }
+
+    /// Whether nothing was heard and nothing was said about safety since this was read: what follows from it may then be
+    /// written, in the transaction that asks.
+    ///
+    /// # Errors
+    /// What the database reports.
+    pub async fn is_current(&self, writer: &mut Writer) -> StoreResult<bool> {
+        let study = self.study.id;
+        Ok(feedback::version(writer, study).await? == self.version
+            && safety_reviews::version(writer, study).await? == self.safety)
     }
 
     /// The newest trials of a large study and the best one, for showing: the learner is not asked about it.
@@ -42,6 +57,7 @@ impl Standing {
     /// What the database reports.
     pub async fn newest(db: &mut Connection, study: Study, limit: u32) -> StoreResult<Self> {
         let version = feedback::version(db, study.id).await?;
+        let safety = safety_reviews::version(db, study.id).await?;
         let mut trials = trials::newest(db, study.id, None, limit).await?;
         if let Some(best) = trials.last().and_then(|newest| newest.best_before)
             && !trials.iter().any(|trial| trial.id == best)
@@ -49,8 +65,8 @@ impl Standing {
             trials.insert(0, trials::get(db, best).await?);
         }
         let feedback = feedback::newest_of_people(db, study.id, limit).await?;
-        let objections = Objections::read(db, study.id).await?;
-        Ok(Self { study, trials, feedback, version, objections })
+        let grounds = Grounds::read(db, study.id).await?;
+        Ok(Self { study, trials, feedback, version, safety, grounds })
     }
 
     /// The trial with this identifier.
@@ -94,10 +110,23 @@ impl Standing {
         same.then(|| format!("the best action stayed the same over {limit} results"))
     }
 
-    /// Actions whose gaits can be shown to people: they exist, and nobody called them unsafe. What did not converge
-    /// has no gait, and its label has said so already.
+    /// The gait of a trial, if people may walk with it and be asked about it.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn walkable(&self, trial: &Trial) -> Result<WalkableGait, NotWalkable> {
+        self.grounds.admit(trial)
+    }
+
+    /// Whether a gait has everything that a walkable one needs but a certificate.
+    pub fn waits_for_certificate(&self, trial: &Trial) -> bool {
+        matches!(self.walkable(trial), Err(NotWalkable::NotCertified { .. }))
+    }
+
+    /// Actions whose gaits Gait RMSE compares: they exist, and no safety report against them is open. Nobody walks because
+    /// of such a comparison, so it does not wait for certificates.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.objections.closes(trial.id);
+        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.objections.closes(trial.id);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 

@@ -1,12 +1,13 @@
 //! Coactive feedback: "with these bounds it would have been better than in that trial".
 
-use super::answer::{comparable, voice, write};
+use super::answer::{comparable, voice};
+use super::preference;
 use crate::access::Caller;
 use crate::error::Error;
-use crate::store::feedback::{Said, Source};
+use crate::store::feedback::Source;
 use crate::store::studies::Study;
 use crate::store::trials::Trial;
-use crate::store::{FeedbackId, StudyId, TrialId, Writer, audit, studies};
+use crate::store::{FeedbackId, StudyId, TrialId, Writer, audit, events, studies};
 use gait_learner::ActionIndex;
 use serde::Deserialize;
 use serde_json::json;
@@ -44,7 +45,8 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Su
     let trial = comparable(writer, study.id, "over", new.over).await?;
     let suggested = action(&study, &trial, &new.bounds)?;
     let voice = voice(caller, new.source, new.author.as_deref(), &new.note)?;
-    let id = write(writer, study.id, &Said::Suggestion { suggested, over: trial.id }, voice).await?;
+    let id = preference::suggest(writer, &trial, suggested, voice).await?;
+    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": voice.author });
     audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;
     Ok(id)

@@ -6,15 +6,15 @@ use crate::http::AppState;
 use crate::http::extract::{Id, Params};
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::store::trials::{Trial, TrialState};
+use crate::store::trials::Trial;
 use crate::store::{TrialId, consents, gaits, trials};
-use crate::studies::objections::Objections;
 use crate::studies::solve_input::SolveInput;
+use crate::studies::walkable::{self, NotWalkable};
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use gait_optimizer::Gait;
-use gait_optimizer::export::{self, ControllerFile};
+use gait_optimizer::export;
 use serde::Deserialize;
 
 /// How densely a gait is sampled.
@@ -76,7 +76,7 @@ pub(super) async fn motion_file(
     get,
     path = "/trials/{id}/controller.json",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "The trial; its gait has converged, and nobody calls it unsafe"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
+    params(("id" = TrialId, Path, description = "The trial; its gait has converged and is certified, and no safety report against it is open"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
     responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints; it explains its fields", body = Object)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -87,30 +87,15 @@ pub(super) async fn controller(
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
-    let trial = trials::get(&mut reader, id).await?;
-    if let Some(closed) = Objections::read(&mut reader, trial.study_id).await?.closing(id).first() {
-        let (number, by) = (trial.number, &closed.by);
-        let until = "no device gets it until staff let it be walked with again";
-        return Err(Error::conflict(format!("the gait of trial {number} was called unsafe by {by}: {until}")));
+    let found = walkable::admit(&mut reader, id).await?;
+    if matches!(found, Err(NotWalkable::NotCertified { .. })) {
+        app.director.certify(id);
     }
+    let gait = found?;
+    let trajectory = gait.trajectory(&mut reader).await?;
     drop(reader);
-    controller_file(&app, id, sampling.rate_hz, &format!("device-trial-{}.json", trial.number)).await
-}
-
-/// The controller file of a converged gait under a name of its own.
-///
-/// # Errors
-/// A conflict when the trial did not converge, [`Error::Invalid`] for a rate out of range.
-pub(super) async fn controller_file(app: &AppState, id: TrialId, rate_hz: f64, name: &str) -> Result<Response, Error> {
-    let (trial, gait) = leaving(app, id).await?;
-    // The last iterate of a solve without a solution must not reach a device.
-    if trial.state != TrialState::Converged {
-        let (number, state) = (trial.number, trial.state.as_str());
-        return Err(Error::conflict(format!("trial {number} is {state}: a device only gets a gait that converged")));
-    }
-    let controller = ControllerFile::new(&gait, rate_hz)?;
-    let text = serde_json::to_string_pretty(&controller).map_err(|e| Error::Internal(e.to_string()))?;
-    Ok(file("application/json", name, text))
+    let text = gait.controller_file(&trajectory, sampling.rate_hz)?;
+    Ok(file("application/json", &format!("device-trial-{}.json", gait.number()), text))
 }
 
 /// A trial and its gait, where its subject lets it be given out.

@@ -106,10 +106,13 @@ pub(super) async fn controller(
     Shown(id): Shown<LabSessionId>,
     Params(of): Params<OfWalk>,
 ) -> Result<Response, Error> {
-    let session = lab_sessions::get(&mut *app.read().await?, id).await?;
-    let trial = lab::gait_of(&session, of.walk)?;
-    let name = format!("controller-walk-{}.json", of.walk);
-    exports::controller_file(&app, trial, of.rate_hz, &name).await
+    let mut reader = app.read().await?;
+    let session = lab_sessions::get(&mut reader, id).await?;
+    let gait = lab::gait_to_walk_with(&mut reader, &session, of.walk).await?;
+    let trajectory = gait.trajectory(&mut reader).await?;
+    drop(reader);
+    let text = gait.blinded_controller_file(&trajectory, of.rate_hz)?;
+    Ok(exports::file("application/json", &format!("controller-walk-{}.json", of.walk), text))
 }
 
 /// A note at the end.

@@ -11,6 +11,7 @@ use crate::store::{StudyId, TrialId, schema, studies};
 use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended::{self, CertificateState};
 use crate::studies::standing::Standing;
+use crate::studies::walkable::WalkableGait;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -19,20 +20,20 @@ use serde::Serialize;
 use std::sync::Arc;
 use utoipa::ToSchema;
 
-/// The best action of a study so far.
+/// The best action of a study so far whose gait is certified.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Recommendation {
     study_id: StudyId,
     study: String,
     #[serde(flatten)]
     best: Recommended,
-    /// What the certificate of its gait says. Asking for a recommendation sets an examination going where there was none.
+    /// What the certificate of its gait says.
     certificate: CertificateState,
     /// Why that failed, in words.
     objections: Vec<String>,
     /// Where it failed: the best action whose gait is known to pass.
     passing: Option<Recommended>,
-    /// Gaits of the study are being examined, the best one first, until one passes: ask again.
+    /// A better gait, or one that passes, may follow: gaits of the study are being certified. Ask again.
     examining: bool,
 }
 
@@ -52,11 +53,11 @@ struct Recommended {
     cost_of_transport: Option<f64>,
 }
 
-impl From<&Trial> for Recommended {
-    fn from(trial: &Trial) -> Self {
+impl Recommended {
+    fn of(gait: &WalkableGait, trial: &Trial) -> Self {
         Self {
-            trial_id: trial.id,
-            number: trial.number,
+            trial_id: gait.trial(),
+            number: gait.number(),
             bounds: trial.action,
             gait_rmse_rad: trial.gait_rmse_rad,
             cost_of_transport: trial.cost_of_transport,
@@ -133,19 +134,32 @@ async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
     .await
     .map_err(|e| Error::Internal(e.to_string()))?;
     let ranking = ranking.map_err(Error::Learner)?;
-    let none = || Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better");
-    let best = ranking.first().and_then(|id| standing.trial(*id)).ok_or_else(none)?;
-    let mut judged = recommended::judged(&mut *app.read().await?, &ranking).await?;
-    if let Some(next) = judged.unexamined {
-        judged.examined_by_service(app.director.examine(id, next));
-    }
+    let best = *ranking.first().ok_or_else(|| {
+        Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better")
+    })?;
+    let walkable = ranking.iter().enumerate().find_map(|(place, id)| {
+        let trial = standing.trial(*id)?;
+        Some((place, trial, standing.walkable(trial).ok()?))
+    });
+    let mut reader = app.read().await?;
+    let unexamined = recommended::judged(&mut reader, &ranking).await?.unexamined;
+    let examining = unexamined.is_some_and(|next| app.director.examine(id, next));
+    let Some((place, trial, gait)) = walkable else {
+        app.director.certify(best);
+        return Err(Error::conflict("nothing is recommended yet: the best gait is being certified; ask again"));
+    };
+    let judged = recommended::judged(&mut reader, &ranking[place..]).await?;
+    drop(reader);
     Ok(Recommendation {
         study_id: id,
         study: standing.study.plan.name.clone(),
-        best: best.into(),
+        best: Recommended::of(&gait, trial),
         certificate: judged.verdict,
         objections: judged.objections,
-        examining: judged.examining,
-        passing: judged.passing.and_then(|id| standing.trial(id)).map(Into::into),
+        examining,
+        passing: judged.passing.and_then(|id| {
+            let trial = standing.trial(id)?;
+            Some(Recommended::of(&standing.walkable(trial).ok()?, trial))
+        }),
     })
 }

@@ -13,19 +13,20 @@ use crate::http::problem::Problem;
 use crate::http::shown::Shown;
 use crate::plots::{Figure, gait_tiles};
 use crate::printable;
-use crate::store::feedback::{FeedbackRow, Source, Whose};
+use crate::store::feedback::{FeedbackRow, Source};
 use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::{Study, StudyState};
-use crate::store::trials::TrialState;
 use crate::store::{
-    Connection, FeedbackId, Instant, RemarkId, StoreError, StudyId, TrialId, commit, events, feedback, gaits, now,
-    presentations, reference_gaits, remarks, studies, trials,
+    Connection, FeedbackId, RemarkId, StoreError, StudyId, TrialId, commit, events, feedback, gaits, presentations,
+    reference_gaits, remarks, studies, trials,
 };
 use crate::studies::answer::{self, Answer, Verdict};
 use crate::studies::choice::MANY;
-use crate::studies::comparison::open_question;
+use crate::studies::comparison::{Question, open_question};
+use crate::studies::preference::{self, StandingAnswer};
 use crate::studies::remark::{self, NewRemark};
 use crate::studies::standing::Standing;
+use crate::studies::walkable;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -89,6 +90,8 @@ struct ComparePage {
     saved: Option<Saved>,
     /// The learner asks for a comparison.
     waits: bool,
+    /// So many gaits can be chosen once they are certified.
+    being_certified: usize,
     /// The study goes on by itself: another gait is being computed, or will be at once.
     is_going_on: bool,
     last_event: i64,
@@ -127,6 +130,9 @@ struct Saved {
 /// So many trials of a large study are offered.
 const OFFERED: u32 = 200;
 
+/// So many of the newest gaits without a certificate are certified because somebody wants to compare gaits.
+const CERTIFIED_AT_ONCE: usize = 10;
+
 /// `GET /studies/{id}/compare`.
 pub(super) async fn get(
     may: May<Read>,
@@ -135,7 +141,7 @@ pub(super) async fn get(
     Params(choice): Params<Choice>,
 ) -> Page {
     // Who signed in need not say so again; whoever may see this page is of the staff, unless told otherwise.
-    let mut typed = Submitted { shown: Some(now()), ..Submitted::default() };
+    let mut typed = Submitted::default();
     if may.caller.user.is_some() {
         (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
     }
@@ -162,16 +168,25 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         Some(saved) => read_back(&mut reader, &standing, saved).await?,
         None => None,
     };
-    let question = if large { None } else { open_question(&standing).map_err(Error::Learner)? };
+    let question = if large { Question::None } else { open_question(&standing).map_err(Error::Learner)? };
+    let question = question.pair().map(|pair| pair.trials());
     let waits = question.is_some();
+    let mut being_certified = 0;
+    for trial in
+        standing.trials.iter().rev().filter(|trial| standing.waits_for_certificate(trial)).take(CERTIFIED_AT_ONCE)
+    {
+        being_certified += usize::from(app.director.certify(trial.id));
+    }
     let mut trials: Vec<Offered> = standing
         .trials
         .iter()
-        .filter(|trial| trial.state == TrialState::Converged && !standing.objections.closes(trial.id))
+        .filter(|trial| standing.walkable(trial).is_ok())
         .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
         .collect();
-    if refused.is_none() {
-        check(&mut reader, &standing, &choice).await?;
+    if refused.is_none()
+        && let (Some(a), Some(b)) = (choice.a, choice.b)
+    {
+        walkable::admit_pair(&mut reader, id, ("a", "b"), (a, b)).await?;
     }
     let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
     let (a, b) = match (choice.a, choice.b, question) {
@@ -214,6 +229,7 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         key: FeedbackId::fresh(),
         saved,
         waits,
+        being_certified,
         is_going_on,
         last_event,
         typed,
@@ -249,17 +265,6 @@ async fn read_back(db: &mut Connection, standing: &Standing, saved: Recorded) ->
     })
 }
 
-/// Refuses what the address asks to compare and cannot be compared.
-async fn check(reader: &mut Connection, standing: &Standing, choice: &Choice) -> Result<(), Error> {
-    for (field, trial) in [("a", choice.a), ("b", choice.b)] {
-        if let Some(trial) = trial {
-            answer::comparable(reader, standing.study.id, field, trial).await?;
-            standing.objections.refuse(field, trial)?;
-        }
-    }
-    Ok(())
-}
-
 /// The form as typed, so that a refused one comes back as it was.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -273,14 +278,18 @@ pub(super) struct Submitted {
     #[serde(default)]
     note: String,
     key: String,
-    /// When the page was shown first; without it, no earlier answer of the same person was seen.
-    shown: Option<Instant>,
 }
 
 /// What a form says.
 enum Said {
     Preference(Answer),
     Remark(NewRemark),
+}
+
+impl Said {
+    fn is_about_safety(&self) -> bool {
+        matches!(self, Self::Remark(remark) if remark.answer.is_about_safety())
+    }
 }
 
 impl Submitted {
@@ -315,7 +324,7 @@ impl Submitted {
 
     /// What tells this answer from another one with the same key.
     fn fingerprint(&self, study: StudyId) -> String {
-        let Self { a, b, answer, source, author, note, key, shown: _ } = self;
+        let Self { a, b, answer, source, author, note, key } = self;
         let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
         fingerprint("form", &format!("/studies/{study}/compare"), said.as_bytes())
     }
@@ -331,7 +340,7 @@ enum Given {
     Saved(Recorded),
     /// The same form was sent before with another answer: that one is recorded.
     Before(Recorded),
-    /// The same person has answered elsewhere, after this page was shown: that answer is recorded.
+    /// The same person has answered this comparison before: that answer is recorded.
     Elsewhere(Recorded),
 }
 
@@ -352,9 +361,9 @@ pub(super) async fn post(
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Ok(Given::Elsewhere(saved)) => {
-            let why = "You have answered this comparison elsewhere since this page was shown, in another tab or window. \
-                       Recorded is the answer above, and it counts; this one was not taken. To change your mind, take \
-                       that answer back and save again.";
+            let why = "You have answered this comparison already, perhaps in another tab or window. Your first answer is \
+                       shown above and counts; this one was not taken. To change your mind, retract the first answer \
+                       and save again.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
@@ -377,7 +386,10 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
         let recorded = Recorded::try_from(before.body)?;
         return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
     }
-    if let Some(saved) = answered_elsewhere(&mut writer, id, form).await? {
+    // The door refuses a second answer; here the page shows the first one. A safety report is always taken.
+    if !said.is_about_safety()
+        && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
+    {
         return Ok(Given::Elsewhere(saved));
     }
     let saved = match said {
@@ -391,20 +403,14 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     Ok(Given::Saved(saved))
 }
 
-/// The newest answer to the same comparison that the same person gave since the page of a form was shown, and that stands.
+/// The answer of the same person to the same comparison that stands: it was given in another tab or elsewhere.
 async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
-    let (a, b) = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
+    let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
-    let is_unseen = |at: Instant| form.shown.is_none_or(|shown| shown <= at);
-    let mut made = remarks::of_study(db, study).await?;
-    made.retain(|remark| remark.retraction.is_none() && remark.author == author && is_unseen(remark.created_at));
-    if let Some(remark) = made.iter().rfind(|remark| [(a, b), (b, a)].contains(&remark.pair())) {
-        return Ok(Some(Recorded::Remark(remark.id)));
-    }
-    // What somebody said blindly is not shown here.
-    let given = feedback::of_pair(db, (a, b), Whose::Own(author), OFFERED).await?;
-    let row = given.into_iter().find(|row| !row.by_rater && is_unseen(row.created_at));
-    Ok(row.map(|row| Recorded::Preference(row.id)))
+    Ok(preference::standing_answer(db, study, pair, author).await?.map(|answer| match answer {
+        StandingAnswer::Preference(id) => Recorded::Preference(id),
+        StandingAnswer::Note(id) => Recorded::Remark(id),
+    }))
 }
 
 /// Taking an answer back.

@@ -14,6 +14,7 @@ use crate::store::{Connection, Instant, StudyId, TrialId, Writer, consents, even
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::objections::Objections;
+use crate::studies::preference::{self, Again, Statement};
 use crate::studies::standing::Standing;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -67,7 +68,8 @@ async fn question(db: &mut Connection, study: StudyId) -> Result<Question, Error
         .await
         .map_err(|e| Error::Internal(e.to_string()))?;
     // What the learner says names bounds: it is logged, and the rater hears that the program failed.
-    let pair = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
+    let found = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
+    let pair = found.pair().map(|pair| pair.trials());
     Ok(Question { seed, pair, converged })
 }
 
@@ -151,10 +153,14 @@ pub async fn answer(
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let voice = Voice { source, author: &caller.name, note: &given.note };
     // What is shown twice, or beside itself, says how the rater judges, and nothing of gaits.
-    let heard = if shown.kind == Kind::New { given.answer.heard(shown.pair()) } else { None };
-    let heard = match heard {
-        Some(said) => Some(feedback::append(writer, shown.study_id, &said, voice).await?),
-        None => None,
+    let heard = if shown.kind == Kind::New {
+        let fields = ("first", "second");
+        let (study, pair, said) = (shown.study_id, shown.pair(), given.answer);
+        // The server drew the pair; that this rater is asked again is meant.
+        let statement = Statement { study, pair, fields, said, voice, again: Again::Meant };
+        preference::hear(writer, statement).await.map_err(without_gaits)?
+    } else {
+        None
     };
     let row = NewAnswer { said: given.answer, response_ms: given.response_ms, note: &given.note, feedback: heard };
     if !presentations::answer(writer, shown.id, row).await? {
@@ -165,6 +171,14 @@ pub async fn answer(
     let detail = json!({ "study": shown.study_id, "number": shown.number, "answer": given.answer });
     audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
     Ok((shown.study_id, Answered { number: shown.number, answer: given.answer }))
+}
+
+/// A refusal that names no gait.
+fn without_gaits(error: Error) -> Error {
+    match error {
+        Error::Invalid(_) => Error::conflict("this pair is not asked about any more: go on to the next one"),
+        other => other,
+    }
 }
 
 /// Why a second answer is not taken, and what counts.

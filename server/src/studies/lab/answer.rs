@@ -7,12 +7,14 @@ use super::session::{InTheLab, in_the_lab, next_walk, still_open};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
+use crate::store::audit::Actor;
 use crate::store::feedback::{Source, Voice};
 use crate::store::lab_answers::{self, LabAnswer};
 use crate::store::lab_sessions::{Act, LabSession};
 use crate::store::presentations::Said;
 use crate::store::{Instant, LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
-use crate::studies::{answer, remark};
+use crate::studies::preference::{self, Again, Statement};
+use crate::studies::remark;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -128,16 +130,37 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId) -
     in_the_lab(writer, id).await
 }
 
-/// Lets the learner hear the answer that stands, if one does, as said by the subject.
+/// Tells the learner the answer that stands, if one does, as said by the subject. An answer about a gait that was reported
+/// unsafe since then stays in the record of the session, and the learner does not hear it.
 pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
     let Some(given) = session.answer() else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
-    let voice = Voice { source: Source::Subject, author: &author, note: &given.note };
-    if given.said.is_remark() {
-        remark::write(writer, study.id, session.walked(), given.said, voice).await?;
-    } else if let Some(said) = given.said.heard(session.walked()) {
-        answer::write(writer, study.id, &said, voice).await?;
+    let statement = Statement {
+        study: study.id,
+        pair: session.walked(),
+        fields: ("walk 2", "walk 3"),
+        said: given.said,
+        voice: Voice { source: Source::Subject, author: &author, note: &given.note },
+        // The same two gaits may be walked with in several sessions.
+        again: Again::Meant,
+    };
+    let heard = if given.said.is_remark() {
+        remark::write(writer, statement).await.map(drop)
+    } else {
+        heard_as_preference(writer, statement).await
+    };
+    match heard {
+        Err(reason @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let detail = json!({ "number": given.number, "reason": reason.to_string() });
+            let object = format!("lab session {}", session.id);
+            Ok(audit::append(writer, &Actor::program(), "lab_session.answer_not_heard", &object, &detail).await?)
+        }
+        other => other,
     }
-    Ok(())
+}
+
+async fn heard_as_preference(writer: &mut Writer, statement: Statement<'_>) -> Result<(), Error> {
+    let heard = preference::hear(writer, statement).await?;
+    Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": heard })).await?)
 }

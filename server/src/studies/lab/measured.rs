@@ -2,7 +2,7 @@
 //! walk may be known.
 
 use super::recording::{EmgReading, MotionReading, WHAT, aside};
-use super::session::{gait_of, still_shown};
+use super::session::{still_shown, trial_of};
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
@@ -147,7 +147,7 @@ pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Resu
     if walk == 1 || session.done(Act::Unblinded).is_none() {
         return Ok(None);
     }
-    match gaits::get(db, gait_of(&session, walk)?).await {
+    match gaits::get(db, trial_of(&session, walk)?).await {
         Ok(gait) => Ok(Some(gait)),
         Err(StoreError::Missing { .. }) => Ok(None),
         Err(error) => Err(error.into()),

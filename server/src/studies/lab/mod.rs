@@ -17,5 +17,5 @@ pub use measured::{
 pub use recording::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, keep};
 pub use session::{
     Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
-    gait_of, in_the_lab, plan, record_walk, still_open, unblind, was_recorded,
+    gait_to_walk_with, in_the_lab, plan, record_walk, still_open, unblind, was_recorded,
 };

@@ -5,13 +5,10 @@ use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
-use crate::store::trials::TrialState;
-use crate::store::{
-    Connection, Instant, LabSessionId, StoreError, StudyId, TrialId, Writer, consents, studies, trials,
-};
+use crate::store::{Connection, Instant, LabSessionId, StudyId, TrialId, Writer, consents, studies};
 use crate::studies::balance::comes_first;
-use crate::studies::objections::Objections;
 use crate::studies::seed::{Purpose, derive};
+use crate::studies::walkable::{self, NotWalkable, WalkableGait};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -163,16 +160,42 @@ fn condition(session: &LabSession, walk: u8) -> Condition {
     }
 }
 
-/// The gait of a walk, whoever may know it.
+/// The trial of a walk, whoever may know it.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a walk without the device and for one that there is not.
-pub fn gait_of(session: &LabSession, walk: u8) -> Result<TrialId, Error> {
+pub(super) fn trial_of(session: &LabSession, walk: u8) -> Result<TrialId, Error> {
     match condition(session, checked_walk(walk)?) {
         Condition::Normal => Err(Error::invalid("walk", walk, "2 or 3: walk 1 is without the device")),
         Condition::GaitOne => Ok(session.gait_one),
         Condition::GaitTwo => Ok(session.gait_two),
     }
+}
+
+/// The gait that the subject is about to walk with.
+///
+/// # Errors
+/// As [`trial_of`], and [`Error::Conflict`] when the session is closed or one of its two gaits may not be walked with.
+pub async fn gait_to_walk_with(db: &mut Connection, session: &LabSession, walk: u8) -> Result<WalkableGait, Error> {
+    let trial = trial_of(session, walk)?;
+    if session.done(Act::Closed).is_some() {
+        return Err(Error::conflict("the session is closed: nobody walks in it any more"));
+    }
+    let (one, two) = both_walkable(db, session).await?;
+    Ok(if trial == one.trial() { one } else { two })
+}
+
+/// Both gaits of a session. The refusal does not say which of them may not be walked with: that would tell the order to
+/// whoever knows which walk is next.
+async fn both_walkable(db: &mut Connection, session: &LabSession) -> Result<(WalkableGait, WalkableGait), Error> {
+    let one = walkable::admit(db, session.gait_one).await?;
+    let two = walkable::admit(db, session.gait_two).await?;
+    one.and_then(|one| Ok((one, two?))).map_err(|reason| match reason {
+        NotWalkable::Withdrawn => reason.into(),
+        _ => Error::conflict(
+            "one of the two gaits of this session may not be walked with any more: close the session and plan another one",
+        ),
+    })
 }
 
 /// The number of a walk, if there is such a walk.
@@ -190,22 +213,7 @@ pub fn checked_walk(walk: u8) -> Result<u8, Error> {
 pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewSession) -> Result<LabSession, Error> {
     let seed = studies::get(writer, study).await?.plan.seed;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
-    for (field, id) in [("gait_one", new.gait_one), ("gait_two", new.gait_two)] {
-        let converged = match trials::get(writer, id).await {
-            Ok(trial) => trial.study_id == study && trial.state == TrialState::Converged,
-            Err(StoreError::Missing { .. }) => false,
-            Err(error) => return Err(error.into()),
-        };
-        if !converged {
-            return Err(Error::invalid(field, id.to_string(), "a converged trial of this study"));
-        }
-    }
-    let objections = Objections::read(writer, study).await?;
-    objections.refuse("gait_one", new.gait_one)?;
-    objections.refuse("gait_two", new.gait_two)?;
-    if new.gait_one == new.gait_two {
-        return Err(Error::invalid("gait_two", new.gait_two.to_string(), "another gait than gait one"));
-    }
+    walkable::admit_pair(writer, study, ("gait_one", "gait_two"), (new.gait_one, new.gait_two)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
     let lot = derive(seed, Purpose::LabSession, before as u64 / 4);
     let row = NewLabSession {
@@ -296,6 +304,9 @@ pub async fn record_walk(
         Some(next) if next == walk => {}
         Some(next) => return Err(Error::conflict(format!("walk {next} is next, not walk {walk}"))),
         None => return Err(Error::conflict("every walk of this session was recorded")),
+    }
+    if walk > 1 {
+        both_walkable(writer, &session).await?;
     }
     lab_sessions::act(writer, actor, id, Act::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });

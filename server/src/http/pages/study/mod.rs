@@ -370,7 +370,8 @@ pub(super) fn figures(
         let question = standing.study.state == StudyState::Waiting;
         return Ok(Figures { best, ranking, history, question, ..Figures::default() });
     }
-    let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.is_some();
+    let question =
+        standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.pair().is_some();
     if standing.waits_for_first_answer() {
         return Ok(Figures { unanswered: true, question, ..Figures::default() });
     }
@@ -429,7 +430,7 @@ fn view(
         let reviewed = closed.review.is_some();
         Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at, reviewed })
     };
-    let unsafe_gaits = standing.objections.closed.iter().filter_map(unsafe_gait).collect();
+    let unsafe_gaits = standing.grounds.objections.closed.iter().filter_map(unsafe_gait).collect();
     let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
     let files = format!("/api/v1/studies/{}/figures", standing.study.id);
     let acts = if may_run { acts_of_people(standing.study.state) } else { Vec::new() };
@@ -478,7 +479,7 @@ fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
     let why = |retraction: &Option<Retraction>| Some(format!("taken back: {}", retraction.as_ref()?.reason));
     let lifted = |id| {
         let of_it = |closed: &&Closed| closed.said == Statement::Staff(id);
-        let review = standing.objections.lifted.iter().find(of_it)?.review.as_ref()?;
+        let review = standing.grounds.objections.lifted.iter().find(of_it)?.review.as_ref()?;
         Some(format!("may be walked with again, {}: {}", review.author, review.reason))
     };
     let preference = |row: &FeedbackRow| {
