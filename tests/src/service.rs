@@ -69,6 +69,12 @@ impl Service {
         Self::start_with(database, Arc::new(InProcess::new(workers, Arc::new(solver)).standing_back())).await
     }
 
+    /// Starts a service in which gaits get certificates only when somebody asks.
+    pub async fn start_without_certificates(database: &Path, solver: impl Evaluate) -> Self {
+        let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
+        Self::over(with_catalogue(database).await, engine, None)
+    }
+
     /// Starts a service whose jobs go to an engine.
     pub async fn start_with(database: &Path, engine: Arc<dyn Dispatch>) -> Self {
         Self::over(with_catalogue(database).await, engine, None).passing_every_gait()

@@ -95,7 +95,7 @@ fn what_is_no_gait_or_recording_is_refused() {
 #[tokio::test]
 async fn a_trial_gets_its_certificate_once() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
+    let service = Service::start_without_certificates(&folder.path().join("a.db"), GaitSolver).await;
     let study = service
         .study(|new| {
             new.muscles = false;

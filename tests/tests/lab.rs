@@ -235,7 +235,7 @@ async fn a_walk_that_was_unsafe_closes_both_gaits_until_the_order_says_which() {
     assert_eq!(closed().await, [true, true]);
     let pair = json!({"trial_a": gaits[0].id, "trial_b": gaits[2].id, "answer": "a", "author": "K"});
     let refused = service.post(&format!("/api/v1/studies/{study}/preferences"), &pair).await;
-    assert!(refused.text.contains("a gait that nobody called unsafe"), "{}", refused.text);
+    assert!(refused.text.contains("a gait that may be walked with"), "{}", refused.text);
     let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[2].id});
     let refused = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await;
     assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("gait_one")));
@@ -261,9 +261,9 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     let no_gait = trials.iter().find(|trial| trial.state != TrialState::Converged).unwrap().id;
     let path = format!("/api/v1/studies/{study}/lab-sessions");
     for (two, expected) in [
-        (foreign, "a converged trial of this study"),
-        (no_gait, "a converged trial of this study"),
-        (gaits[0].id, "another gait than gait one"),
+        (foreign, "a trial of this study"),
+        (no_gait, "only a converged gait can be walked with"),
+        (gaits[0].id, "another gait than gait_one"),
     ] {
         let refused = service.post(&path, &json!({"gait_one": gaits[0].id, "gait_two": two})).await;
         assert_eq!(refused.json()["field"], "gait_two");

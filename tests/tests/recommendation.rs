@@ -69,19 +69,22 @@ async fn a_study_without_a_gait_has_no_best_trial() {
 #[tokio::test]
 async fn nothing_is_recommended_silently_whose_certificate_failed() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let page = format!("/studies/{study}");
 
-    let fresh = recommendation(&service, study).await;
-    assert_eq!((&fresh["certificate"], &fresh["objections"]), (&json!("not_examined"), &json!([])));
+    let best = ranked(&service, study).await[0];
+    for file in ["recommendation", "recommendation.csv"] {
+        let refused = service.fetch(&format!("/api/v1/studies/{study}/{file}")).await;
+        assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
+        assert!(refused.text.contains(&format!("POST /api/v1/trials/{best}/certificate")), "{}", refused.text);
+    }
     assert!(service.fetch(&page).await.text.contains("Nobody examined this gait yet"));
 
-    let best: TrialId = fresh["trial_id"].as_str().unwrap().parse().unwrap();
     examined(&service, best, false).await;
     let failed = recommendation(&service, study).await;
-    assert_eq!(failed["trial_id"], fresh["trial_id"], "the learner's answer is the same");
+    assert_eq!(failed["trial_id"], json!(best), "the learner's answer is the same");
     assert_eq!(failed["certificate"], "failed");
     assert_eq!((&failed["objections"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
     let shown = service.fetch(&page).await.text;
@@ -106,10 +109,10 @@ async fn nothing_is_recommended_silently_whose_certificate_failed() {
 #[tokio::test]
 async fn a_gait_that_passed_is_said_to_have_passed() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let best: TrialId = recommendation(&service, study).await["trial_id"].as_str().unwrap().parse().unwrap();
+    let best = ranked(&service, study).await[0];
     examined(&service, best, true).await;
     let passed = recommendation(&service, study).await;
     assert_eq!((&passed["certificate"], &passed["passing"]), (&json!("passed"), &Value::Null));
@@ -125,10 +128,11 @@ fn only(bounds: Option<TunedBounds>) -> Verdicts<impl Fn(&Gait) -> bool> {
 /// What is recommended once nothing is being examined any more.
 async fn settled(service: &Service, study: StudyId) -> Value {
     for _ in 0..1000 {
-        let found = recommendation(service, study).await;
-        if found["examining"] == json!(false) {
-            return found;
+        let found = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
+        if found.status == StatusCode::OK && found.json()["examining"] == json!(false) {
+            return found.json();
         }
+        assert!(found.status == StatusCode::OK || found.text.contains("being certified"), "{}", found.text);
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     panic!("the gaits are not examined");
@@ -153,8 +157,8 @@ async fn when_a_study_has_ended_its_ten_best_gaits_are_examined_in_order() {
     let service = Service::start_examining(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
     let study = service.study(|new| new.trial_budget = 20).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let early = recommendation(&service, study).await;
-    assert_eq!((&early["certificate"], &early["examining"]), (&json!("being_examined"), &json!(true)));
+    let early = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
+    assert!(early.status == StatusCode::CONFLICT && early.text.contains("being certified"), "{}", early.text);
     assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait is being examined"));
 
     let found = settled(&service, study).await;
@@ -170,7 +174,7 @@ async fn when_a_study_has_ended_its_ten_best_gaits_are_examined_in_order() {
 async fn what_ended_before_the_process_began_is_examined_until_one_passes_and_that_one_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
-    let service = Service::start(&database, Analytic::default(), 1).await;
+    let service = Service::start_without_certificates(&database, Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 12).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let best = ranked(&service, study).await;
@@ -205,7 +209,7 @@ async fn a_recommendation_that_is_asked_for_while_the_study_runs_is_examined_bes
     let study = service.study(|new| new.trial_budget = 500).await;
     service.wait_for_trials(study, 3).await;
     assert!(examined_by_service(&service).await.is_empty(), "nobody asked");
-    recommendation(&service, study).await;
+    service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     let ended = async || service.trials(study).await.iter().filter(|trial| !trial.state.is_open()).count();
     let before = ended().await;
     while examined_by_service(&service).await.is_empty() {

@@ -374,7 +374,9 @@ impl Director {
             Prepared::Done(finding) => {
                 drop(hand_over);
                 self.started(attempt, PREPARED).await?;
-                return self.ended(attempt, PREPARED, finding).await;
+                self.ended(attempt, PREPARED, finding).await?;
+                self.changed();
+                return Ok(());
             }
         }
         if self.busy().await? > self.0.engine.size() {

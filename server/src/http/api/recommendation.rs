@@ -145,8 +145,12 @@ async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
     let unexamined = recommended::judged(&mut reader, &ranking).await?.unexamined;
     let examining = unexamined.is_some_and(|next| app.director.examine(id, next));
     let Some((place, trial, gait)) = walkable else {
-        app.director.certify(best);
-        return Err(Error::conflict("nothing is recommended yet: the best gait is being certified; ask again"));
+        let why = if examining {
+            "nothing is recommended yet: the best gait is being certified; ask again".to_owned()
+        } else {
+            format!("nothing is recommended: the best gait has no certificate; POST /api/v1/trials/{best}/certificate")
+        };
+        return Err(Error::conflict(why));
     };
     let judged = recommended::judged(&mut reader, &ranking[place..]).await?;
     drop(reader);
