@@ -112,7 +112,13 @@ async fn a_trial_gets_its_certificate_once() {
 
     let motion = service.fetch(&format!("/api/v1/trials/{}/gait.mot?rate_hz=100", trial.id)).await;
     assert!(motion.text.contains("inDegrees=yes") && motion.text.contains("knee_angle_l"), "{}", motion.text);
+    let early = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
+    assert_eq!(early.status, StatusCode::CONFLICT, "{}", early.text);
+    assert!(early.text.contains(&format!("POST {address}")), "{}", early.text);
+    let certificate = service.post(&address, &json!({})).await;
+    assert_eq!(certificate.status, StatusCode::OK, "{}", certificate.text);
     let controller = service.fetch(&format!("/api/v1/trials/{}/controller.json", trial.id)).await;
+    assert_eq!(controller.json()["certificate_passed"], certificate.json()["passed"]);
     assert_eq!(ControllerFile::from_json(&controller.text).unwrap().domains.len(), 8);
     assert!(controller.headers["content-disposition"].to_str().unwrap().contains("device-trial-1.json"));
     let refused = service.fetch(&format!("/api/v1/trials/{}/controller.json?rate_hz=1", trial.id)).await;

@@ -102,7 +102,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let best_id = best.as_str().unwrap();
     let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
-    assert!(for_the_device.text.contains("no device gets it"), "{}", for_the_device.text);
+    assert!(for_the_device.text.contains("nobody walks with it"), "{}", for_the_device.text);
     let seen = objections(&service, study).await[0]["at"].clone();
     tokio::time::sleep(std::time::Duration::from_millis(2)).await;
     service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;

@@ -16,7 +16,7 @@ const FORMAT_VERSION: u32 = 1;
 const ANGLES: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
 
 /// Every field in words; it travels with the file.
-const FIELDS: [(&str, &str); 28] = [
+const FIELDS: [(&str, &str); 29] = [
     ("format", "what this file is"),
     ("format_version", "version of its layout"),
     ("fields", "this explanation"),
@@ -25,6 +25,10 @@ const FIELDS: [(&str, &str); 28] = [
         "forward lean, hip flexion, knee flexion and ankle dorsiflexion are positive; R is the prosthesis, L the intact leg",
     ),
     ("device", "name of the prosthesis"),
+    (
+        "certificate_passed",
+        "whether the gait passed its certificate: false means that an independent check found a limit exceeded",
+    ),
     ("stride_time_s", "time from right heel strike to the next, s"),
     ("stride_length_m", "distance between these heel strikes, m"),
     ("domains", "the eight contact situations of a stride, in order from right heel strike"),
@@ -77,6 +81,9 @@ pub struct ControllerFile {
     pub fields: BTreeMap<String, String>,
     /// Name of the prosthesis.
     pub device: String,
+    /// Whether the gait passed its certificate; absent in the file of a blinded walk, where it would tell the gait.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate_passed: Option<bool>,
     /// s.
     pub stride_time_s: f64,
     /// m.
@@ -213,6 +220,7 @@ impl ControllerFile {
             format_version: FORMAT_VERSION,
             fields: FIELDS.iter().map(|(name, words)| ((*name).to_owned(), (*words).to_owned())).collect(),
             device: gait.device.name.clone(),
+            certificate_passed: None,
             stride_time_s: gait.domains.iter().map(|d| d.duration_s).sum(),
             stride_length_m: gait.stride_length_m,
             domains,

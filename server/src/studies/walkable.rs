@@ -10,7 +10,6 @@ use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, StoreResult, StudyId, TrialId, consents, gaits, trials};
 use gait_optimizer::export::ControllerFile;
 use gait_optimizer::{Gait, SolveReport};
-use serde_json::json;
 use std::collections::HashMap;
 use thiserror::Error as ThisError;
 
@@ -58,18 +57,13 @@ impl WalkableGait {
         gaits::get(db, self.trial).await
     }
 
-    /// The controller file of this gait, which names its trial and what its certificate says. `gait` is
-    /// [`Self::trajectory`].
+    /// The controller file of this gait, which says whether it passed its certificate. `gait` is [`Self::trajectory`].
     ///
     /// # Errors
     /// [`Error::Invalid`] for a rate out of range.
     pub fn controller_file(&self, gait: &Gait, rate_hz: f64) -> Result<String, Error> {
-        let mut file = self.content(gait, rate_hz)?;
-        if let Some(fields) = file.as_object_mut() {
-            fields.insert("trial".to_owned(), json!({ "id": self.trial, "number": self.number }));
-            fields.insert("certificate".to_owned(), json!({ "passed": self.certified == Certified::Passed }));
-        }
-        pretty(&file)
+        let certificate_passed = Some(self.certified == Certified::Passed);
+        pretty(&ControllerFile { certificate_passed, ..ControllerFile::new(gait, rate_hz)? })
     }
 
     /// The controller file of this gait for a blinded walk: nothing in it names the gait.
@@ -77,17 +71,11 @@ impl WalkableGait {
     /// # Errors
     /// [`Error::Invalid`] for a rate out of range.
     pub fn blinded_controller_file(&self, gait: &Gait, rate_hz: f64) -> Result<String, Error> {
-        pretty(&self.content(gait, rate_hz)?)
-    }
-
-    fn content(&self, gait: &Gait, rate_hz: f64) -> Result<serde_json::Value, Error> {
-        let file = ControllerFile::new(gait, rate_hz)?;
-        serde_json::to_value(&file)
-            .map_err(|e| Error::Internal(format!("controller file of trial {}: {e}", self.number)))
+        pretty(&ControllerFile::new(gait, rate_hz)?)
     }
 }
 
-fn pretty(file: &serde_json::Value) -> Result<String, Error> {
+fn pretty(file: &ControllerFile) -> Result<String, Error> {
     serde_json::to_string_pretty(file).map_err(|e| Error::Internal(e.to_string()))
 }
 
