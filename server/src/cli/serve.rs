@@ -105,7 +105,7 @@ impl Serve {
                 handle.graceful_shutdown(Some(DRAIN));
             }
         });
-        let service = app.into_make_service();
+        let service = app.into_make_service_with_connect_info::<SocketAddr>();
         let served = if let Some(config) = tls {
             let server = axum_server::from_tcp_rustls(listener, config).map_err(cannot_listen)?;
             let mut server = server.handle(handle).http1_only();

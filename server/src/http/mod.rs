@@ -2,6 +2,7 @@
 
 pub mod api;
 mod blind_motion;
+mod client_address;
 mod extract;
 mod host;
 mod identify;
@@ -20,6 +21,7 @@ mod shown;
 mod state;
 mod static_files;
 
+pub use client_address::ClientAddress;
 pub use host::Hosts;
 pub use router::router;
 pub use state::{Access, AppState};

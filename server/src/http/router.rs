@@ -1,9 +1,11 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, BODY_LIMIT_BYTES, api, host, identify, metrics, openapi, pages, same_origin, static_files};
+use super::{
+    AppState, BODY_LIMIT_BYTES, api, client_address, host, identify, metrics, openapi, pages, same_origin, static_files,
+};
 use crate::error::Error;
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
+use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
@@ -57,8 +59,16 @@ pub fn router(state: AppState) -> Router {
         .layer(header(HeaderName::from_static("cross-origin-resource-policy"), "same-origin"))
         .layer(header(HeaderName::from_static("permissions-policy"), "camera=(), geolocation=(), microphone=()"))
         .layer(option_layer(secure.then(|| header(header::STRICT_TRANSPORT_SECURITY, "max-age=31536000"))))
-        .layer(TraceLayer::new_for_http())
+        .layer(middleware::from_fn(client_address::note))
+        .layer(TraceLayer::new_for_http().make_span_with(span_of))
         .with_state(state)
+}
+
+/// What log lines say of their request: its route and not its address, which holds the secret of a sign-in link or the
+/// token of a blind pair.
+fn span_of(request: &Request) -> tracing::Span {
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str);
+    tracing::info_span!("request", method = %request.method(), route)
 }
 
 /// `GET /api/openapi.json`.
