@@ -66,7 +66,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 62] = [
+const PAGES: [(&str, Option<Right>); 64] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -122,6 +122,8 @@ const PAGES: [(&str, Option<Right>); 62] = [
     ("get /system", Some(Right::Read)),
     ("post /system/backup", Some(Right::Administer)),
     ("get /glossary", None),
+    ("get /problems", None),
+    ("get /problems/{name}", None),
     ("get /api", None),
     ("get /sign-in", None),
     ("post /sign-in", None),

@@ -1,6 +1,7 @@
 //! `gaitwright serve`.
 
 use super::config::{Flags, Settings};
+use super::output::tell;
 use crate::access::people;
 use crate::error::Error;
 use crate::http::{Access, AppState, Hosts, router};
@@ -92,7 +93,7 @@ impl Serve {
         });
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if let Some(secret) = link {
-            eprintln!("sign in (once, within a day): {origin}/sign-in/{secret}");
+            tell(&format!("sign in (once, within a day): {origin}/sign-in/{secret}"));
         }
 
         // Streams end when the director stops, so that the drain is not held up by them.

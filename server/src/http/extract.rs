@@ -17,7 +17,7 @@ pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Re
     let bytes = if absent { b"{}" } else { bytes };
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("");
     if !absent && !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
-        return Err(Error::Malformed(format!("content type {kind:?}: this needs application/json")));
+        return Err(Error::UnsupportedMediaType(format!("content type {kind:?}: this needs application/json")));
     }
     document::read(bytes)
 }
@@ -28,6 +28,8 @@ pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
         Error::TooLarge(format!(
             "the body is larger than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} where a recording is uploaded)"
         ))
+    } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
+        Error::UnsupportedMediaType(reason.to_owned())
     } else {
         Error::Malformed(format!("the body cannot be read: {reason}"))
     }

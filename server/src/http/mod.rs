@@ -1,5 +1,6 @@
 //! The HTTP face: REST under `/api/v1`, pages for people, static files.
 
+mod answers;
 pub mod api;
 mod blind_motion;
 mod client_address;
@@ -14,6 +15,7 @@ pub mod openapi;
 pub mod pages;
 mod pages_of;
 mod problem;
+mod problem_kinds;
 mod revision;
 mod router;
 mod same_origin;
@@ -23,7 +25,7 @@ mod static_files;
 
 pub use client_address::ClientAddress;
 pub use host::Hosts;
-pub use router::router;
+pub use router::{router, with_layers};
 pub use state::{Access, AppState};
 
 /// Largest request body.

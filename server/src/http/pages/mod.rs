@@ -21,6 +21,7 @@ mod lab_walk;
 mod muscles;
 mod new_study;
 mod people;
+mod problems;
 mod rate;
 mod reference;
 mod reference_gaits;
@@ -86,6 +87,8 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/system", get(system::get))
         .route("/system/backup", post(system::make_backup))
         .route("/glossary", get(glossary::get))
+        .route("/problems", get(problems::list))
+        .route("/problems/{name}", get(problems::get))
         .route("/api", get(reference::get))
         .route("/sign-in", get(sign_in::get).post(sign_in::post))
         .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))
