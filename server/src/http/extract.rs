@@ -3,12 +3,10 @@
 use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::document;
 use crate::error::Error;
-use axum::extract::{FromRequest, FromRequestParts, Query, RawPathParams, Request};
+use axum::extract::{FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
-use std::fmt::Display;
-use std::str::FromStr;
 
 /// Reads a JSON body, naming the field that cannot be read.
 pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
@@ -32,26 +30,6 @@ pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
         Error::UnsupportedMediaType(reason.to_owned())
     } else {
         Error::Malformed(format!("the body cannot be read: {reason}"))
-    }
-}
-
-/// The identifier in the path: `{id}`.
-#[derive(Debug)]
-pub(crate) struct Id<T>(pub(crate) T);
-
-impl<T, S> FromRequestParts<S> for Id<T>
-where
-    T: FromStr,
-    T::Err: Display,
-    S: Send + Sync,
-{
-    type Rejection = Error;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Error> {
-        let named =
-            RawPathParams::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
-        let text = named.iter().find(|(name, _)| *name == "id").map_or("", |(_, text)| text).to_owned();
-        text.parse().map(Self).map_err(|_| Error::NotFound { what: "an identifier like".to_owned(), id: text })
     }
 }
 

@@ -16,6 +16,7 @@ pub mod pages;
 mod pages_of;
 mod problem;
 mod problem_kinds;
+mod reached;
 mod revision;
 mod router;
 mod same_origin;

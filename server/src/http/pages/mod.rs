@@ -18,6 +18,7 @@ mod lab;
 mod lab_charts;
 mod lab_recordings;
 mod lab_walk;
+mod members;
 mod muscles;
 mod new_study;
 mod people;
@@ -53,6 +54,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
+        .route("/studies/{id}/members", get(members::get).post(members::post))
         .route("/subjects", get(subject::list).post(subject::add))
         .route("/subjects/{id}", get(subject::get))
         .route("/subjects/{id}/consent", post(subject::consent))
