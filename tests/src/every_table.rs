@@ -75,5 +75,16 @@ pub async fn fill(database: &Path) {
         sqlx::query(sql).execute(&mut *writer).await.unwrap();
     }
     commit(writer).await.unwrap();
+    for (path, body) in [
+        (format!("/api/v1/studies/{study}/members"), json!({"kind": "user", "name": "R1"})),
+        (format!("/api/v1/studies/{study}/access"), json!({"restricted": true})),
+    ] {
+        let done = service.post(&path, &body).await;
+        assert!(done.status.is_success(), "{path}: {}", done.text);
+        if let Some(member) = done.json()["id"].as_str() {
+            let removed = service.post(&format!("/api/v1/study-members/{member}/remove"), &json!({})).await;
+            assert_eq!(removed.status, StatusCode::OK, "{}", removed.text);
+        }
+    }
     service.stop().await;
 }

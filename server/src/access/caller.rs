@@ -2,9 +2,9 @@
 
 use super::reach::{Principal, Reach};
 use super::right::{Right, Rights, Role};
-use crate::store::{TokenId, UserId};
 use crate::store::audit::Actor;
 use crate::store::feedback::Source;
+use crate::store::{TokenId, UserId};
 
 /// Who makes a request, and what they may do.
 #[derive(Debug, Clone)]

@@ -9,8 +9,8 @@ use crate::access::{Permission, Reach};
 use crate::error::Error;
 use crate::store::{
     Connection, DeviceId, FeedbackId, LabRecordingId, LabSessionId, MemberId, ReferenceGaitId, RemarkId, StoreError,
-    StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, feedback, lab_recordings, lab_sessions, members, remarks,
-    trials,
+    StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, feedback, lab_recordings, lab_sessions, members,
+    remarks, trials,
 };
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
@@ -43,7 +43,9 @@ macro_rules! of_study {
 
 of_study!(StudyId, "study", async |_: &mut Connection, id: StudyId| StoreResult::Ok(id));
 of_study!(TrialId, "trial", async |db: &mut Connection, id| StoreResult::Ok(trials::get(db, id).await?.study_id));
-of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult::Ok(feedback::get(db, id).await?.study_id));
+of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult::Ok(
+    feedback::get(db, id).await?.study_id
+));
 of_study!(RemarkId, "remark", async |db: &mut Connection, id| StoreResult::Ok(remarks::get(db, id).await?.study_id));
 of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
 of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {

@@ -3,8 +3,8 @@
 use super::{Connection, Instant, MemberId, StoreError, StoreResult, StudyId, now};
 use crate::access::{Principal, Reach, Role};
 use serde::{Deserialize, Serialize};
-use sqlx::{AssertSqlSafe, Row};
 use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
 use utoipa::ToSchema;
 
 /// SQL that holds where a caller reaches the study of a column. `?1`, `?2` and `?3` are what [`binds`] gives.
@@ -102,7 +102,8 @@ const MEMBERS: &str = "select m.*, coalesce(u.name, t.name) as name, u.role as r
 /// # Errors
 /// What the database reports.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Member>> {
-    let sql = format!("{MEMBERS} where m.study_id = ? and m.id in (select id from current_study_members) order by m.id");
+    let sql =
+        format!("{MEMBERS} where m.study_id = ? and m.id in (select id from current_study_members) order by m.id");
     let rows = sqlx::query(AssertSqlSafe(sql)).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
@@ -126,15 +127,17 @@ pub async fn insert(db: &mut Connection, study: StudyId, who: Principal, actor: 
         Principal::Token(id) => (None, Some(id)),
     };
     let id = MemberId::fresh();
-    sqlx::query("insert into study_members (id, study_id, user_id, token_id, actor, created_at) values (?, ?, ?, ?, ?, ?)")
-        .bind(id)
-        .bind(study)
-        .bind(user)
-        .bind(token)
-        .bind(actor)
-        .bind(now())
-        .execute(db)
-        .await?;
+    sqlx::query(
+        "insert into study_members (id, study_id, user_id, token_id, actor, created_at) values (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(study)
+    .bind(user)
+    .bind(token)
+    .bind(actor)
+    .bind(now())
+    .execute(db)
+    .await?;
     Ok(id)
 }
 
@@ -152,7 +155,8 @@ pub async fn end(db: &mut Connection, id: MemberId, actor: &str) -> StoreResult<
 /// # Errors
 /// What the database reports.
 pub async fn is_restricted(db: &mut Connection, study: StudyId) -> StoreResult<bool> {
-    let found = sqlx::query("select 1 from restricted_studies where study_id = ?").bind(study).fetch_optional(db).await?;
+    let found =
+        sqlx::query("select 1 from restricted_studies where study_id = ?").bind(study).fetch_optional(db).await?;
     Ok(found.is_some())
 }
 
@@ -181,11 +185,13 @@ pub async fn inherit(db: &mut Connection, from: StudyId, to: StudyId, actor: &st
         return Ok(());
     }
     set_restricted(db, to, true, actor).await?;
-    let rows = sqlx::query("select m.user_id, m.token_id, u.role from current_study_members m \
-                            left join users u on u.id = m.user_id where m.study_id = ?")
-        .bind(from)
-        .fetch_all(&mut *db)
-        .await?;
+    let rows = sqlx::query(
+        "select m.user_id, m.token_id, u.role from current_study_members m \
+                            left join users u on u.id = m.user_id where m.study_id = ?",
+    )
+    .bind(from)
+    .fetch_all(&mut *db)
+    .await?;
     for row in &rows {
         if row.try_get::<Option<&str>, _>("role")? == Some(Role::Rater.as_str()) {
             continue;

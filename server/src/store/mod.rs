@@ -46,8 +46,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, MemberId, PresentationId, ReferenceGaitId, RemarkId,
-    SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, MemberId, PresentationId, ReferenceGaitId,
+    RemarkId, SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use migrations::FORM;
 pub use time::{Instant, now};

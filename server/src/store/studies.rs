@@ -279,12 +279,7 @@ pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn page(
-    db: &mut Connection,
-    reach: Reach,
-    before: Option<StudyId>,
-    limit: u32,
-) -> StoreResult<Vec<Study>> {
+pub async fn page(db: &mut Connection, reach: Reach, before: Option<StudyId>, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(
         "select * from studies where ",
@@ -366,12 +361,7 @@ pub async fn with_objections(db: &mut Connection, reach: Reach, limit: u32) -> S
 ///
 /// # Errors
 /// What the database reports.
-pub async fn of_subject(
-    db: &mut Connection,
-    reach: Reach,
-    subject: SubjectId,
-    limit: u32,
-) -> StoreResult<Vec<Study>> {
+pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!("select * from studies where subject_id = ?4 and ", reached!("id"), " order by id desc limit ?5");
     let query = sqlx::query(sql).bind(every).bind(open).bind(principal);

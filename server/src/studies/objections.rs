@@ -1,8 +1,8 @@
 //! What people said of gaits that is no preference, wherever they said it: gaits that must not be walked, and pairs of
 //! which somebody could not tell which is better.
 
-use crate::error::Error;
 use crate::access::Reach;
+use crate::error::Error;
 use crate::store::presentations::Said;
 use crate::store::safety_reviews::{self, SafetyReview, SafetyVerdict};
 use crate::store::studies::{self, Study};

@@ -39,7 +39,9 @@ impl Workers {
     pub(crate) async fn read(app: &AppState) -> Result<Self, Error> {
         let mut at_work = BTreeMap::new();
         // Names of workers alone: they say nothing of a study.
-        for worker in jobs::open(&mut *app.read().await?, Reach::Every, MOST).await?.into_iter().filter_map(|job| job.worker) {
+        for worker in
+            jobs::open(&mut *app.read().await?, Reach::Every, MOST).await?.into_iter().filter_map(|job| job.worker)
+        {
             *at_work.entry(worker).or_default() += 1;
         }
         Ok(Self { places: app.director.workers(), at_work })

@@ -3,8 +3,8 @@
 use crate::access::Run;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::reached::Id;
 use crate::http::once::OnceWith;
+use crate::http::reached::Id;
 use crate::store::trials::Trial;
 use crate::store::{StudyId, TrialId};
 use crate::studies::script::{self, Ask, Tell};

@@ -5,9 +5,9 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
-use crate::http::reached::Id;
 use crate::http::once::{Once, OnceWith};
 use crate::http::pages_of::Before;
+use crate::http::reached::Id;
 use crate::http::revision::{IfMatch, tagged};
 use crate::store::studies::{self, Study};
 use crate::store::trials::{self, TrialCounts};
@@ -94,7 +94,11 @@ pub(super) async fn list(
     )),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id, _): Id<StudyId, Read>) -> Result<Response, Error> {
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Read>,
+) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let revision = study.revision;
