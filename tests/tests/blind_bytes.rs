@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 
 const JSON: &str = "application/json";
 /// Headers that any answer of the service may carry. Anything else must be looked at: it may name something.
-const HEADERS: [&str; 16] = [
+const HEADERS: [&str; 17] = [
     "allow",
     "cache-control",
     "content-length",
@@ -35,6 +35,7 @@ const HEADERS: [&str; 16] = [
     "www-authenticate",
     "x-content-type-options",
     "x-frame-options",
+    "x-request-id",
 ];
 
 async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
@@ -175,10 +176,10 @@ fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, St
     (answer.status, text, named(&answer.headers))
 }
 
-/// Headers but the length of the body, which follows from the motion.
+/// Headers but the length of the body, which follows from the motion, and the identifier of the request.
 fn named(headers: &HeaderMap) -> Vec<(String, String)> {
     let token = |value: &str| value.split("saved=").next().unwrap_or_default().to_owned();
-    let kept = headers.iter().filter(|(name, _)| name.as_str() != "content-length");
+    let kept = headers.iter().filter(|(name, _)| !["content-length", "x-request-id"].contains(&name.as_str()));
     kept.map(|(name, value)| (name.to_string(), token(value.to_str().unwrap()))).collect()
 }
 
