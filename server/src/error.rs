@@ -62,6 +62,9 @@ pub enum Error {
     /// A field of the request cannot be read.
     #[error("{}", .0.message)]
     Unreadable(Box<FieldError>),
+    /// The body is of a media type that is not accepted.
+    #[error("{0}")]
+    UnsupportedMediaType(String),
     /// The request can be read, but a field is not acceptable.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),
@@ -100,6 +103,9 @@ pub enum Error {
     /// The record.
     #[error(transparent)]
     Store(StoreError),
+    /// What a command has to say cannot be written.
+    #[error("cannot write to stdout: {0}")]
+    Output(std::io::Error),
     /// A fault of the program.
     #[error("internal: {0}")]
     Internal(String),
@@ -118,7 +124,7 @@ impl Error {
 
     /// Whether the request is at fault, and not the program or the machine.
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Store(_) | Self::Dispatch(_) | Self::Internal(_))
+        !matches!(self, Self::Store(_) | Self::Dispatch(_) | Self::Output(_) | Self::Internal(_))
     }
 }
 

@@ -2,6 +2,8 @@
 //!
 //! Arrows point down: [`cli`] -> `http` -> [`access`], [`studies`] -> [`workers`], [`store`].
 
+// What a command says goes through `cli::output`, which knows readers that went away and disks that are full.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod access;

@@ -9,7 +9,9 @@ use gaitwright::access::tokens::{self, NewToken};
 use gaitwright::access::{Right, Role, sign_in};
 use gaitwright::http::Access;
 use gaitwright::store::audit::Actor;
-use gaitwright::store::{UserId, commit};
+use gaitwright::store::members::{Member, MemberKind};
+use gaitwright::store::{StudyId, UserId, commit};
+use gaitwright::studies::membership::{self, NewMember};
 use std::sync::Arc;
 use tempfile::TempDir;
 
@@ -61,6 +63,24 @@ pub async fn token(service: &Service, scopes: &[Right]) -> As {
     let (_, secret) = tokens::make(&mut writer, &Actor::program(), &new).await.unwrap();
     commit(writer).await.unwrap();
     As::Token(secret)
+}
+
+/// Makes a user or a token a member of a study.
+pub async fn member(service: &Service, study: StudyId, kind: MemberKind, name: &str) -> Member {
+    let mut writer = service.store.write().await.unwrap();
+    let new = NewMember { kind, name: name.to_owned() };
+    let member = membership::add(&mut writer, &Actor::program(), study, &new).await.unwrap();
+    commit(writer).await.unwrap();
+    member
+}
+
+/// A rater who is assigned to these studies, signed in.
+pub async fn rater_of(service: &Service, studies: &[StudyId]) -> As {
+    let rater = signed_in(service, Role::Rater).await;
+    for study in studies {
+        member(service, *study, MemberKind::User, "a rater").await;
+    }
+    rater
 }
 
 /// Sends a request as somebody.

@@ -9,6 +9,7 @@ pub mod broker;
 pub mod callers;
 pub mod cli;
 pub mod client;
+pub mod every_table;
 pub mod examined;
 pub mod explained;
 pub mod large;

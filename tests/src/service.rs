@@ -4,7 +4,8 @@ use crate::examined::{Verdicts, certificate};
 use crate::explained::Clearance;
 use axum::Router;
 use axum::body::Body;
-use axum::http::{HeaderMap, Method, Request, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Method, Request, Response, StatusCode, header};
+use axum::middleware::map_request;
 use gait_optimizer::Gait;
 use gaitwright::http::{Access, AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
@@ -52,6 +53,13 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// What a response has.
+    pub async fn of(response: Response<Body>) -> Self {
+        let (status, headers) = (response.status(), response.headers().clone());
+        let bytes = response.into_body().collect().await.unwrap().to_bytes();
+        Self { status, headers, text: String::from_utf8(bytes.to_vec()).unwrap() }
+    }
+
     /// The body as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.text).unwrap_or_else(|e| panic!("not JSON ({e}): {}", self.text))
@@ -213,10 +221,15 @@ impl Service {
         panic!("the study did not reach {ended} trials");
     }
 
-    /// The router.
-    pub fn router(&self) -> Router {
+    /// What handlers can reach.
+    pub fn state(&self) -> AppState {
         let hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &[]);
-        router(AppState::new(self.director.clone(), Arc::clone(&self.access), hosts))
+        AppState::new(self.director.clone(), Arc::clone(&self.access), hosts)
+    }
+
+    /// The router; a request without a Host header is one for localhost.
+    pub fn router(&self) -> Router {
+        router(self.state()).layer(map_request(for_localhost))
     }
 
     /// `GET`.
@@ -247,10 +260,7 @@ impl Service {
 
     /// Any request.
     pub async fn send(&self, request: Request<Body>) -> Answer {
-        let response = self.router().oneshot(request).await.unwrap();
-        let (status, headers) = (response.status(), response.headers().clone());
-        let bytes = response.into_body().collect().await.unwrap().to_bytes();
-        Answer { status, headers, text: String::from_utf8(bytes.to_vec()).unwrap() }
+        Answer::of(self.router().oneshot(request).await.unwrap()).await
     }
 }
 
@@ -271,6 +281,12 @@ async fn pass_every_gait(store: &Store) -> bool {
         certificates::keep(&mut writer, *trial, &certificate(true)).await.unwrap();
     }
     commit(writer).await.is_ok()
+}
+
+/// A request with a Host header.
+pub async fn for_localhost<B>(mut request: Request<B>) -> Request<B> {
+    request.headers_mut().entry(header::HOST).or_insert(HeaderValue::from_static("localhost"));
+    request
 }
 
 /// A record with what every service begins with.

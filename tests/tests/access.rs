@@ -9,8 +9,9 @@ use gaitwright::access::{Right, Role, people, secret};
 use gaitwright::http::{Access, openapi};
 use gaitwright::store::audit::{self, Actor};
 use gaitwright::store::commit;
+use gaitwright::store::members::MemberKind;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright_tests::callers::{As, FORM, send, service, session_of, signed_in, token, user};
+use gaitwright_tests::callers::{As, FORM, member, send, service, session_of, signed_in, token, user};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -66,7 +67,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 62] = [
+const PAGES: [(&str, Option<Right>); 66] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -80,6 +81,8 @@ const PAGES: [(&str, Option<Right>); 62] = [
     ("get /studies/{id}/compare", Some(Right::Read)),
     ("post /studies/{id}/compare", Some(Right::Answer)),
     ("post /studies/{id}/retract", Some(Right::Answer)),
+    ("get /studies/{id}/members", Some(Right::Read)),
+    ("post /studies/{id}/members", Some(Right::Run)),
     ("get /subjects", Some(Right::Read)),
     ("post /subjects", Some(Right::Run)),
     ("get /subjects/{id}", Some(Right::Read)),
@@ -122,6 +125,8 @@ const PAGES: [(&str, Option<Right>); 62] = [
     ("get /system", Some(Right::Read)),
     ("post /system/backup", Some(Right::Administer)),
     ("get /glossary", None),
+    ("get /problems", None),
+    ("get /problems/{name}", None),
     ("get /api", None),
     ("get /sign-in", None),
     ("post /sign-in", None),
@@ -187,6 +192,7 @@ async fn what_is_sent_after_the_session_has_ended_is_not_stored_and_not_lost() {
     let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 3)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, _) = user(&service, "R1", Role::Rater).await;
+    member(&service, study, MemberKind::User, "R1").await;
     let mut writer = service.store.write().await.unwrap();
     let hashed = secret::hash_password("correct horse battery").unwrap();
     people::set_password(&mut writer, &Actor::program(), rater, &hashed).await.unwrap();

@@ -6,18 +6,19 @@
 use axum::http::{HeaderMap, Method, StatusCode};
 use gaitwright::access::{Right, Role};
 use gaitwright::http::openapi;
+use gaitwright::store::members::MemberKind;
 use gaitwright::store::presentations::{self, Kind, Presentation};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
 use gaitwright::store::{StudyId, studies};
-use gaitwright_tests::callers::{As, FORM, send, service, signed_in, token};
+use gaitwright_tests::callers::{As, FORM, member, rater_of, send, service, signed_in, token};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 const JSON: &str = "application/json";
 /// Headers that any answer of the service may carry. Anything else must be looked at: it may name something.
-const HEADERS: [&str; 16] = [
+const HEADERS: [&str; 17] = [
     "allow",
     "cache-control",
     "content-length",
@@ -34,6 +35,7 @@ const HEADERS: [&str; 16] = [
     "www-authenticate",
     "x-content-type-options",
     "x-frame-options",
+    "x-request-id",
 ];
 
 async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
@@ -102,8 +104,9 @@ async fn whatever_a_rater_asks_for_says_nothing_of_what_is_rated() {
         service.trials(automatic).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();
     let plan = json!({"gait_one": gaits[0].id, "gait_two": gaits[1].id, "notes": "treadmill"});
     let session = post(&service, &clinician, &format!("/api/v1/studies/{automatic}/lab-sessions"), &plan).await.json();
-    let rater = signed_in(&service, Role::Rater).await;
+    let rater = rater_of(&service, &[automatic, study]).await;
     let program = token(&service, &[Right::Rate]).await;
+    member(&service, study, MemberKind::Token, "[Rate]").await;
     // Another rater's pair, which this one must not see.
     let other = post(&service, &program, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
     let own = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
@@ -173,10 +176,10 @@ fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, St
     (answer.status, text, named(&answer.headers))
 }
 
-/// Headers but the length of the body, which follows from the motion.
+/// Headers but the length of the body, which follows from the motion, and the identifier of the request.
 fn named(headers: &HeaderMap) -> Vec<(String, String)> {
     let token = |value: &str| value.split("saved=").next().unwrap_or_default().to_owned();
-    let kept = headers.iter().filter(|(name, _)| name.as_str() != "content-length");
+    let kept = headers.iter().filter(|(name, _)| !["content-length", "x-request-id"].contains(&name.as_str()));
     kept.map(|(name, value)| (name.to_string(), token(value.to_str().unwrap()))).collect()
 }
 
@@ -184,7 +187,7 @@ fn named(headers: &HeaderMap) -> Vec<(String, String)> {
 async fn a_control_looks_like_a_question_even_where_others_answer_the_same() {
     let (_folder, service) = service().await;
     let study = waiting(&service, 40).await;
-    let (rater, clinician) = (signed_in(&service, Role::Rater).await, signed_in(&service, Role::Clinician).await);
+    let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);
     let mut looks = BTreeSet::new();
     let mut kinds = Vec::new();
     for turn in 0..4000 {
@@ -247,7 +250,7 @@ async fn answer_too(service: &Service, clinician: &As, study: StudyId, shown: &P
 async fn taking_back_what_somebody_else_took_back_is_no_matter_of_its_kind() {
     let (_folder, service) = service().await;
     let study = waiting(&service, 6).await;
-    let (rater, clinician) = (signed_in(&service, Role::Rater).await, signed_in(&service, Role::Clinician).await);
+    let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);
     let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
     let token = pair["pair"]["token"].as_str().unwrap().to_owned();
     post(&service, &rater, &format!("/api/v1/blind/{token}/answer"), &json!({"answer": "first"})).await;

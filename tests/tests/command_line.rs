@@ -276,3 +276,44 @@ fn settings_of_the_solver_are_refused_with_field_value_and_range() {
     refused(&["solve", "--problem", "p.json", "--solver-settings", "s.json"], "--solver-settings");
     refused(&["solve", "--solver-settings", "nowhere.json"], "cannot read nowhere.json");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn full_device_ends_printing_commands_with_a_message_and_code_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let full = || std::fs::File::options().write(true).open("/dev/full").unwrap();
+    for arguments in [&["openapi"][..], &["config", "show"]] {
+        let output = cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), arguments)
+            .stdout(full())
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+        assert!(text.starts_with("gaitwright: cannot write to stdout: ") && text.lines().count() == 1, "{text}");
+    }
+    // Without a place for words either, the code is all that is left.
+    let output = cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &["openapi"])
+        .stdout(full())
+        .stderr(full())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let refused = cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &["certify", "none.json"])
+        .stderr(full())
+        .output()
+        .unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn reader_that_goes_away_early_is_no_fault() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [&["openapi"][..], &["config", "show"]] {
+        let mut command = cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), arguments);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && text.is_empty(), "{arguments:?}: {text}");
+    }
+}

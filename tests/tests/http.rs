@@ -94,7 +94,8 @@ async fn subjects_are_made_listed_and_refused() {
     let answer = service.post_text("/api/v1/subjects", "application/json", "{\"pseudonym\": ").await;
     is_problem(&answer, StatusCode::BAD_REQUEST, "/problems/malformed", "EOF");
     let answer = service.post_text("/api/v1/subjects", "text/plain", "{}").await;
-    is_problem(&answer, StatusCode::BAD_REQUEST, "/problems/malformed", "application/json");
+    let (unsupported, kind) = (StatusCode::UNSUPPORTED_MEDIA_TYPE, "/problems/unsupported-media-type");
+    is_problem(&answer, unsupported, kind, "application/json");
     assert_eq!(service.fetch("/api/v1/subjects").await.json().as_array().unwrap().len(), 3, "nothing changed");
     service.stop().await;
 }

@@ -6,6 +6,7 @@
 use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, ReferenceGait, SolveOptions, Subject, TunedBounds,
 };
+use gaitwright::access::Reach;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
 use gaitwright::store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
@@ -301,7 +302,7 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
     let mut ours = None;
     until("a study of its own", async || {
         let mut reader = pool.acquire().await.unwrap();
-        let all = studies::page(&mut reader, None, 10).await.unwrap();
+        let all = studies::page(&mut reader, Reach::Every, None, 10).await.unwrap();
         ours = all.into_iter().map(|study| study.id).find(|id| !of_others.contains(id));
         match ours {
             Some(id) => !trials::of_study(&mut reader, id).await.unwrap().is_empty(),

@@ -3,11 +3,15 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::body::Body;
-use axum::http::{Request, StatusCode, header};
-use gaitwright::http::openapi;
+use axum::extract::Path;
+use axum::http::{Request, StatusCode, Version, header};
+use axum::middleware::map_request;
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use gaitwright::http::{openapi, router, with_layers};
 use gaitwright::store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::service::{Answer, Service, for_localhost};
 use http_body_util::BodyExt;
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -118,4 +122,111 @@ fn the_answers_of_raters_are_described_as_they_are_taken() {
     let name = answer.as_str().unwrap().rsplit('/').next().unwrap();
     let words = document["components"]["schemas"][name]["enum"].as_array().unwrap();
     assert!(words.contains(&json!("cannot_tell")) && words.contains(&json!("unsafe_first")), "{words:?}");
+}
+
+/// Every refusal and failure, whatever makes it: a problem document with the identifier that the header has.
+fn is_complete_problem(answer: &Answer, status: u16, kind: &str) {
+    assert_eq!(
+        (answer.status.as_u16(), answer.content_type()),
+        (status, "application/problem+json"),
+        "{}",
+        answer.text
+    );
+    let problem = answer.json();
+    assert_eq!((&problem["type"], &problem["status"]), (&json!(kind), &json!(status)), "{problem}");
+    assert_eq!(problem["request_id"], answer.headers["x-request-id"].to_str().unwrap(), "{problem}");
+    assert!(!problem["title"].as_str().unwrap().is_empty() && !problem["detail"].as_str().unwrap().is_empty());
+}
+
+#[tokio::test]
+async fn timeouts_panics_and_bare_statuses_are_problem_documents() {
+    let (_folder, service) = service().await;
+    let mut state = service.state();
+    state.slowest_answer = Duration::from_millis(50);
+    let slow = async || tokio::time::sleep(Duration::from_secs(600)).await;
+    let panics = async || -> () { panic!("a handler that fails") };
+    let routes = Router::new()
+        .route("/api/slow", get(slow))
+        .route("/api/panics", get(panics))
+        .route("/panics", get(panics))
+        .route("/api/bare/{status}", get(async |Path(status): Path<u16>| StatusCode::from_u16(status).unwrap()))
+        .route("/api/rejected", post(async |Json(_): Json<Value>| ()));
+    let router = with_layers(routes, state).layer(map_request(for_localhost));
+    let send = async |request: Request<Body>| Answer::of(router.clone().oneshot(request).await.unwrap()).await;
+    let fetch = |path: &str| send(Request::get(path).body(Body::empty()).unwrap());
+
+    is_complete_problem(&fetch("/api/slow").await, 503, "/problems/timed-out");
+    is_complete_problem(&fetch("/api/panics").await, 500, "/problems/internal");
+    is_complete_problem(&fetch("/api/rejected").await, 405, "/problems/method-not-allowed");
+    is_complete_problem(&fetch("/api/bare/x").await, 400, "/problems/malformed");
+    for (status, kind) in [(404, "not-found"), (413, "too-large"), (418, "malformed"), (502, "internal")] {
+        is_complete_problem(&fetch(&format!("/api/bare/{status}")).await, status, &format!("/problems/{kind}"));
+    }
+    let rejected = |kind: &'static str| {
+        send(Request::post("/api/rejected").header(header::CONTENT_TYPE, kind).body(Body::from("{")).unwrap())
+    };
+    is_complete_problem(&rejected("text/plain").await, 415, "/problems/unsupported-media-type");
+    is_complete_problem(&rejected("application/json").await, 400, "/problems/malformed");
+    let page = fetch("/panics").await;
+    let id = page.headers["x-request-id"].to_str().unwrap();
+    assert!(page.status.as_u16() == 500 && page.text.contains("<h1>") && page.text.contains(id), "{}", page.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn every_refusal_of_the_service_names_its_request_and_every_problem_type_has_a_page() {
+    let (_folder, service) = service().await;
+    for (answer, status, kind) in [
+        (service.fetch("/api/v1/nothing").await, 404, "/problems/not-found"),
+        (service.fetch("/static/%ff").await, 400, "/problems/malformed"),
+        (service.post("/health", &json!({})).await, 405, "/problems/method-not-allowed"),
+        (service.post_text("/api/v1/subjects", "text/plain", "{}").await, 415, "/problems/unsupported-media-type"),
+        (service.post_text("/api/v1/subjects", "application/json", "{").await, 400, "/problems/malformed"),
+        (
+            service.post_text("/api/v1/subjects", "application/json", &"x".repeat(2 << 20)).await,
+            413,
+            "/problems/too-large",
+        ),
+    ] {
+        is_complete_problem(&answer, status, kind);
+        let page = service.fetch(kind).await;
+        assert!(page.status == StatusCode::OK && page.text.contains(kind), "{kind}: {}", page.text);
+    }
+    assert_ne!(
+        service.fetch("/health").await.headers["x-request-id"],
+        service.fetch("/health").await.headers["x-request-id"]
+    );
+    let all = service.fetch("/problems").await.text;
+    let listed: Vec<&str> =
+        all.split("href=\"/problems/").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+    assert!(listed.len() > 12, "{listed:?}");
+    for name in listed {
+        let page = service.fetch(&format!("/problems/{name}")).await;
+        assert!(page.status == StatusCode::OK && page.text.contains("HTTP status"), "{name}");
+    }
+    assert_eq!(service.fetch("/problems/nothing").await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_request_without_exactly_one_host_is_refused() {
+    let (_folder, service) = service().await;
+    let router = router(service.state());
+    let status = async |hosts: &[&str], version: Version, uri: &str| {
+        let mut request = Request::get(uri).version(version);
+        for host in hosts {
+            request = request.header(header::HOST, *host);
+        }
+        router.clone().oneshot(request.body(Body::empty()).unwrap()).await.unwrap().status().as_u16()
+    };
+    let (path, new, old) = ("/health", Version::HTTP_11, Version::HTTP_10);
+    assert_eq!(status(&["localhost"], new, path).await, 200);
+    assert_eq!(status(&[], old, path).await, 200);
+    assert_eq!(status(&[], new, path).await, 400);
+    assert_eq!(status(&["localhost", "localhost"], new, path).await, 400);
+    assert_eq!(status(&["localhost", "evil.example"], old, path).await, 400);
+    assert_eq!(status(&["evil.example"], old, path).await, 403);
+    assert_eq!(status(&["localhost"], new, "http://evil.example/health").await, 400);
+    assert_eq!(status(&["localhost"], new, "http://localhost/health").await, 200);
+    service.stop().await;
 }

@@ -8,6 +8,7 @@ use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// A service as a process, killed when dropped.
@@ -15,6 +16,8 @@ struct Process {
     child: Child,
     /// What it said until it was ready.
     said: Vec<String>,
+    /// What it says from then on.
+    later: Option<JoinHandle<Vec<String>>>,
     origin: String,
 }
 
@@ -33,14 +36,20 @@ impl Process {
             said.push(lines.next().expect("it ended before it was ready").unwrap());
         }
         // Whatever it says later must not fill the pipe.
-        std::thread::spawn(move || lines.for_each(drop));
+        let later = std::thread::spawn(move || lines.map_while(Result::ok).collect());
         let listening = said.iter().find(|line| line.contains("listening on ")).unwrap();
         let origin = listening.split("listening on ").nth(1).unwrap().split_whitespace().next().unwrap().to_owned();
-        Self { child, said, origin }
+        Self { child, said, later: Some(later), origin }
     }
 
     fn address(&self) -> &str {
         self.origin.split("://").nth(1).unwrap()
+    }
+
+    /// Ends it: everything that it said after it was ready.
+    fn end(mut self) -> Vec<String> {
+        self.child.kill().unwrap();
+        self.later.take().unwrap().join().unwrap()
     }
 }
 
@@ -65,6 +74,23 @@ fn the_first_start_prints_a_link_that_signs_in_once() {
     assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
     let second = send(process.address(), "POST", &path, "").unwrap();
     assert!(!second.head.to_lowercase().contains("set-cookie"), "{}", second.head);
+}
+
+#[test]
+fn one_time_links_do_not_appear_in_trace_logs() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "log = \"trace\"\n").unwrap();
+    let process = Process::start(folder.path(), &[], "sign in");
+    let path = process.said.last().unwrap().split(process.address()).nth(1).unwrap().to_owned();
+    let secret = path.rsplit('/').next().unwrap().to_owned();
+    assert_eq!(get(process.address(), &path).unwrap().status, 200);
+    let first = send(process.address(), "POST", &path, "").unwrap();
+    let session = first.head.split("gaitwright_session=").nth(1).unwrap().split(';').next().unwrap().to_owned();
+    let said = process.end();
+    assert!(said.iter().any(|line| line.contains("/sign-in/{link}")), "{said:?}");
+    for secret in [secret, session] {
+        assert!(secret.len() == 64 && !said.iter().any(|line| line.contains(&secret)), "{said:?}");
+    }
 }
 
 #[test]

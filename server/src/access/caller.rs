@@ -1,9 +1,10 @@
 //! Who makes a request.
 
+use super::reach::{Principal, Reach};
 use super::right::{Right, Rights, Role};
-use crate::store::UserId;
 use crate::store::audit::Actor;
 use crate::store::feedback::Source;
+use crate::store::{TokenId, UserId};
 
 /// Who makes a request, and what they may do.
 #[derive(Debug, Clone)]
@@ -17,12 +18,19 @@ pub struct Caller {
     /// The role of the user.
     pub role: Option<Role>,
     rights: Rights,
+    reach: Reach,
 }
 
 impl Caller {
     /// A person who signed in.
     pub fn person(id: UserId, name: &str, role: Role) -> Self {
+        let principal = Principal::User(id);
         Self {
+            reach: match role {
+                Role::Admin => Reach::Every,
+                Role::Clinician => Reach::Open(principal),
+                Role::Rater => Reach::Assigned(principal),
+            },
             actor: Actor::named(&format!("{} {name}", role.as_str())),
             name: name.to_owned(),
             user: Some(id),
@@ -31,9 +39,12 @@ impl Caller {
         }
     }
 
-    /// A program with a token.
-    pub fn token(name: &str, scopes: &[Right]) -> Self {
+    /// A program with a token. One that may compare gaits blindly and nothing else is a rater.
+    pub fn token(id: TokenId, name: &str, scopes: &[Right]) -> Self {
+        let principal = Principal::Token(id);
+        let rates_only = scopes.iter().all(|scope| *scope == Right::Rate);
         Self {
+            reach: if rates_only { Reach::Assigned(principal) } else { Reach::Open(principal) },
             actor: Actor::named(&format!("token {name}")),
             name: name.to_owned(),
             user: None,
@@ -45,12 +56,24 @@ impl Caller {
     /// Whoever reaches a service that asks nobody to sign in.
     pub fn without_sign_in() -> Self {
         let actor = Actor::anonymous();
-        Self { name: actor.as_str().to_owned(), actor, user: None, role: None, rights: Rights::all() }
+        Self {
+            name: actor.as_str().to_owned(),
+            actor,
+            user: None,
+            role: None,
+            rights: Rights::all(),
+            reach: Reach::Every,
+        }
     }
 
     /// Whether it may.
     pub fn may(&self, right: Right) -> bool {
         self.rights.has(right)
+    }
+
+    /// Which studies it reaches.
+    pub fn reach(&self) -> Reach {
+        self.reach
     }
 
     /// Whether the name is known: then it, and not what a form says, is the author of what is said.

@@ -6,6 +6,7 @@
 mod back_off;
 mod caller;
 pub mod people;
+mod reach;
 mod right;
 pub mod secret;
 pub mod sign_in;
@@ -13,4 +14,5 @@ pub mod tokens;
 
 pub use back_off::BackOff;
 pub use caller::Caller;
+pub use reach::{Principal, Reach};
 pub use right::{Administer, Answer, Permission, Rate, Read, Right, Rights, Role, Run};

@@ -143,5 +143,5 @@ pub async fn seen(writer: &mut Writer, session: &str) -> Result<(), Error> {
 /// What the database reports.
 pub async fn of_token(db: &mut Connection, token: &str) -> Result<Option<Caller>, Error> {
     let found = tokens::by_hash(db, &secret::hash(token)).await?;
-    Ok(found.map(|token| Caller::token(&token.name, &token.scopes)))
+    Ok(found.map(|token| Caller::token(token.id, &token.name, &token.scopes)))
 }

@@ -1,6 +1,7 @@
 //! Configuration of the service: flags, then environment, then file, then defaults; each value knows where it is from.
 
 use super::numbers::workers;
+use super::output::data;
 use crate::error::Error;
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -302,7 +303,8 @@ impl Config {
         let settings = Settings::read(&flags)?;
         for (name, _, meaning) in KNOWN {
             let origin = settings.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
-            println!("{name} = {:?}  # {origin}; {meaning}", without_password(settings.text(name)));
+            let value = without_password(settings.text(name));
+            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use super::output::tell;
 use crate::error::Error;
+use std::io::IsTerminal;
 use tracing_subscriber::EnvFilter;
 
 /// Begins to log.
@@ -15,7 +16,14 @@ pub(super) fn start(filter: EnvFilter, json: bool) -> Result<(), Error> {
         })?,
         Err(_) => filter,
     };
-    let builder = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // A file or a pipe gets no colours; https://no-color.org lets people do without them, too.
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colours)
+        // It would be said on stderr, which cannot be written then.
+        .log_internal_errors(false);
     let started = if json { builder.json().try_init() } else { builder.with_target(false).try_init() };
     if let Err(error) = started {
         tell(&format!("gaitwright: no logs: {error}"));

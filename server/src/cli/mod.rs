@@ -27,7 +27,7 @@ use crate::error::Error;
 use crate::http::openapi;
 use clap::{Parser, Subcommand};
 use config::{Flags, Settings, unknown_variables};
-use output::tell;
+use output::{data, tell};
 use std::process::ExitCode;
 
 /// Exit code when the input is at fault, as with every usage error.
@@ -131,10 +131,10 @@ pub fn run() -> ExitCode {
         Command::Convert(convert) => convert.run().map(|()| Ended::Done),
         Command::Audit(audit) => runtime.block_on(audit.run()).map(|()| Ended::Done),
         Command::Config(config) => config.run().map(|()| Ended::Done),
-        Command::Openapi => openapi::text().map_err(|e| Error::Internal(e.to_string())).map(|text| {
-            print!("{text}");
-            Ended::Done
-        }),
+        Command::Openapi => {
+            let text = openapi::text().map_err(|e| Error::Internal(e.to_string()));
+            text.and_then(|text| data(text.trim_end())).map(|()| Ended::Done)
+        }
         Command::Backup(backup) => runtime.block_on(backup.run()).map(|()| Ended::Done),
         Command::Restore(restore) => runtime.block_on(restore.run()).map(|()| Ended::Done),
         Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),

@@ -1,6 +1,7 @@
 //! `gaitwright serve`.
 
 use super::config::{Flags, Settings};
+use super::output::tell;
 use crate::access::people;
 use crate::error::Error;
 use crate::http::{Access, AppState, Hosts, router};
@@ -92,7 +93,7 @@ impl Serve {
         });
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if let Some(secret) = link {
-            eprintln!("sign in (once, within a day): {origin}/sign-in/{secret}");
+            tell(&format!("sign in (once, within a day): {origin}/sign-in/{secret}"));
         }
 
         // Streams end when the director stops, so that the drain is not held up by them.
@@ -105,7 +106,7 @@ impl Serve {
                 handle.graceful_shutdown(Some(DRAIN));
             }
         });
-        let service = app.into_make_service();
+        let service = app.into_make_service_with_connect_info::<SocketAddr>();
         let served = if let Some(config) = tls {
             let server = axum_server::from_tcp_rustls(listener, config).map_err(cannot_listen)?;
             let mut server = server.handle(handle).http1_only();

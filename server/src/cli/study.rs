@@ -1,5 +1,6 @@
 //! `gaitwright export` and `gaitwright import`: a whole study as one file. `gaitwright prune`: retention.
 
+use super::output::data;
 use super::record::exists;
 use crate::error::Error;
 use crate::store::archive::Archive;
@@ -37,8 +38,7 @@ impl Export {
         let cannot = |e: std::io::Error| Error::Malformed(format!("cannot write {}: {e}", self.to.display()));
         let mut file = std::fs::File::create_new(&self.to).map_err(cannot)?;
         std::io::Write::write_all(&mut file, &bytes).and_then(|()| file.sync_all()).map_err(cannot)?;
-        println!("{}", self.to.display());
-        Ok(())
+        data(&self.to.display().to_string())
     }
 }
 
@@ -60,8 +60,7 @@ impl Import {
         let store = Store::open(&self.database).await?;
         let done = import(&store, &archive).await;
         store.close().await;
-        println!("{}", done?);
-        Ok(())
+        data(&done?.to_string())
     }
 }
 
@@ -106,8 +105,7 @@ impl Prune {
         let store = Store::open(&self.database).await?;
         let done = prune(&store, self.older_than_days).await;
         store.close().await;
-        println!("{} trajectories dropped", done?);
-        Ok(())
+        data(&format!("{} trajectories dropped", done?))
     }
 }
 

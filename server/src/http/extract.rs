@@ -3,12 +3,10 @@
 use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::document;
 use crate::error::Error;
-use axum::extract::{FromRequest, FromRequestParts, Query, RawPathParams, Request};
+use axum::extract::{FromRequest, FromRequestParts, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
-use std::fmt::Display;
-use std::str::FromStr;
 
 /// Reads a JSON body, naming the field that cannot be read.
 pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
@@ -17,7 +15,7 @@ pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Re
     let bytes = if absent { b"{}" } else { bytes };
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("");
     if !absent && !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
-        return Err(Error::Malformed(format!("content type {kind:?}: this needs application/json")));
+        return Err(Error::UnsupportedMediaType(format!("content type {kind:?}: this needs application/json")));
     }
     document::read(bytes)
 }
@@ -28,28 +26,10 @@ pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
         Error::TooLarge(format!(
             "the body is larger than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} where a recording is uploaded)"
         ))
+    } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
+        Error::UnsupportedMediaType(reason.to_owned())
     } else {
         Error::Malformed(format!("the body cannot be read: {reason}"))
-    }
-}
-
-/// The identifier in the path: `{id}`.
-#[derive(Debug)]
-pub(crate) struct Id<T>(pub(crate) T);
-
-impl<T, S> FromRequestParts<S> for Id<T>
-where
-    T: FromStr,
-    T::Err: Display,
-    S: Send + Sync,
-{
-    type Rejection = Error;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Error> {
-        let named =
-            RawPathParams::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
-        let text = named.iter().find(|(name, _)| *name == "id").map_or("", |(_, text)| text).to_owned();
-        text.parse().map(Self).map_err(|_| Error::NotFound { what: "an identifier like".to_owned(), id: text })
     }
 }
 

@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use axum::extract::{Request, State};
-use axum::http::header;
+use axum::http::{Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use std::net::{IpAddr, SocketAddr};
@@ -41,15 +41,33 @@ fn address_in(host: &str) -> Option<IpAddr> {
     bare.parse().ok().or_else(|| host.parse().ok().map(|address: SocketAddr| address.ip()))
 }
 
-/// Refuses a request for another name.
+/// Refuses a request for another name, and one that does not say clearly which name it means.
 pub(super) async fn check(State(hosts): State<Hosts>, request: Request, next: Next) -> Result<Response, Error> {
-    let host = request.headers().get(header::HOST).map(|value| value.to_str().unwrap_or_default());
-    match host {
+    match named(&request)? {
         Some(host) if !hosts.answers_to(host) => {
             let reason = format!("this service does not answer to the name {host:?}; `serve --host-name` makes it");
             Err(Error::Forbidden(reason))
         }
         _ => Ok(next.run(request).await),
+    }
+}
+
+/// The one name in a request. HTTP/1.1 demands exactly one Host header: with two, or with another name in the request
+/// line, a proxy and this service could mean different ones. HTTP/1.0 knows requests without a name.
+fn named(request: &Request) -> Result<Option<&str>, Error> {
+    let malformed = |reason: &str| Err(Error::Malformed(format!("Host header: {reason}")));
+    let mut all = request.headers().get_all(header::HOST).iter();
+    let (first, second) = (all.next(), all.next());
+    if second.is_some() {
+        return malformed("given more than once; exactly one is accepted");
+    }
+    let Some(first) = first else {
+        return if request.version() < Version::HTTP_11 { Ok(None) } else { malformed("it must be there") };
+    };
+    let Ok(host) = first.to_str() else { return malformed("it has characters that no name has") };
+    match request.uri().authority() {
+        Some(other) if !other.as_str().eq_ignore_ascii_case(host) => malformed("the request line names another host"),
+        _ => Ok(Some(host)),
     }
 }
 

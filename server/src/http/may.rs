@@ -25,6 +25,15 @@ pub(crate) struct Refused {
     for_program: bool,
 }
 
+impl Refused {
+    /// The refusal of this request.
+    pub(crate) fn of(parts: &Parts, error: Error) -> Self {
+        // Nested routers see the rest of the path alone.
+        let whole = parts.extensions.get::<OriginalUri>().map_or(&parts.uri, |original| &original.0);
+        Self { error, for_program: is_for_programs(whole.path()) }
+    }
+}
+
 impl IntoResponse for Refused {
     fn into_response(self) -> Response {
         if self.for_program { self.error.into_response() } else { PageError::from(self.error).into_response() }
@@ -44,10 +53,7 @@ impl<P: Permission, S: Send + Sync> FromRequestParts<S> for May<P> {
     type Rejection = Refused;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refused> {
-        // Nested routers see the rest of the path alone.
-        let whole = parts.extensions.get::<OriginalUri>().map_or(&parts.uri, |original| &original.0);
-        let for_program = is_for_programs(whole.path());
-        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused { error, for_program })?;
+        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused::of(parts, error))?;
         Ok(Self { caller, right: PhantomData })
     }
 }

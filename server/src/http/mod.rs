@@ -1,7 +1,9 @@
 //! The HTTP face: REST under `/api/v1`, pages for people, static files.
 
+mod answers;
 pub mod api;
 mod blind_motion;
+mod client_address;
 mod extract;
 mod host;
 mod identify;
@@ -13,6 +15,8 @@ pub mod openapi;
 pub mod pages;
 mod pages_of;
 mod problem;
+mod problem_kinds;
+mod reached;
 mod revision;
 mod router;
 mod same_origin;
@@ -20,8 +24,9 @@ mod shown;
 mod state;
 mod static_files;
 
+pub use client_address::ClientAddress;
 pub use host::Hosts;
-pub use router::router;
+pub use router::{router, with_layers};
 pub use state::{Access, AppState};
 
 /// Largest request body.

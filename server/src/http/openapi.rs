@@ -69,7 +69,7 @@ fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
         problems.push(("403", "Not allowed"));
     }
     if names_something || changes {
-        problems.push(("404", "There is no such thing"));
+        problems.push(("404", "Not found"));
     }
     if changes || operation.parameters.is_some() {
         problems.push(("409", "Not possible in the present state"));
@@ -77,6 +77,7 @@ fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
     if changes {
         problems.push(("412", "It was changed since it was read"));
         problems.push(("413", "The body is too large"));
+        problems.push(("415", "The media type of the body is not accepted"));
     }
     if changes || operation.parameters.is_some() {
         problems.push(("422", "A field is not acceptable"));

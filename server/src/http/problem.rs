@@ -1,5 +1,6 @@
 //! Problem documents (RFC 9457): the one table from errors to answers.
 
+use super::problem_kinds::Kind;
 use crate::error::{Error, FieldError};
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -14,7 +15,7 @@ pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 /// A problem document.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub(super) struct Problem {
-    /// What kind of problem: stable, for programs.
+    /// What kind of problem: stable, for programs. The address serves a page that explains the kind.
     #[serde(rename = "type")]
     pub(super) kind: &'static str,
     /// The kind in words.
@@ -32,11 +33,24 @@ pub(super) struct Problem {
     /// What would have been accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) allowed: Option<String>,
+    /// The request, as in the `X-Request-Id` header and in the log.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) request_id: Option<String>,
 }
 
 impl Problem {
-    fn new(status: StatusCode, kind: &'static str, title: &'static str, detail: String) -> Self {
-        Self { kind, title, status: status.as_u16(), detail, field: None, value: None, allowed: None }
+    /// A problem of a kind.
+    pub(super) fn new(kind: Kind, detail: String) -> Self {
+        let entry = kind.entry();
+        let (field, value, allowed, request_id) = (None, None, None, None);
+        let (kind, title, status) = (entry.uri, entry.title, entry.status.as_u16());
+        Self { kind, title, status, detail, field, value, allowed, request_id }
+    }
+
+    /// What an answer says that has no more than a status.
+    pub(super) fn of_status(status: StatusCode) -> Self {
+        let kind = Kind::of_status(status);
+        Self { status: status.as_u16(), ..Self::new(kind, kind.entry().meaning.to_owned()) }
     }
 
     fn of(self, field: &FieldError) -> Self {
@@ -54,60 +68,22 @@ impl From<&Error> for Problem {
     fn from(error: &Error) -> Self {
         let detail = error.to_string();
         match error {
-            Error::NotFound { .. } => {
-                Self::new(StatusCode::NOT_FOUND, "/problems/not-found", "There is no such thing", detail)
+            Error::NotFound { .. } => Self::new(Kind::NotFound, detail),
+            Error::Malformed(_) => Self::new(Kind::Malformed, detail),
+            Error::Unreadable(field) => Self::new(Kind::Malformed, detail).of(field),
+            Error::UnsupportedMediaType(_) => Self::new(Kind::UnsupportedMediaType, detail),
+            Error::Invalid(field) => Self::new(Kind::InvalidField, detail).of(field),
+            Error::NotSignedIn(_) => Self::new(Kind::NotSignedIn, detail),
+            Error::TooManyAttempts(_) => Self::new(Kind::TooManyAttempts, detail),
+            Error::Changed(_) => Self::new(Kind::Changed, detail),
+            Error::TooLarge(_) => Self::new(Kind::TooLarge, detail),
+            Error::MethodNotAllowed { .. } => Self::new(Kind::MethodNotAllowed, detail),
+            Error::Forbidden(_) => Self::new(Kind::Forbidden, detail),
+            Error::Conflict(_) => Self::new(Kind::Conflict, detail),
+            Error::Learner(_) => Self::new(Kind::Learner, detail),
+            Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => {
+                Self::new(Kind::Internal, "the failure was logged; nothing was changed".to_owned())
             }
-            Error::Malformed(_) => {
-                Self::new(StatusCode::BAD_REQUEST, "/problems/malformed", "The request cannot be read", detail)
-            }
-            Error::Unreadable(field) => {
-                Self::new(StatusCode::BAD_REQUEST, "/problems/malformed", "The request cannot be read", detail)
-                    .of(field)
-            }
-            Error::Invalid(field) => Self::new(
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "/problems/invalid-field",
-                "A field is not acceptable",
-                detail,
-            )
-            .of(field),
-            Error::NotSignedIn(_) => {
-                Self::new(StatusCode::UNAUTHORIZED, "/problems/not-signed-in", "Sign in first", detail)
-            }
-            Error::TooManyAttempts(_) => {
-                Self::new(StatusCode::TOO_MANY_REQUESTS, "/problems/too-many-attempts", "Too many attempts", detail)
-            }
-            Error::Changed(_) => Self::new(
-                StatusCode::PRECONDITION_FAILED,
-                "/problems/changed",
-                "It was changed since it was read",
-                detail,
-            ),
-            Error::TooLarge(_) => {
-                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "/problems/too-large", "The request is too large", detail)
-            }
-            Error::MethodNotAllowed { .. } => Self::new(
-                StatusCode::METHOD_NOT_ALLOWED,
-                "/problems/method-not-allowed",
-                "Not possible with this method",
-                detail,
-            ),
-            Error::Forbidden(_) => Self::new(StatusCode::FORBIDDEN, "/problems/forbidden", "Not allowed", detail),
-            Error::Conflict(_) => {
-                Self::new(StatusCode::CONFLICT, "/problems/conflict", "Not possible in the present state", detail)
-            }
-            Error::Learner(_) => Self::new(
-                StatusCode::UNPROCESSABLE_ENTITY,
-                "/problems/learner",
-                "The learner cannot work with this",
-                detail,
-            ),
-            Error::Store(_) | Error::Dispatch(_) | Error::Internal(_) => Self::new(
-                StatusCode::INTERNAL_SERVER_ERROR,
-                "/problems/internal",
-                "The program failed",
-                "the failure was logged; nothing was changed".to_owned(),
-            ),
         }
     }
 }
@@ -115,7 +91,7 @@ impl From<&Error> for Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let mut answer = (self.status(), [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
-        // For pages, which show the same problem in words.
+        // For `answers::complete`, which adds the request id and makes a page of it where people ask.
         answer.extensions_mut().insert(self);
         answer
     }

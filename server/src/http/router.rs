@@ -1,14 +1,16 @@
 //! The table of contents of the HTTP face.
 
-use super::{AppState, BODY_LIMIT_BYTES, api, host, identify, metrics, openapi, pages, same_origin, static_files};
+use super::{
+    AppState, BODY_LIMIT_BYTES, answers, api, client_address, host, identify, metrics, openapi, pages, same_origin,
+    static_files,
+};
 use crate::error::Error;
 use axum::Router;
-use axum::extract::DefaultBodyLimit;
+use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use std::time::Duration;
 use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
@@ -20,17 +22,10 @@ use utoipa_axum::router::OpenApiRouter;
 const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
                                        form-action 'self'; frame-ancestors 'none'";
 
-/// An answer that takes longer is given up; streams have begun by then.
-const SLOWEST_ANSWER: Duration = Duration::from_mins(1);
-
 /// Every route.
 pub fn router(state: AppState) -> Router {
     let (api, _) = OpenApiRouter::new().nest("/api/v1", api::routes()).split_for_parts();
-    let secure = state.access.secure;
-    let header = |name: HeaderName, value: &'static str| {
-        SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
-    };
-    Router::new()
+    let routes = Router::new()
         .merge(pages::routes(&state))
         .route("/health", get(api::health::get))
         .merge(api)
@@ -39,15 +34,26 @@ pub fn router(state: AppState) -> Router {
         .route("/ready", get(api::health::ready))
         .route("/static/{*path}", get(static_files::get))
         .fallback(pages::error::no_such_page)
-        .method_not_allowed_fallback(pages::error::no_such_method)
+        .method_not_allowed_fallback(pages::error::no_such_method);
+    with_layers(routes, state)
+}
+
+/// Routes within everything that holds for all of them: who calls, which names and origins are answered, time-outs,
+/// problem documents, security headers.
+pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
+    let secure = state.access.secure;
+    let header = |name: HeaderName, value: &'static str| {
+        SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
+    };
+    routes
         .layer(middleware::from_fn_with_state(state.clone(), identify::identify))
         .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
         .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
-        .layer(middleware::from_fn(pages::error::problems_as_pages))
-        .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, SLOWEST_ANSWER))
+        .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, state.slowest_answer))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
-        .layer(CatchPanicLayer::new())
+        .layer(CatchPanicLayer::custom(answers::after_panic))
+        .layer(middleware::from_fn(answers::complete))
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))
         .layer(header(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
         .layer(header(header::REFERRER_POLICY, "same-origin"))
@@ -57,8 +63,16 @@ pub fn router(state: AppState) -> Router {
         .layer(header(HeaderName::from_static("cross-origin-resource-policy"), "same-origin"))
         .layer(header(HeaderName::from_static("permissions-policy"), "camera=(), geolocation=(), microphone=()"))
         .layer(option_layer(secure.then(|| header(header::STRICT_TRANSPORT_SECURITY, "max-age=31536000"))))
-        .layer(TraceLayer::new_for_http())
+        .layer(middleware::from_fn(client_address::note))
+        .layer(TraceLayer::new_for_http().make_span_with(span_of))
         .with_state(state)
+}
+
+/// What log lines say of their request: its route and not its address, which holds the secret of a sign-in link or the
+/// token of a blind pair.
+fn span_of(request: &Request) -> tracing::Span {
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str);
+    tracing::info_span!("request", method = %request.method(), route)
 }
 
 /// `GET /api/openapi.json`.

@@ -7,6 +7,7 @@ use crate::store::{Reader, Store, StoreResult, Writer};
 use crate::studies::belief::Beliefs;
 use crate::studies::director::Director;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What every handler can reach.
 #[derive(Debug, Clone)]
@@ -21,7 +22,12 @@ pub struct AppState {
     pub beliefs: Arc<Beliefs>,
     /// The names that the service answers to.
     pub hosts: Hosts,
+    /// An answer that takes longer is given up; streams have begun by then.
+    pub slowest_answer: Duration,
 }
+
+/// An answer that takes longer is given up.
+const SLOWEST_ANSWER: Duration = Duration::from_mins(1);
 
 /// How people and programs say who they are.
 #[derive(Debug)]
@@ -52,7 +58,7 @@ impl AppState {
     /// A service over a director.
     pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
         let beliefs = Arc::clone(director.beliefs());
-        Self { director, access, requests: Arc::default(), beliefs, hosts }
+        Self { director, access, requests: Arc::default(), beliefs, hosts, slowest_answer: SLOWEST_ANSWER }
     }
 
     /// The record.

@@ -75,6 +75,7 @@ identifier!(FeedbackId, "feedback row");
 identifier!(JobId, "job");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
+identifier!(MemberId, "membership in a study");
 identifier!(PresentationId, "presentation");
 identifier!(RemarkId, "remark");
 identifier!(SafetyReviewId, "safety review");

@@ -3,7 +3,9 @@
 //! `attempts` is the fence: a result counts only when it carries the number of the current attempt and the
 //! job is still leased, so that whatever arrives late or twice is recorded at most once.
 
+use super::members::{binds, reached};
 use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
+use crate::access::Reach;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -54,15 +56,20 @@ pub struct Job {
     pub created_at: Instant,
 }
 
-/// At most `limit` jobs that are not done, in the order of queueing.
+/// At most `limit` jobs that are not done, of studies that a caller reaches, in the order of queueing.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn open(db: &mut Connection, limit: u32) -> StoreResult<Vec<Job>> {
-    let rows = sqlx::query(
-        "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id where j.state <> 'done' \
-         order by j.created_at, j.id limit ?",
-    )
+pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Job>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
+        "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id where j.state <> 'done' and ",
+        reached!("t.study_id"),
+        " order by j.created_at, j.id limit ?4"
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
     .bind(limit)
     .fetch_all(db)
     .await?;

@@ -2,7 +2,9 @@
 
 use super::audit::Actor;
 use super::lab_answers::{self, LabAnswer};
+use super::members::{binds, reached};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
+use crate::access::Reach;
 use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -179,17 +181,22 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<La
     all(db, &rows).await
 }
 
-/// Sessions that are not closed, of subjects who did not withdraw, newest first.
+/// Sessions that a caller reaches and that are not closed, of subjects who did not withdraw, newest first.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn open(db: &mut Connection, limit: u32) -> StoreResult<Vec<LabSession>> {
-    let rows = sqlx::query(
+pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<LabSession>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
         "select l.* from lab_sessions l join studies s on s.id = l.study_id \
          where s.subject_id not in (select subject_id from withdrawn_subjects) \
-         and not exists (select 1 from lab_acts a where a.session_id = l.id and a.act = 'closed') \
-         order by l.id desc limit ?",
-    )
+         and not exists (select 1 from lab_acts a where a.session_id = l.id and a.act = 'closed') and ",
+        reached!("s.id"),
+        " order by l.id desc limit ?4"
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
     .bind(limit)
     .fetch_all(&mut *db)
     .await?;

@@ -7,7 +7,10 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
-const FILES: &[(i64, &str, &str)] = &[(1, "baseline", include_str!("../../../migrations/0001_baseline.sql"))];
+const FILES: &[(i64, &str, &str)] = &[
+    (1, "baseline", include_str!("../../../migrations/0001_baseline.sql")),
+    (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
+];
 
 /// Version of the form of a record that this program writes.
 pub const FORM: i64 = FILES[FILES.len() - 1].0;

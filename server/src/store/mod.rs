@@ -24,6 +24,7 @@ pub mod lab_answers;
 pub mod lab_recordings;
 pub mod lab_sessions;
 pub mod listing;
+pub mod members;
 mod migrations;
 pub mod presentations;
 pub mod reference_gaits;
@@ -45,8 +46,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, PresentationId, ReferenceGaitId, RemarkId,
-    SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, MemberId, PresentationId, ReferenceGaitId,
+    RemarkId, SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use migrations::FORM;
 pub use time::{Instant, now};

@@ -29,7 +29,7 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 29] = [
+pub const TABLES: [Sealed; 32] = [
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
@@ -59,6 +59,9 @@ pub const TABLES: [Sealed; 29] = [
     sealed("emg_results", &["id"]),
     sealed("users", &["id"]),
     sealed("tokens", &["id"]),
+    sealed("study_members", &["id"]),
+    sealed("study_member_ends", &["member_id"]),
+    sealed("study_restrictions", &["seq"]),
 ];
 
 /// Tables whose rows come and go with the work, or only repeat what others say.

@@ -1,8 +1,10 @@
 //! Studies: one tuning each.
 
+use super::members::{binds, reached};
 use super::{
     Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now, schema,
 };
+use crate::access::Reach;
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use serde::{Deserialize, Serialize};
@@ -273,18 +275,33 @@ pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "study", id: id.to_string() })
 }
 
-/// At most `limit` studies older than `before`, newest first.
+/// At most `limit` studies older than `before` that a caller reaches, newest first.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn page(db: &mut Connection, before: Option<StudyId>, limit: u32) -> StoreResult<Vec<Study>> {
-    let rows = sqlx::query("select * from studies where ? is null or id < ? order by id desc limit ?")
-        .bind(before)
-        .bind(before)
-        .bind(limit)
-        .fetch_all(db)
-        .await?;
-    rows.iter().map(from_row).collect()
+pub async fn page(db: &mut Connection, reach: Reach, before: Option<StudyId>, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where ",
+        reached!("id"),
+        " and (?4 is null or id < ?4) order by id desc limit ?5"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(before).bind(limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// The studies that ask raters for comparisons and that a caller reaches, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn asking_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where state in ('running', 'waiting') and feedback_mode <> 'automatic' and ",
+        reached!("id"),
+        " order by priority desc, id"
+    );
+    sqlx::query(sql).bind(every).bind(open).bind(principal).fetch_all(db).await?.iter().map(from_row).collect()
 }
 
 /// Every study that proposes trials by itself, oldest first.
@@ -298,45 +315,56 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
-/// The newest studies that go on only when a person does something.
+/// The newest studies that a caller reaches and that go on only when a person does something.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn waiting_for_people(db: &mut Connection, limit: u32) -> StoreResult<Vec<Study>> {
-    let rows =
-        sqlx::query("select * from studies where state in ('waiting', 'paused', 'draft') order by id desc limit ?")
-            .bind(limit)
-            .fetch_all(db)
-            .await?;
-    rows.iter().map(from_row).collect()
+pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where state in ('waiting', 'paused', 'draft') and ",
+        reached!("id"),
+        " order by id desc limit ?4"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 
-/// The newest studies in which somebody called a gait unsafe and did not take it back, of subjects who did not withdraw.
+/// The newest studies that a caller reaches in which somebody called a gait unsafe and did not take it back, of subjects
+/// who did not withdraw.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn with_objections(db: &mut Connection, limit: u32) -> StoreResult<Vec<Study>> {
-    let rows = sqlx::query(
-        "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and s.id in (\
+pub async fn with_objections(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
+        "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and ",
+        reached!("s.id"),
+        " and s.id in (\
          select m.study_id from remarks m where m.answer glob 'unsafe*' \
          and m.id not in (select remark_id from remark_retractions) \
          union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
          where a.answer glob 'unsafe*' \
          union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
-         where a.answer glob 'unsafe*') order by s.id desc limit ?",
-    )
+         where a.answer glob 'unsafe*') order by s.id desc limit ?4",
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
     .bind(limit)
     .fetch_all(db)
     .await?;
     rows.iter().map(from_row).collect()
 }
 
-/// The newest studies of a subject.
+/// The newest studies of a subject that a caller reaches.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn of_subject(db: &mut Connection, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
-    let query = sqlx::query("select * from studies where subject_id = ? order by id desc limit ?");
+pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!("select * from studies where subject_id = ?4 and ", reached!("id"), " order by id desc limit ?5");
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal);
     query.bind(subject).bind(limit).fetch_all(db).await?.iter().map(from_row).collect()
 }
 

@@ -26,6 +26,13 @@ pub struct Token {
     pub revoked_at: Option<Instant>,
 }
 
+impl Token {
+    /// Whether it was not revoked and has not ended.
+    pub fn is_good(&self) -> bool {
+        self.revoked_at.is_none() && self.expires_at.is_none_or(|at| at > now())
+    }
+}
+
 /// The unique name, as SQLite names it in a violation.
 pub const NAME_UNIQUE: &str = "tokens.name";
 

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::studies::{FeedbackMode, Limits, Study, StudyState};
-use crate::store::{StudyId, Writer, events, studies};
+use crate::store::{StudyId, Writer, events, members, studies};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -127,7 +127,10 @@ pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) 
     new.muscles = fork.muscles.unwrap_or(new.muscles);
     new.feedback_mode = fork.feedback_mode.unwrap_or(new.feedback_mode);
     new.start = fork.start;
-    plan::create_from(writer, actor, new, Some(id)).await
+    let made = plan::create_from(writer, actor, new, Some(id)).await?;
+    // What a restricted study is made of is told to its members alone, in a copy, too.
+    members::inherit(writer, id, made.id, actor.as_str()).await?;
+    Ok(made)
 }
 
 async fn changed(

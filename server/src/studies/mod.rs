@@ -23,6 +23,7 @@ pub mod explanation;
 pub mod history;
 pub mod lab;
 pub mod lifecycle;
+pub mod membership;
 mod next_step;
 pub mod objections;
 pub mod person;

@@ -1,6 +1,7 @@
 //! What people said of gaits that is no preference, wherever they said it: gaits that must not be walked, and pairs of
 //! which somebody could not tell which is better.
 
+use crate::access::Reach;
 use crate::error::Error;
 use crate::store::presentations::Said;
 use crate::store::safety_reviews::{self, SafetyReview, SafetyVerdict};
@@ -36,13 +37,13 @@ pub enum Statement {
     Subject,
 }
 
-/// Studies with gaits about which staff decided nothing since somebody called them unsafe, and how many gaits that are.
+/// Studies that a caller reaches with gaits about which staff decided nothing since somebody called them unsafe, and how many gaits that are.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn undecided(db: &mut Connection, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
+pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
     let mut found = Vec::new();
-    for study in studies::with_objections(db, limit).await? {
+    for study in studies::with_objections(db, reach, limit).await? {
         let closed = Objections::read(db, study.id).await?.closed.into_iter();
         let waiting: HashSet<TrialId> = closed.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
         if !waiting.is_empty() {

@@ -137,6 +137,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("unsafe-gait", format!("/trials/{unsafe_one}")),
         ("figures", format!("/studies/{study}/figures?other={other}")),
         ("lab-sessions", format!("/studies/{study}/lab")),
+        ("study-members", format!("/studies/{study}/members")),
         ("lab-session", format!("/lab-sessions/{session}")),
         ("lab", "/lab".to_owned()),
         ("lab-walk", format!("/lab/{session}")),

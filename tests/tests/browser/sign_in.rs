@@ -7,7 +7,9 @@ use gaitwright::access::{Role, secret};
 use gaitwright::http::Access;
 use gaitwright::store::audit::Actor;
 use gaitwright::store::commit;
+use gaitwright::store::members::MemberKind;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::studies::membership::{self, NewMember};
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 
@@ -111,6 +113,8 @@ async fn browser_sends_an_answer_after_the_session_has_ended() {
     let rater = people::add(&mut writer, &Actor::program(), &new).await.unwrap();
     let hashed = secret::hash_password("correct horse battery").unwrap();
     people::set_password(&mut writer, &Actor::program(), rater.id, &hashed).await.unwrap();
+    let member = NewMember { kind: MemberKind::User, name: "R1".to_owned() };
+    membership::add(&mut writer, &Actor::program(), study, &member).await.unwrap();
     commit(writer).await.unwrap();
 
     let page = browser.open(&site.at("/sign-in")).await;

@@ -10,6 +10,7 @@ use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem::reference_of;
 use super::unattended::{self, Lines};
+use crate::access::Reach;
 use crate::error::Error;
 use crate::store::studies::{self, Study, StudyState};
 use crate::store::{Store, commit, gaits, reference_gaits};
@@ -172,7 +173,7 @@ impl Reproduce {
         };
         let wanted = plan::checked(&mut writer, new.clone()).await?;
         // A folder holds at most two subjects, two variants and a hundred seeds of one number of trials.
-        let known = studies::page(&mut writer, None, 1000).await?;
+        let known = studies::page(&mut writer, Reach::Every, None, 1000).await?;
         commit(writer).await?;
         let same = known
             .into_iter()

@@ -3,8 +3,8 @@
 use crate::access::Administer;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::{StudyId, archive};
 use axum::extract::State;
 use axum::http::header;
@@ -22,7 +22,7 @@ use axum::response::{IntoResponse, Response};
 pub(super) async fn of_study(
     _: May<Administer>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Administer>,
 ) -> Result<Response, Error> {
     let bytes = archive::of_study(&mut *app.read().await?, id).await?;
     let headers = [

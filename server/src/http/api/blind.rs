@@ -4,9 +4,9 @@ use crate::access::{Administer, Rate, Read};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::blind_motion::{Figure, blind_motion};
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::presentations::{self, Presentation};
 use crate::store::{StudyId, gaits, studies};
@@ -50,7 +50,7 @@ pub(super) struct NextPair {
 )]
 pub(super) async fn next(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Rate>,
     once: Once<Rate>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
@@ -154,7 +154,7 @@ pub(super) async fn answer(
 pub(super) async fn raters(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Json<Vec<RaterFigures>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -185,7 +185,7 @@ pub(super) struct Unblind {
 )]
 pub(super) async fn unblind(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Administer>,
     OnceWith(once, whose): OnceWith<Administer, Unblind>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

@@ -3,9 +3,9 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::Once;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::{TrialId, certificates};
 use crate::studies::examination;
@@ -27,7 +27,7 @@ use gait_optimizer::certificate::Certificate;
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Certificate>, Error> {
     let missing = || Error::NotFound { what: "certificate of trial".to_owned(), id: id.to_string() };
     certificates::find(&mut *app.read().await?, id).await?.map(Json).ok_or_else(missing)
@@ -44,7 +44,7 @@ pub(super) async fn get(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
     once: Once<Run>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {

@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
+use crate::http::reached::Named;
 use crate::store::studies::{self, StudyState};
 use crate::store::trials::{self, TrialCounts};
 use crate::store::{Connection, StudyId, consents, schema};
@@ -60,7 +61,7 @@ pub(super) struct Compared {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
     Params(which): Params<Which>,
 ) -> Result<Json<Vec<Compared>>, Error> {
@@ -71,7 +72,8 @@ pub(super) async fn get(
     let mut reader = app.read().await?;
     let mut rows = Vec::with_capacity(named.len());
     for id in named {
-        let id = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
+        let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
+        let id = id.reached(&mut reader, may.caller.reach()).await?;
         rows.push(row(&mut reader, id, Arc::clone(&app.beliefs)).await?);
     }
     Ok(Json(rows))

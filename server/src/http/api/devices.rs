@@ -3,9 +3,9 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::OnceWith;
+use crate::http::reached::Id;
 use crate::store::DeviceId;
 use crate::store::devices::{self, Device};
 use crate::studies::device;
@@ -61,7 +61,7 @@ pub(super) async fn create(
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<DeviceId>,
+    Id(id, _): Id<DeviceId, Read>,
 ) -> Result<Json<Device>, Error> {
     Ok(Json(devices::get(&mut *app.read().await?, id).await?))
 }

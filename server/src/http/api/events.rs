@@ -4,13 +4,13 @@
 //! misses one sees the next. A stream begins with where the study stands, so that who listens to one that has ended
 //! knows; it stays open, because a study that has ended can be extended.
 
-use crate::access::Read;
+use crate::access::{Reach, Read};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::shown::Shown;
-use crate::store::{StudyId, TrialId, events, studies};
+use crate::store::{StudyId, TrialId, events, members, studies};
 use crate::workers::Progress;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -48,9 +48,9 @@ pub(super) struct From {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(from): Params<From>,
     headers: HeaderMap,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Error> {
@@ -68,7 +68,7 @@ pub(super) async fn of_study(
             return;
         }
         // Ends when the browser goes away or the server stops; either is the normal end.
-        let _ = follow(&app, id, after, &sender).await;
+        let _ = follow(&app, may.caller.reach(), id, after, &sender).await;
     });
     let stream = futures_util::StreamExt::map(ReceiverStream::new(receiver), Ok);
     Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))))
@@ -96,13 +96,19 @@ pub(super) struct ServerSentEvent {
 /// The listener went away.
 struct Gone;
 
-async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mpsc::Sender<Event>) -> Result<(), Gone> {
+async fn follow(
+    app: &AppState,
+    reach: Reach,
+    study: StudyId,
+    mut after: i64,
+    sender: &mpsc::Sender<Event>,
+) -> Result<(), Gone> {
     let mut pulse = app.director.pulse();
     let mut progress = app.director.board().listen();
     let stopping = app.director.stopping();
     let mut shown: HashMap<TrialId, Instant> = HashMap::new();
     loop {
-        after = replay(app, study, after, sender).await?;
+        after = replay(app, reach, study, after, sender).await?;
         loop {
             tokio::select! {
                 () = stopping.cancelled() => return Ok(()),
@@ -124,9 +130,19 @@ async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mpsc::S
     }
 }
 
-async fn replay(app: &AppState, study: StudyId, mut after: i64, sender: &mpsc::Sender<Event>) -> Result<i64, Gone> {
+async fn replay(
+    app: &AppState,
+    reach: Reach,
+    study: StudyId,
+    mut after: i64,
+    sender: &mpsc::Sender<Event>,
+) -> Result<i64, Gone> {
     loop {
         let mut reader = app.read().await.map_err(|_| Gone)?;
+        if !members::reaches(&mut reader, reach, study).await.map_err(|_| Gone)? {
+            // Removed from the study while it listened.
+            return Err(Gone);
+        }
         let batch = events::after(&mut reader, study, after, BATCH).await.map_err(|_| Gone)?;
         drop(reader);
         let Some(last) = batch.last() else { return Ok(after) };

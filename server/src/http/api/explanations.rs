@@ -3,9 +3,9 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::Once;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::explanations::Explained;
 use crate::store::{Instant, TrialId, schema, trials};
@@ -106,7 +106,7 @@ enum Coming {
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
@@ -136,7 +136,7 @@ pub(super) async fn get(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
     once: Once<Run>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

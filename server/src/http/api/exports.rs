@@ -3,8 +3,9 @@
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::trials::Trial;
 use crate::store::{TrialId, consents, gaits, trials};
@@ -42,7 +43,7 @@ pub(super) fn two_hundred() -> f64 {
 pub(super) async fn problem(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let number = trials::get(&mut reader, id).await?.number;
@@ -63,7 +64,7 @@ pub(super) async fn problem(
 pub(super) async fn motion_file(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Read>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
     let (trial, gait) = leaving(&app, id).await?;
@@ -83,7 +84,7 @@ pub(super) async fn motion_file(
 pub(super) async fn controller(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Read>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;

@@ -3,9 +3,10 @@
 use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::pages::{belief, figures};
+use crate::http::reached::{Id, Named, reached};
 use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::{LabSessionId, ReferenceGaitId, StudyId, TrialId, reference_gaits};
@@ -17,7 +18,7 @@ use serde::Deserialize;
 /// A second study, or a second trial.
 #[derive(Debug, Deserialize)]
 pub(super) struct Beside<T> {
-    other: Option<T>,
+    other: Option<Named<T>>,
 }
 
 /// `GET /studies/{id}/figures/{file}`: those of the page with the figures of a study.
@@ -34,12 +35,13 @@ pub(super) struct Beside<T> {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(Beside { other }): Params<Beside<StudyId>>,
 ) -> Result<Response, Error> {
+    let other = reached(&mut *app.read().await?, may.caller.reach(), other).await?;
     answer(figures::of_study(&app, id, other).await?.into_figures(), file).await
 }
 
@@ -58,12 +60,13 @@ pub(super) async fn of_study(
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_trial(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(Beside { other }): Params<Beside<TrialId>>,
 ) -> Result<Response, Error> {
+    let other = reached(&mut *app.read().await?, may.caller.reach(), other).await?;
     let figures = match other {
         None => figures::of_trial(&app, id).await?,
         Some(other) => figures::of_pair(&app, id, other).await?,
@@ -86,7 +89,7 @@ pub(super) async fn of_trial(
 pub(super) async fn of_session(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabSessionId>,
+    Shown(id, _): Shown<LabSessionId, Read>,
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Error> {
     answer(figures::of_session(&app, id).await?, file).await
@@ -109,7 +112,7 @@ pub(super) async fn of_session(
 pub(super) async fn of_belief(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(choice): Params<belief::Choice>,
 ) -> Result<Response, Error> {
@@ -131,7 +134,7 @@ pub(super) async fn of_belief(
 pub(super) async fn of_reference(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<ReferenceGaitId>,
+    Id(id, _): Id<ReferenceGaitId, Read>,
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Error> {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;

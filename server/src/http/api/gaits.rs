@@ -24,7 +24,7 @@ use axum::response::{IntoResponse, Response};
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     if wants_csv(&headers) {
@@ -47,7 +47,7 @@ pub(super) async fn get(
 pub(super) async fn get_csv(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, Error> {
     table(&app, id).await
 }

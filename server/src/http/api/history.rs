@@ -28,7 +28,7 @@ use std::sync::Arc;
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let history = read(&app, id).await?;
@@ -47,7 +47,7 @@ pub(super) async fn of_study(
 pub(super) async fn of_study_csv(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Error> {
     table(id, &read(&app, id).await?)
 }

@@ -1,6 +1,6 @@
 //! What waits to be solved, what is being solved, and by whom.
 
-use crate::access::Read;
+use crate::access::{Reach, Read};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 /// Jobs listed at most.
 const MOST: u32 = 1000;
 
-/// `GET`: the jobs that are not done, in the order of queueing, at most 1000 of them.
+/// `GET`: the jobs that are not done, of studies that the caller reaches, in the order of queueing, at most 1000 of them.
 #[utoipa::path(
     get,
     path = "/jobs",
@@ -22,8 +22,8 @@ const MOST: u32 = 1000;
     responses((status = 200, description = "Those that are not done", body = Vec<Job>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<Job>>, Error> {
-    Ok(Json(jobs::open(&mut *app.read().await?, MOST).await?))
+pub(super) async fn list(may: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<Job>>, Error> {
+    Ok(Json(jobs::open(&mut *app.read().await?, may.caller.reach(), MOST).await?))
 }
 
 /// Who solves.
@@ -38,7 +38,10 @@ pub(crate) struct Workers {
 impl Workers {
     pub(crate) async fn read(app: &AppState) -> Result<Self, Error> {
         let mut at_work = BTreeMap::new();
-        for worker in jobs::open(&mut *app.read().await?, MOST).await?.into_iter().filter_map(|job| job.worker) {
+        // Names of workers alone: they say nothing of a study.
+        for worker in
+            jobs::open(&mut *app.read().await?, Reach::Every, MOST).await?.into_iter().filter_map(|job| job.worker)
+        {
             *at_work.entry(worker).or_default() += 1;
         }
         Ok(Self { places: app.director.workers(), at_work })

@@ -4,9 +4,9 @@ use super::exports;
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::lab_recordings::{self, LabRecording};
 use crate::store::{LabRecordingId, LabSessionId};
@@ -31,7 +31,7 @@ use utoipa::ToSchema;
 pub(super) async fn list(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabSessionId>,
+    Shown(id, _): Shown<LabSessionId, Read>,
 ) -> Result<Json<Vec<LabRecording>>, Error> {
     Ok(Json(lab_recordings::of_session(&mut *app.read().await?, id).await?))
 }
@@ -48,7 +48,7 @@ pub(super) async fn list(
 pub(super) async fn file(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabRecordingId>,
+    Shown(id, _): Shown<LabRecordingId, Read>,
 ) -> Result<Response, Error> {
     let Brought { recording, form, text } = lab::brought(&mut *app.read().await?, id).await?;
     let (kind, ending) = match form {
@@ -75,7 +75,7 @@ pub(super) async fn file(
 )]
 pub(super) async fn electromyogram(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, new): OnceWith<Run, NewEmg>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
@@ -97,7 +97,7 @@ pub(super) async fn electromyogram(
 )]
 pub(super) async fn motion(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, new): OnceWith<Run, NewMotion>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
@@ -138,7 +138,7 @@ pub(super) struct Processing {
 )]
 pub(super) async fn process(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, processing): OnceWith<Run, Processing>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
@@ -167,7 +167,7 @@ pub(super) async fn process(
 pub(super) async fn result(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabSessionId>,
+    Shown(id, _): Shown<LabSessionId, Read>,
 ) -> Result<Json<Option<EmgView>>, Error> {
     Ok(Json(lab::emg(&mut *app.read().await?, id).await?))
 }
@@ -184,7 +184,7 @@ pub(super) async fn result(
 pub(super) async fn limit_cycles(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabSessionId>,
+    Shown(id, _): Shown<LabSessionId, Read>,
 ) -> Result<Json<Vec<LimitCycles>>, Error> {
     Ok(Json(lab::limit_cycles(&mut *app.read().await?, id).await?))
 }

@@ -4,9 +4,10 @@ use super::exports;
 use crate::access::{Administer, Rate, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::{LabSessionId, StudyId, lab_sessions, studies};
 use crate::studies::lab::{self, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
@@ -29,7 +30,7 @@ use utoipa::ToSchema;
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Json<Vec<SessionView>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -49,7 +50,7 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     OnceWith(once, new): OnceWith<Run, NewSession>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -73,7 +74,7 @@ pub(super) async fn create(
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabSessionId>,
+    Shown(id, _): Shown<LabSessionId, Read>,
 ) -> Result<Json<SessionView>, Error> {
     Ok(Json(SessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
 }
@@ -103,7 +104,7 @@ pub(super) struct OfWalk {
 pub(super) async fn controller(
     _: May<Run>,
     State(app): State<AppState>,
-    Shown(id): Shown<LabSessionId>,
+    Shown(id, _): Shown<LabSessionId, Run>,
     Params(of): Params<OfWalk>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
@@ -137,7 +138,7 @@ pub(super) struct Closing {
 )]
 pub(super) async fn close(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, closing): OnceWith<Run, Closing>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -171,7 +172,7 @@ pub(super) struct Told {
 )]
 pub(super) async fn unblind(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Administer>,
     OnceWith(once, told): OnceWith<Administer, Told>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -194,7 +195,7 @@ pub(super) async fn unblind(
 pub(super) async fn in_the_lab(
     _: May<Rate>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
 ) -> Result<Json<InTheLab>, Error> {
     Ok(Json(lab::in_the_lab(&mut *app.read().await?, id).await?))
 }
@@ -211,7 +212,7 @@ pub(super) async fn in_the_lab(
 )]
 pub(super) async fn walk(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
     OnceWith(once, walked): OnceWith<Rate, RecordedWalk>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -235,7 +236,7 @@ pub(super) async fn walk(
 )]
 pub(super) async fn answer(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
     OnceWith(once, new): OnceWith<Rate, NewAnswer>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -257,7 +258,7 @@ pub(super) async fn answer(
 )]
 pub(super) async fn take_back(
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
     once: Once<Rate>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

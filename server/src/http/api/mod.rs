@@ -18,6 +18,7 @@ mod history;
 mod jobs;
 mod lab_recordings;
 mod lab_sessions;
+mod members;
 mod motion;
 mod objections;
 mod preferences;
@@ -78,6 +79,11 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(history::of_study_csv))
         .routes(routes!(preferences::of_study, preferences::create))
         .routes(routes!(events::of_study))
+        // who reaches a study
+        .routes(routes!(members::of_study, members::add))
+        .routes(routes!(members::end))
+        .routes(routes!(members::restrict))
+        .routes(routes!(members::invite))
         // trials
         .routes(routes!(trials::get))
         .routes(routes!(trials::cancel))

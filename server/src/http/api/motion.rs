@@ -50,7 +50,7 @@ struct Frame {
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Motion>, Error> {
     let gait = gaits::get(&mut *app.read().await?, id).await?;
     Ok(Json(motion(&gait)?))

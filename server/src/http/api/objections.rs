@@ -3,9 +3,9 @@
 use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::OnceWith;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::safety_reviews::{SafetyReview, SafetyVerdict};
 use crate::store::{Instant, StudyId, TrialId, studies};
@@ -56,7 +56,7 @@ impl From<Closed> for Objection {
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Json<Vec<Objection>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -82,7 +82,7 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn review(
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, access::Answer>,
     OnceWith(once, decision): OnceWith<access::Answer, Decision>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

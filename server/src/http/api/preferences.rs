@@ -3,11 +3,12 @@
 use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::OnceWith;
 use crate::http::pages_of::{After, linked_after};
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::feedback::{self, FeedbackRow, Said};
 use crate::store::{FeedbackId, StudyId, studies};
@@ -32,7 +33,7 @@ use utoipa::ToSchema;
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(page): Params<After<i64>>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
@@ -99,7 +100,7 @@ fn table(study: StudyId, rows: &[FeedbackRow]) -> Result<Response, Error> {
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<FeedbackId>,
+    Shown(id, _): Shown<FeedbackId, Read>,
 ) -> Result<Json<FeedbackRow>, Error> {
     Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
 }
@@ -125,7 +126,7 @@ pub(super) struct Recorded {
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, access::Answer>,
     OnceWith(once, answer): OnceWith<access::Answer, Answer>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -162,7 +163,7 @@ pub(super) struct Retract {
 )]
 pub(super) async fn retract(
     State(app): State<AppState>,
-    Id(id): Id<FeedbackId>,
+    Id(id, _): Id<FeedbackId, access::Answer>,
     OnceWith(once, why): OnceWith<access::Answer, Retract>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

@@ -80,7 +80,7 @@ impl Recommended {
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Json<Recommendation>, Error> {
     Ok(Json(read(&app, id).await?))
 }
@@ -100,7 +100,7 @@ pub(super) async fn of_study(
 pub(super) async fn of_study_csv(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Error> {
     let Recommendation { best, certificate, .. } = read(&app, id).await?;
     let bounds = TunedBounds::NAMES.iter().zip(best.bounds.to_array()).zip(TunedBounds::MEANINGS);

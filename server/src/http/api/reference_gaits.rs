@@ -3,9 +3,9 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::OnceWith;
+use crate::http::reached::Id;
 use crate::store::reference_gaits::{self, ReferenceGait};
 use crate::store::{ReferenceGaitId, SubjectId, subjects};
 use crate::studies::recording::{self, Match, NewReferenceGait};
@@ -65,7 +65,7 @@ pub(super) async fn create(
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<ReferenceGaitId>,
+    Id(id, _): Id<ReferenceGaitId, Read>,
 ) -> Result<Json<ReferenceGait>, Error> {
     Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?))
 }
@@ -82,7 +82,7 @@ pub(super) async fn get(
 pub(super) async fn of_subject(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<Vec<Match>>, Error> {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;

@@ -4,9 +4,9 @@ use super::preferences::Retract;
 use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::OnceWith;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::remarks::{self, Remark};
 use crate::store::{RemarkId, StudyId, studies};
@@ -28,7 +28,7 @@ use axum::response::Response;
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Json<Vec<Remark>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -48,7 +48,7 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, access::Answer>,
     OnceWith(once, new): OnceWith<access::Answer, NewRemark>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -72,7 +72,7 @@ pub(super) async fn create(
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<RemarkId>,
+    Shown(id, _): Shown<RemarkId, Read>,
 ) -> Result<Json<Remark>, Error> {
     Ok(Json(remarks::get(&mut *app.read().await?, id).await?))
 }
@@ -89,7 +89,7 @@ pub(super) async fn get(
 )]
 pub(super) async fn retract(
     State(app): State<AppState>,
-    Id(id): Id<RemarkId>,
+    Id(id, _): Id<RemarkId, access::Answer>,
     OnceWith(once, why): OnceWith<access::Answer, Retract>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

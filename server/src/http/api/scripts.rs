@@ -3,8 +3,8 @@
 use crate::access::Run;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::once::OnceWith;
+use crate::http::reached::Id;
 use crate::store::trials::Trial;
 use crate::store::{StudyId, TrialId};
 use crate::studies::script::{self, Ask, Tell};
@@ -27,7 +27,7 @@ const TRIES: usize = 20;
 )]
 pub(super) async fn ask(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     OnceWith(once, ask): OnceWith<Run, Ask>,
 ) -> Result<Response, Error> {
     let worker = ask.worker.as_deref().unwrap_or(&once.caller.name).trim();
@@ -57,7 +57,7 @@ pub(super) async fn ask(
 )]
 pub(super) async fn tell(
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
     OnceWith(once, tell): OnceWith<Run, Tell>,
 ) -> Result<Response, Error> {
     for _ in 0..TRIES {

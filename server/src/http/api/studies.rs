@@ -3,10 +3,11 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
 use crate::http::pages_of::Before;
+use crate::http::reached::Id;
 use crate::http::revision::{IfMatch, tagged};
 use crate::store::studies::{self, Study};
 use crate::store::trials::{self, TrialCounts};
@@ -62,13 +63,13 @@ pub(super) struct StudyPage {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
     Params(page): Params<Before<StudyId>>,
 ) -> Result<Json<StudyPage>, Error> {
     let limit = page.limit(200)?;
     let mut reader = app.read().await?;
-    let mut found = studies::page(&mut reader, page.before, limit + 1).await?;
+    let mut found = studies::page(&mut reader, may.caller.reach(), page.before, limit + 1).await?;
     let more = found.len() > limit as usize;
     found.truncate(limit as usize);
     let next = if more { found.last().map(|study| study.id) } else { None };
@@ -93,7 +94,11 @@ pub(super) async fn list(
     )),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<StudyId>) -> Result<Response, Error> {
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Read>,
+) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let revision = study.revision;
@@ -145,7 +150,7 @@ pub(super) struct Why {
 )]
 pub(super) async fn start(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
     OnceWith(once, why): OnceWith<Run, Why>,
 ) -> Result<Response, Error> {
@@ -164,7 +169,7 @@ pub(super) async fn start(
 )]
 pub(super) async fn pause(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
     OnceWith(once, why): OnceWith<Run, Why>,
 ) -> Result<Response, Error> {
@@ -183,7 +188,7 @@ pub(super) async fn pause(
 )]
 pub(super) async fn resume(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
     OnceWith(once, why): OnceWith<Run, Why>,
 ) -> Result<Response, Error> {
@@ -202,7 +207,7 @@ pub(super) async fn resume(
 )]
 pub(super) async fn stop(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
     OnceWith(once, why): OnceWith<Run, Why>,
 ) -> Result<Response, Error> {
@@ -244,7 +249,7 @@ async fn act(
 )]
 pub(super) async fn patch(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
     OnceWith(once, new): OnceWith<Run, Change>,
 ) -> Result<Response, Error> {
@@ -269,7 +274,7 @@ pub(super) async fn patch(
 )]
 pub(super) async fn extend(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
     OnceWith(once, more): OnceWith<Run, Extend>,
 ) -> Result<Response, Error> {
@@ -294,7 +299,7 @@ pub(super) async fn extend(
 )]
 pub(super) async fn fork(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     OnceWith(once, differs): OnceWith<Run, Fork>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

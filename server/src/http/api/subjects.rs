@@ -3,10 +3,11 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::once::OnceWith;
 use crate::http::pages_of::{Before, linked};
+use crate::http::reached::Id;
 use crate::store::SubjectId;
 use crate::store::consents::{self, Consent};
 use crate::store::subjects::{self, Subject};
@@ -49,7 +50,7 @@ pub(super) async fn list(
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<Subject>, Error> {
     Ok(Json(subjects::get(&mut *app.read().await?, id).await?))
 }
@@ -88,7 +89,7 @@ pub(super) async fn create(
 pub(super) async fn consents(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<Vec<Consent>>, Error> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;
@@ -107,7 +108,7 @@ pub(super) async fn consents(
 )]
 pub(super) async fn consent(
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Run>,
     OnceWith(once, new): OnceWith<Run, NewConsent>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -131,7 +132,7 @@ pub(super) async fn consent(
 )]
 pub(super) async fn withdraw(
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Run>,
     OnceWith(once, why): OnceWith<Run, Withdrawal>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -158,7 +159,7 @@ pub(super) async fn withdraw(
 pub(super) async fn muscles(
     _: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Read>,
 ) -> Result<Json<MuscleParameters>, Error> {
     let mut reader = app.read().await?;
     subjects::get(&mut reader, id).await?;
@@ -177,7 +178,7 @@ pub(super) async fn muscles(
 )]
 pub(super) async fn set_muscles(
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Run>,
     OnceWith(once, muscles): OnceWith<Run, MuscleParameters>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

@@ -3,10 +3,11 @@
 use crate::access::{self, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::once::OnceWith;
 use crate::http::pages_of::{After, linked_after};
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::feedback::{self, FeedbackRow};
 use crate::store::{StudyId, studies};
@@ -28,7 +29,7 @@ use axum::response::Response;
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(page): Params<After<i64>>,
 ) -> Result<Response, Error> {
     let limit = page.limit(1000)?;
@@ -51,7 +52,7 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn create(
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, access::Answer>,
     OnceWith(once, new): OnceWith<access::Answer, Suggestion>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

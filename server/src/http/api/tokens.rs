@@ -4,9 +4,9 @@ use crate::access::Administer;
 use crate::access::tokens::{self as making, NewToken};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::reached::Id;
 use crate::store::TokenId;
 use crate::store::tokens::{self, Token};
 use axum::Json;
@@ -67,7 +67,7 @@ pub(super) async fn create(
 )]
 pub(super) async fn revoke(
     State(app): State<AppState>,
-    Id(id): Id<TokenId>,
+    Id(id, _): Id<TokenId, Administer>,
     once: Once<Administer>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {

@@ -3,11 +3,12 @@
 use crate::access::{Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Id, Params};
+use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_answer, wants_csv};
 use crate::http::once::Once;
 use crate::http::pages_of::After;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::results::{self, AttemptResult};
 use crate::store::trials::{self, Trial};
@@ -43,7 +44,7 @@ pub(super) struct TrialPage {
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(page): Params<After<u32>>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
@@ -72,7 +73,7 @@ pub(super) async fn of_study(
 pub(super) async fn of_study_csv(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
@@ -91,7 +92,7 @@ pub(super) async fn of_study_csv(
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Trial>, Error> {
     Ok(Json(trials::get(&mut *app.read().await?, id).await?))
 }
@@ -107,7 +108,7 @@ pub(super) async fn get(
 )]
 pub(super) async fn cancel(
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
     once: Once<Run>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -131,7 +132,7 @@ pub(super) async fn cancel(
 )]
 pub(super) async fn retry(
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
     once: Once<Run>,
 ) -> Result<Response, Error> {
     let mut writer = match once.begin(&app).await? {
@@ -154,7 +155,7 @@ pub(super) async fn retry(
 pub(super) async fn iterations(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Vec<IterationRecord>>, Error> {
     if let Some(track) = app.director.board().track(id) {
         return Ok(Json(track.records));
@@ -174,7 +175,7 @@ pub(super) async fn iterations(
 pub(super) async fn attempts(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Vec<AttemptResult>>, Error> {
     Ok(Json(results::of_trial(&mut *app.read().await?, id).await?))
 }

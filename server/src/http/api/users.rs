@@ -4,9 +4,9 @@ use crate::access::people::{self, NewUser};
 use crate::access::{Administer, Caller, Right, Role};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
+use crate::http::reached::Id;
 use crate::store::UserId;
 use crate::store::users::{self, User};
 use axum::Json;
@@ -92,7 +92,7 @@ pub(super) struct Link {
 )]
 pub(super) async fn link(
     State(app): State<AppState>,
-    Id(id): Id<UserId>,
+    Id(id, _): Id<UserId, Administer>,
     once: Once<Administer>,
 ) -> Result<Response, Error> {
     let mut writer = once.begin_secret(&app).await?;
@@ -111,7 +111,7 @@ pub(super) async fn link(
 )]
 pub(super) async fn disable(
     State(app): State<AppState>,
-    Id(id): Id<UserId>,
+    Id(id, _): Id<UserId, Administer>,
     once: Once<Administer>,
 ) -> Result<Response, Error> {
     set_disabled(&app, id, &once, true).await
@@ -128,7 +128,7 @@ pub(super) async fn disable(
 )]
 pub(super) async fn enable(
     State(app): State<AppState>,
-    Id(id): Id<UserId>,
+    Id(id, _): Id<UserId, Administer>,
     once: Once<Administer>,
 ) -> Result<Response, Error> {
     set_disabled(&app, id, &once, false).await

@@ -90,7 +90,7 @@ struct AnswerRow {
 pub(super) async fn get(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     let study = studies::get(&mut *app.read().await?, id).await?;

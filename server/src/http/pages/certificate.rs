@@ -4,8 +4,8 @@ use super::error::PageError;
 use super::format;
 use crate::access::Run;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::{TrialId, commit};
 use crate::studies::examination;
 use axum::extract::State;
@@ -79,7 +79,7 @@ impl CheckInWords {
 pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
     let begun = examination::begin(&mut *app.read().await.map_err(crate::error::Error::from)?, id).await?;
     let certificate = examination::certificate(begun).await?;

@@ -7,9 +7,10 @@ use super::study::{answer_in_words, remark_in_words};
 use crate::access::{self, Caller, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id, Params};
+use crate::http::extract::{Form, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::plots::{Figure, gait_tiles};
 use crate::printable;
@@ -137,7 +138,7 @@ const CERTIFIED_AT_ONCE: usize = 10;
 pub(super) async fn get(
     may: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     // Who signed in need not say so again; whoever may see this page is of the staff, unless told otherwise.
@@ -348,7 +349,7 @@ enum Given {
 pub(super) async fn post(
     may: May<access::Answer>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, access::Answer>,
     Form(form): Form<Submitted>,
 ) -> Result<Response, PageError> {
     let (saved, status, why) = match give(&app, &may.caller, id, &form).await {
@@ -425,7 +426,7 @@ pub(super) struct Retract {
 pub(super) async fn retract(
     may: May<access::Answer>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, access::Answer>,
     Form(form): Form<Retract>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;

@@ -5,8 +5,9 @@ use super::format;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::Form;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::devices::{self, Device};
 use crate::store::{DeviceId, commit};
 use crate::studies::device;
@@ -80,7 +81,7 @@ impl DevicePage {
 }
 
 /// `GET /devices/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<DeviceId>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<DeviceId, Read>) -> Page {
     let device = devices::get(&mut *app.read().await?, id).await?;
     page(&DevicePage::of(device, may.caller.may(Run::NEEDED)))
 }
@@ -89,7 +90,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<
 pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<DeviceId>,
+    Id(id, _): Id<DeviceId, Run>,
     Form(typed): Form<Typed>,
 ) -> Result<Response, PageError> {
     let before = devices::get(&mut *app.read().await?, id).await?;

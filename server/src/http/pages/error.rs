@@ -5,9 +5,7 @@ use crate::error::Error;
 use crate::http::identify::AnsweredTo;
 use crate::http::problem::Problem;
 use askama::Template;
-use axum::extract::Request;
-use axum::http::{Method, Uri, header};
-use axum::middleware::Next;
+use axum::http::{Method, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 
 /// An error that is shown as a page.
@@ -33,12 +31,13 @@ impl IntoResponse for PageError {
         if matches!(self.0, Error::NotSignedIn(_)) {
             return Redirect::to("/sign-in").into_response();
         }
-        // `problems_as_pages` makes a page of it, with the navigation of whoever asked.
+        // `answers::complete` makes a page of it, with the navigation of whoever asked.
         self.0.into_response()
     }
 }
 
-fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
+/// A problem as a page, with the navigation of whoever asked.
+pub(in crate::http) fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
     let status = problem.status();
     match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),
@@ -71,21 +70,4 @@ pub async fn no_such_method(method: Method, uri: Uri) -> Error {
 pub fn is_for_programs(path: &str) -> bool {
     ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
         || ["/health", "/ready", "/metrics"].contains(&path)
-}
-
-/// Shows the problem documents of addresses for people as pages, wherever they come from.
-pub async fn problems_as_pages(request: Request, next: Next) -> Response {
-    let for_programs = is_for_programs(request.uri().path());
-    let mut answer = next.run(request).await;
-    if for_programs {
-        return answer;
-    }
-    let Some(problem) = answer.extensions_mut().remove::<Problem>() else { return answer };
-    let allow = answer.headers_mut().remove(header::ALLOW);
-    let to = answer.extensions().get::<AnsweredTo>().copied();
-    let mut shown = shown(problem, to);
-    if let Some(allow) = allow {
-        shown.headers_mut().insert(header::ALLOW, allow);
-    }
-    shown
 }

@@ -4,8 +4,8 @@ use super::error::PageError;
 use super::format;
 use crate::access::Run;
 use crate::http::AppState;
-use crate::http::extract::Id;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::trials::Trial;
 use crate::store::{TrialId, commit};
 use crate::studies::explanation::{self, ExplanationState};
@@ -47,7 +47,7 @@ impl NoGait {
 pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
     explanation::ask(&mut writer, &may.caller.actor, id, app.director.explaining(id)).await?;

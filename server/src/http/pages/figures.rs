@@ -10,6 +10,7 @@ use crate::gait_charts;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
+use crate::http::reached::{Named, reached};
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, band_in_words};
 use crate::store::studies::Study;
@@ -277,18 +278,22 @@ pub(super) struct Beside {
 
 /// `GET /studies/{id}/figures`.
 pub(super) async fn get(
-    _: May<Read>,
+    may: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(beside): Params<Beside>,
 ) -> Page {
     let other = match beside.other.as_deref() {
         None | Some("") => None,
-        Some(text) => Some(text.parse::<StudyId>().map_err(|_| Error::invalid("other", text, "a study of the list"))?),
+        Some(text) => {
+            Some(text.parse::<Named<StudyId>>().map_err(|_| Error::invalid("other", text, "a study of the list"))?)
+        }
     };
+    let reach = may.caller.reach();
+    let other = reached(&mut *app.read().await?, reach, other).await?;
     let StudyFigures { study, best, without_gait, sections, .. } = of_study(&app, id, other).await?;
     let mut reader = app.read().await?;
-    let mut offered = studies::page(&mut reader, None, OFFERED).await?;
+    let mut offered = studies::page(&mut reader, reach, None, OFFERED).await?;
     offered.retain(|offered| offered.id != id);
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
     drop(reader);

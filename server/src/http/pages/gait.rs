@@ -65,7 +65,7 @@ impl GaitPage {
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<TrialId>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<TrialId, Read>) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;

@@ -74,8 +74,9 @@ pub(super) async fn get(
 }
 
 async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page {
+    let reach = may.caller.reach();
     let mut reader = app.read().await?;
-    let mut found = studies::page(&mut reader, before, PAGE + 1).await?;
+    let mut found = studies::page(&mut reader, reach, before, PAGE + 1).await?;
     let more = found.len() > PAGE as usize;
     found.truncate(PAGE as usize);
     let next = found.last().filter(|_| more).map(|study| study.id);
@@ -83,8 +84,8 @@ async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page 
     for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    let unsafe_gaits = objections::undecided(&mut reader, PAGE).await?.into_iter().map(unsafe_gaits);
-    let held = studies::waiting_for_people(&mut reader, PAGE).await?.into_iter().map(waiting);
+    let unsafe_gaits = objections::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
+    let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
     page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })

@@ -9,9 +9,10 @@ use super::lab_recordings::{Forms, Settings};
 use crate::access::{Administer, Caller, Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::http::problem::Problem;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
@@ -68,7 +69,7 @@ impl Fields {
 }
 
 /// `GET /studies/{id}/lab`.
-pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<StudyId>) -> Page {
+pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<StudyId, Read>) -> Page {
     show_list(&app, id, may.caller.may(Run::NEEDED), Fields::default(), None).await
 }
 
@@ -107,7 +108,7 @@ async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, r
 pub(super) async fn plan(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     Form(fields): Form<Fields>,
 ) -> Result<Response, PageError> {
     let planned = async {
@@ -228,7 +229,7 @@ struct WalkRow {
 }
 
 /// `GET /lab-sessions/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id): Shown<LabSessionId>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<LabSessionId, Read>) -> Page {
     show(&app, id, &may.caller, Forms::default(), None).await
 }
 
@@ -293,7 +294,7 @@ pub(super) struct Note {
 pub(super) async fn close(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     Form(Note { note }): Form<Note>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
@@ -308,7 +309,7 @@ pub(super) async fn close(
 pub(super) async fn unblind(
     may: May<Administer>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Administer>,
     Form(Note { note }): Form<Note>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;

@@ -5,8 +5,9 @@ use super::lab;
 use crate::access::Run;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::Form;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::{LabSessionId, commit};
 use crate::studies::lab::{self as session, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion};
 use crate::studies::recording::Unit;
@@ -125,7 +126,7 @@ impl MotionFields {
 pub(super) async fn electromyogram(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<EmgFields>,
 ) -> Result<Response, PageError> {
     let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
@@ -137,7 +138,7 @@ pub(super) async fn electromyogram(
 pub(super) async fn motion(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<MotionFields>,
 ) -> Result<Response, PageError> {
     let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
@@ -187,7 +188,7 @@ pub(super) struct Forms {
 pub(super) async fn process(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Run>,
     Form(typed): Form<Settings>,
 ) -> Result<Response, PageError> {
     let processed = async {

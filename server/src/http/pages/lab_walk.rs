@@ -5,10 +5,11 @@ use super::format::walks_in_words;
 use crate::access::Rate;
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::http::problem::Problem;
-use crate::store::{Instant, LabSessionId, commit, lab_sessions};
+use crate::http::reached::Id;
+use crate::store::{Instant, LabSessionId, commit, lab_sessions, members};
 use crate::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
 use askama::Template;
 use axum::extract::State;
@@ -22,6 +23,8 @@ const LISTED: u32 = 100;
 struct LabPage {
     /// The open sessions, when they were planned, and what is next: names of studies can say what is tuned.
     sessions: Vec<(LabSessionId, Instant, String)>,
+    /// Whether whoever asks reaches any study.
+    assigned: bool,
 }
 
 #[derive(Template)]
@@ -37,10 +40,10 @@ struct WalkPage {
 }
 
 /// `GET /lab`.
-pub(super) async fn list(_: May<Rate>, State(app): State<AppState>) -> Page {
+pub(super) async fn list(may: May<Rate>, State(app): State<AppState>) -> Page {
     let mut reader = app.read().await?;
     let mut sessions = Vec::new();
-    for session in lab_sessions::open(&mut reader, LISTED).await? {
+    for session in lab_sessions::open(&mut reader, may.caller.reach(), LISTED).await? {
         let seen = lab::in_the_lab(&mut reader, session.id).await?;
         let next = match (seen.walk, seen.asks) {
             (Some(walk), _) => format!("walk {walk} is next"),
@@ -49,11 +52,12 @@ pub(super) async fn list(_: May<Rate>, State(app): State<AppState>) -> Page {
         };
         sessions.push((session.id, session.created_at, next));
     }
-    page(&LabPage { sessions })
+    let assigned = members::reaches_any(&mut reader, may.caller.reach()).await?;
+    page(&LabPage { sessions, assigned })
 }
 
 /// `GET /lab/{id}`.
-pub(super) async fn get(_: May<Rate>, State(app): State<AppState>, Id(id): Id<LabSessionId>) -> Page {
+pub(super) async fn get(_: May<Rate>, State(app): State<AppState>, Id(id, _): Id<LabSessionId, Rate>) -> Page {
     show(&app, id, None, String::new()).await
 }
 
@@ -67,7 +71,7 @@ async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: 
 pub(super) async fn record(
     may: May<Rate>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
     Form(walked): Form<RecordedWalk>,
 ) -> Result<Response, PageError> {
     let recorded = async {
@@ -85,7 +89,7 @@ pub(super) async fn record(
 pub(super) async fn answer(
     may: May<Rate>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
     Form(new): Form<NewAnswer>,
 ) -> Result<Response, PageError> {
     let answered = async {
@@ -102,7 +106,7 @@ pub(super) async fn answer(
 pub(super) async fn take_back(
     may: May<Rate>,
     State(app): State<AppState>,
-    Id(id): Id<LabSessionId>,
+    Id(id, _): Id<LabSessionId, Rate>,
 ) -> Result<Response, PageError> {
     let taken_back = async {
         let mut writer = app.write().await?;

@@ -18,9 +18,11 @@ mod lab;
 mod lab_charts;
 mod lab_recordings;
 mod lab_walk;
+mod members;
 mod muscles;
 mod new_study;
 mod people;
+mod problems;
 mod rate;
 mod reference;
 mod reference_gaits;
@@ -52,6 +54,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare::retract))
+        .route("/studies/{id}/members", get(members::get).post(members::post))
         .route("/subjects", get(subject::list).post(subject::add))
         .route("/subjects/{id}", get(subject::get))
         .route("/subjects/{id}/consent", post(subject::consent))
@@ -86,6 +89,8 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/system", get(system::get))
         .route("/system/backup", post(system::make_backup))
         .route("/glossary", get(glossary::get))
+        .route("/problems", get(problems::list))
+        .route("/problems/{name}", get(problems::get))
         .route("/api", get(reference::get))
         .route("/sign-in", get(sign_in::get).post(sign_in::post))
         .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))

@@ -5,9 +5,10 @@ use super::format;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::http::problem::Problem;
+use crate::http::reached::Id;
 use crate::store::subjects::{self, Subject};
 use crate::store::{SubjectId, commit};
 use crate::studies::person;
@@ -96,7 +97,7 @@ fn is_of(refused: &str, field: &str) -> bool {
 }
 
 /// `GET /subjects/{id}/muscles`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<SubjectId>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<SubjectId, Read>) -> Page {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let muscles = subjects::muscles(&mut reader, id).await?;
@@ -108,7 +109,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<
 pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Run>,
     Form(typed): Form<Typed>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;

@@ -198,7 +198,7 @@ pub(super) async fn post(
 }
 
 /// Where the asking browser reaches this service: `https://gait.clinic.example`. Other names are refused before.
-fn origin(app: &AppState, headers: &HeaderMap) -> String {
+pub(super) fn origin(app: &AppState, headers: &HeaderMap) -> String {
     let host = headers.get(header::HOST).and_then(|value| value.to_str().ok()).unwrap_or_default();
     let scheme = if app.access.secure { "https" } else { "http" };
     if host.is_empty() { String::new() } else { format!("{scheme}://{host}") }

@@ -5,13 +5,14 @@ use super::format::words;
 use crate::access::{Caller, Rate, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id, Params};
+use crate::http::extract::{Form, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
+use crate::http::reached::Id;
 use crate::plots::gait_tiles;
 use crate::store::presentations::{self, Presentation, Said};
-use crate::store::studies::{FeedbackMode, StudyState};
-use crate::store::{Connection, StudyId, commit, consents, gaits, studies};
+use crate::store::studies::FeedbackMode;
+use crate::store::{Connection, StudyId, commit, consents, gaits, members, studies};
 use crate::studies::blind::{self, RaterAnswer};
 use askama::Template;
 use axum::extract::{Path, State};
@@ -27,6 +28,8 @@ const SEARCHED: u32 = 200;
 #[template(path = "rate.html")]
 struct RatePage {
     studies: Vec<(StudyId, String)>,
+    /// Whether whoever asks reaches any study.
+    assigned: bool,
     nothing: bool,
     /// What was just answered or, without that, the newest answer as long as it can be taken back.
     saved: Option<Saved>,
@@ -104,24 +107,22 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         }
         None => newest(&mut reader, &may.caller).await?,
     };
-    let active = studies::active(&mut reader).await?;
-    let studies = active
+    let reach = may.caller.reach();
+    let studies = studies::asking_raters(&mut reader, reach)
+        .await?
         .into_iter()
-        .filter(|study| {
-            study.plan.feedback_mode != FeedbackMode::Automatic
-                && matches!(study.state, StudyState::Running | StudyState::Waiting)
-        })
         // Names can say what is tuned: a rater sees the end of the identifier.
         .map(|study| (study.id, study.id.short()))
         .collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
-    page(&RatePage { studies, nothing: before.nothing, saved, no_password })
+    let assigned = members::reaches_any(&mut reader, reach).await?;
+    page(&RatePage { studies, assigned, nothing: before.nothing, saved, no_password })
 }
 
 /// A rater's newest answer, if it can be taken back.
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, Error> {
     let mut newest: Option<Presentation> = None;
-    for study in studies::page(db, None, SEARCHED).await? {
+    for study in studies::page(db, caller.reach(), None, SEARCHED).await? {
         if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
             continue;
         }
@@ -149,7 +150,7 @@ async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Sa
 pub(super) async fn next(
     may: May<Rate>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Rate>,
 ) -> Result<Redirect, PageError> {
     let (writer, shown) = blind::next(&mut *app.read().await?, app.store(), &may.caller, id).await?;
     commit(writer).await?;

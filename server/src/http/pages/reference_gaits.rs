@@ -6,8 +6,9 @@ use super::figures;
 use crate::access::{Permission, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
-use crate::http::extract::{Form as Submitted, Id, Params};
+use crate::http::extract::{Form as Submitted, Params};
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::reference_gaits::{self, ReferenceGait};
 use crate::store::subjects::{self, Subject};
 use crate::store::{Connection, ReferenceGaitId, SubjectId, commit};
@@ -150,7 +151,7 @@ struct ReferenceGaitPage {
 }
 
 /// `GET /references/{id}`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id): Id<ReferenceGaitId>) -> Page {
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id, _): Id<ReferenceGaitId, Read>) -> Page {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
     page(&ReferenceGaitPage {
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),

@@ -3,8 +3,9 @@
 use super::error::PageError;
 use crate::access;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id};
+use crate::http::extract::Form;
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::store::{TrialId, commit};
 use crate::studies::safety_review::{self, Decision};
 use axum::extract::State;
@@ -14,7 +15,7 @@ use axum::response::Redirect;
 pub(super) async fn post(
     may: May<access::Answer>,
     State(app): State<AppState>,
-    Id(id): Id<TrialId>,
+    Id(id, _): Id<TrialId, access::Answer>,
     Form(form): Form<Decision>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;

@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
+use crate::http::reached::{Named, reached};
 use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::TrialCounts;
@@ -28,8 +29,8 @@ const OFFERED: u32 = 200;
 /// Which two.
 #[derive(Debug, Deserialize)]
 pub(super) struct Choice {
-    a: Option<StudyId>,
-    b: Option<StudyId>,
+    a: Option<Named<StudyId>>,
+    b: Option<Named<StudyId>>,
 }
 
 #[derive(Template)]
@@ -58,10 +59,12 @@ struct Compared {
 }
 
 /// `GET /studies/compare`.
-pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+    let reach = may.caller.reach();
     let mut reader = app.read().await?;
-    let offered = studies::page(&mut reader, None, OFFERED).await?;
-    let compared = match (choice.a, choice.b) {
+    let offered = studies::page(&mut reader, reach, None, OFFERED).await?;
+    let (a, b) = (reached(&mut reader, reach, choice.a).await?, reached(&mut reader, reach, choice.b).await?);
+    let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {
             return Err(Error::invalid("b", b.to_string(), "another study than a").into());
         }
@@ -77,7 +80,7 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Params(choice
         }
         _ => None,
     };
-    page(&SideBySide { offered, a: choice.a, b: choice.b, compared })
+    page(&SideBySide { offered, a, b, compared })
 }
 
 /// A study as read.

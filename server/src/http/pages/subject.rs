@@ -2,12 +2,13 @@
 
 use super::error::{Page, PageError, page};
 use super::format::{variant, words};
-use crate::access::{Permission, Read, Run};
+use crate::access::{Caller, Permission, Reach, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
-use crate::http::extract::{Form, Id, Params};
+use crate::http::extract::{Form, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
+use crate::http::reached::Id;
 use crate::store::consents::{self, Consent, ConsentKind};
 use crate::store::studies::Study;
 use crate::store::subjects::{self, Subject};
@@ -168,15 +169,16 @@ async fn show_list(
 }
 
 /// `GET /subjects/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id): Id<SubjectId>) -> Page {
-    show(&app, id, may.caller.may(Run::NEEDED), None).await
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<SubjectId, Read>) -> Page {
+    show(&app, id, &may.caller, None).await
 }
 
-async fn show(app: &AppState, id: SubjectId, may_run: bool, refused: Option<String>) -> Page {
+async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>) -> Page {
+    let may_run = caller.may(Run::NEEDED);
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let consents = consents::of_subject(&mut reader, id).await?;
-    let studies = studies_of(&mut reader, id).await?;
+    let studies = studies_of(&mut reader, caller.reach(), id).await?;
     let mut sessions = Vec::new();
     let last = consents.last();
     let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
@@ -188,10 +190,10 @@ async fn show(app: &AppState, id: SubjectId, may_run: bool, refused: Option<Stri
     page(&SubjectPage { subject, consents, withdrawn, may_run, studies, sessions, after, refused })
 }
 
-/// The studies of a subject, the newest first.
-async fn studies_of(db: &mut Connection, id: SubjectId) -> Result<Vec<StudyRow>, Error> {
+/// The studies of a subject that a caller reaches, the newest first.
+async fn studies_of(db: &mut Connection, reach: Reach, id: SubjectId) -> Result<Vec<StudyRow>, Error> {
     let mut rows = Vec::new();
-    for study in studies::of_subject(db, id, PAGE).await? {
+    for study in studies::of_subject(db, reach, id, PAGE).await? {
         let counts = trials::counts(db, study.id).await?;
         rows.push(StudyRow { state: words(study.state.as_str()), variant: variant(study.plan.muscles), counts, study });
     }
@@ -219,11 +221,11 @@ pub(super) struct Signed {
 pub(super) async fn consent(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Run>,
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let done = give(&app, &may, id, form).await;
-    answer(&app, id, done).await
+    answer(&app, id, &may.caller, done).await
 }
 
 async fn give(app: &AppState, may: &May<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -240,11 +242,11 @@ async fn give(app: &AppState, may: &May<Run>, id: SubjectId, form: Signed) -> Re
 pub(super) async fn withdraw(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<SubjectId>,
+    Id(id, _): Id<SubjectId, Run>,
     Form(why): Form<Withdrawal>,
 ) -> Result<Response, PageError> {
     let done = end(&app, &may, id, &why).await;
-    answer(&app, id, done).await
+    answer(&app, id, &may.caller, done).await
 }
 
 async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
@@ -259,11 +261,17 @@ async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) ->
 }
 
 /// Shows the subject anew; what was refused, with the reason.
-async fn answer(app: &AppState, id: SubjectId, done: Result<(), Error>) -> Result<Response, PageError> {
+async fn answer(
+    app: &AppState,
+    id: SubjectId,
+    caller: &Caller,
+    done: Result<(), Error>,
+) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            Ok((Problem::from(&error).status(), show(app, id, true, Some(error.to_string())).await?).into_response())
+            let shown = show(app, id, caller, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),
     }

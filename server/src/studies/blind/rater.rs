@@ -10,7 +10,7 @@ use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
 use crate::store::trials::TrialState;
-use crate::store::{Connection, Instant, StudyId, TrialId, Writer, consents, events, now, studies};
+use crate::store::{Connection, Instant, StudyId, TrialId, Writer, consents, events, members, now, studies};
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::objections::Objections;
@@ -225,10 +225,10 @@ pub(crate) async fn can_be_taken_back(db: &mut Connection, shown: &Presentation)
     Ok(last && stands)
 }
 
-/// The presentation of a token, if it is this rater's.
+/// The presentation of a token, if it is this rater's and the rater reaches its study.
 pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Presentation, Error> {
     let shown = presentations::by_token(db, token).await?;
-    if shown.rater != caller.name {
+    if shown.rater != caller.name || !members::reaches(db, caller.reach(), shown.study_id).await? {
         return Err(Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() });
     }
     consents::may_be_shown(db, shown.study_id).await?;

@@ -12,8 +12,9 @@ use crate::access::{Administer, Caller, Permission, Read, Run};
 use crate::error::Error;
 use crate::gait_charts;
 use crate::http::AppState;
-use crate::http::extract::{Form, Id, Params};
+use crate::http::extract::{Form, Params};
 use crate::http::may::May;
+use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, Tree};
 use crate::store::devices::{self, Device};
@@ -187,7 +188,7 @@ const SHOWN: u32 = 200;
 pub(super) async fn get(
     may: May<Read>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     let mut reader = app.read().await?;
@@ -211,7 +212,7 @@ pub(super) async fn get(
 pub(super) async fn live(
     may: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<StudyId>,
+    Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     page(&read_live(&app, &may.caller, id, choice).await?)
@@ -228,7 +229,7 @@ struct Running {
 pub(super) async fn running(
     _: May<Read>,
     State(app): State<AppState>,
-    Shown(id): Shown<TrialId>,
+    Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, PageError> {
     let trial = trials::get(&mut *app.read().await?, id).await?;
     let Some(track) = app.director.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
@@ -248,7 +249,7 @@ pub(super) struct Do {
 pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
-    Id(id): Id<StudyId>,
+    Id(id, _): Id<StudyId, Run>,
     Form(form): Form<Do>,
 ) -> Result<Redirect, PageError> {
     let act = lifecycle::Act::ALL

@@ -1,0 +1,21 @@
+//! Writes a record of this version with a row in every table. Such a record is kept for each version that people used, so
+//! that the upgrade from it can be tested.
+//!
+//! `cargo run -p gaitwright-tests --example every_table -- tests/records/v1.db.zst`
+
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use gaitwright_tests::every_table;
+
+/// The strongest compression that needs no more memory to read.
+const LEVEL: i32 = 19;
+
+#[tokio::main]
+async fn main() {
+    let to = std::env::args().nth(1).expect("where the compressed record goes");
+    let (_folder, database) = every_table::filled().await;
+    let record = std::fs::read(database).unwrap();
+    let packed = zstd::encode_all(record.as_slice(), LEVEL).unwrap();
+    println!("{to}: {} bytes, {} uncompressed", packed.len(), record.len());
+    std::fs::write(to, packed).unwrap();
+}

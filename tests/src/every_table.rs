@@ -1,0 +1,90 @@
+//! A record with a row in every table.
+
+use crate::analytic::Analytic;
+use crate::service::Service;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+use gaitwright::store::commit;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A record with a row in every table, in a folder of its own.
+pub async fn filled() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    fill(&database).await;
+    (folder, database)
+}
+
+/// Writes a record with a row in every table.
+pub async fn fill(database: &Path) {
+    let service = Service::start(database, Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let pair = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
+    let answer = format!("/api/v1/blind/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    assert_eq!(service.post(&answer, &json!({"answer": "first"})).await.status, StatusCode::CREATED);
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.json();
+    let retract = format!("/api/v1/preferences/{}/retract", given[0]["id"].as_str().unwrap());
+    for (path, body) in [
+        (retract, json!({"reason": "mistyped"})),
+        (format!("/api/v1/subjects/{}/consents", service.subject().await), json!({"form": "form 3"})),
+        (format!("/api/v1/studies/{study}/unblind"), json!({"rater": "not signed in", "reason": "asked"})),
+        ("/api/v1/users".to_owned(), json!({"name": "R1", "role": "rater"})),
+        ("/api/v1/tokens".to_owned(), json!({"name": "rig", "scopes": ["read"]})),
+    ] {
+        let done = service.post(&path, &body).await;
+        assert!(done.status.is_success(), "{path}: {}", done.text);
+    }
+    let subject = json!({"pseudonym": "P1", "height_m": 1.8, "body_mass_kg": 70.0}).to_string();
+    let with_key = Request::post("/api/v1/subjects")
+        .header("content-type", "application/json")
+        .header("idempotency-key", "key-1")
+        .body(Body::from(subject))
+        .unwrap();
+    assert_eq!(service.send(with_key).await.status, StatusCode::CREATED);
+    let mut writer = service.store.write().await.unwrap();
+    for sql in [
+        "insert into sign_in_links (hash, user_id, created_at, expires_at) select hex(zeroblob(32)), id, '', '' from users \
+         limit 1",
+        "insert into sessions (hash, user_id, created_at, seen_at) select hex(zeroblob(32)), id, '', '' from users limit 1",
+        "insert into certificates select trial_id, 1, 1, '{}', created_at from gaits limit 1",
+        "insert into explanation_requests (trial_id, actor, created_at) select id, 'K', '' from trials limit 1",
+        "insert into explanations (trial_id, program, problem_sha256, document, created_at) \
+         select trial_id, 'P', gait_sha256, '{}', created_at from gaits limit 1",
+        "insert into presentation_retractions select presentation_id, created_at from presentation_answers limit 1",
+        "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, actor, created_at) \
+         select 'L', study_id, 1, min(id), max(id), 1, 'K', '' from trials group by study_id",
+        "insert into lab_acts (session_id, act, actor, created_at) values ('L', 'walk_1', 'K', '')",
+        "insert into lab_answers (session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
+        "insert into lab_answer_retractions (session_id, number, actor, created_at) values ('L', 1, 'K', '')",
+        "insert into remarks (id, study_id, first, second, answer, source, author, created_at) \
+         select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', '' from trials group by study_id",
+        "insert into remark_retractions (remark_id, author, reason, created_at) values ('M', 'K', 'r', '')",
+        "insert into safety_reviews (id, trial_id, said_until, verdict, author, reason, created_at) \
+         select 'I', id, '', 'unsafe', 'K', 'r', '' from trials limit 1",
+        "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+         values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
+        "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
+        "insert into subject_muscles (subject_id, definition, actor, created_at) \
+         select id, '{}', 'K', '' from subjects limit 1",
+    ] {
+        sqlx::query(sql).execute(&mut *writer).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+    for (path, body) in [
+        (format!("/api/v1/studies/{study}/members"), json!({"kind": "user", "name": "R1"})),
+        (format!("/api/v1/studies/{study}/access"), json!({"restricted": true})),
+    ] {
+        let done = service.post(&path, &body).await;
+        assert!(done.status.is_success(), "{path}: {}", done.text);
+        if let Some(member) = done.json()["id"].as_str() {
+            let removed = service.post(&format!("/api/v1/study-members/{member}/remove"), &json!({})).await;
+            assert_eq!(removed.status, StatusCode::OK, "{}", removed.text);
+        }
+    }
+    service.stop().await;
+}

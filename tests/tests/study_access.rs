@@ -1,0 +1,402 @@
+//! Who reaches which study: raters their own, staff those that are open, members those that are restricted.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode, header};
+use gaitwright::access::{Right, Role};
+use gaitwright::http::openapi;
+use gaitwright::store::members::MemberKind;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, audit};
+use gaitwright_tests::callers::{As, FORM, member, send, service, signed_in, token};
+use gaitwright_tests::measured::motion;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::time::Duration;
+use tempfile::TempDir;
+use tower::ServiceExt;
+
+const JSON: &str = "application/json";
+const UNKNOWN: &str = "01890000-0000-7000-8000-000000000000";
+const NAME: &str = "stiff ankle of B7";
+
+/// A restricted study with something of every kind that an address can name, and an administrator.
+struct Closed {
+    _folder: TempDir,
+    service: Service,
+    admin: As,
+    study: StudyId,
+    /// By the start of the address: what stands for `{id}` or `{token}` there.
+    names: BTreeMap<&'static str, String>,
+}
+
+async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Value {
+    let answer = send(service, who, &Method::POST, path, JSON, &body.to_string()).await;
+    assert!(answer.status.is_success(), "{path}: {} {}", answer.status, answer.text);
+    answer.json()
+}
+
+impl Closed {
+    async fn new() -> Self {
+        let (folder, service) = service().await;
+        let admin = signed_in(&service, Role::Admin).await;
+        let set_up = |new: &mut gaitwright::studies::plan::NewStudy| {
+            (new.name, new.feedback_mode, new.trial_budget) = (Some(NAME.to_owned()), FeedbackMode::Mixed, 30);
+        };
+        let study = service.study(set_up).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        let trials = service.trials(study).await;
+        let gaits: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+        let (a, b) = (gaits[0].id, gaits[1].id);
+        let api = format!("/api/v1/studies/{study}");
+        let remark = json!({"first": a, "second": b, "answer": "cannot_tell"});
+        let remark = post(&service, &admin, &format!("{api}/remarks"), &remark).await;
+        let pair = json!({"trial_a": a, "trial_b": b, "answer": "a"});
+        let preference = post(&service, &admin, &format!("{api}/preferences"), &pair).await;
+        let session = json!({"gait_one": a, "gait_two": b});
+        let session = post(&service, &admin, &format!("{api}/lab-sessions"), &session).await;
+        let session = session["id"].as_str().unwrap().to_owned();
+        post(&service, &admin, &format!("/api/v1/lab/{session}/walks"), &json!({"walk": 1})).await;
+        let measured = json!({"walk": 1, "recording": motion()});
+        let brought = post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/motions"), &measured).await;
+        member(&service, study, MemberKind::User, "a admin").await;
+        post(&service, &admin, &format!("{api}/access"), &json!({"restricted": true})).await;
+        let listed = send(&service, &admin, &Method::GET, &format!("{api}/members"), "", "").await.json();
+        let id = |value: &Value| value["id"].as_str().unwrap().to_owned();
+        let names = BTreeMap::from([
+            ("studies", study.to_string()),
+            ("rate", study.to_string()),
+            ("trials", a.to_string()),
+            ("preferences", id(&preference)),
+            ("remarks", id(&remark)),
+            ("lab-sessions", session.clone()),
+            ("lab", session),
+            ("lab-recordings", id(&brought)),
+            ("study-members", id(&listed["members"][0])),
+        ]);
+        Self { _folder: folder, service, admin, study, names }
+    }
+
+    /// Everybody who may do something, and is no member.
+    async fn outsiders(&self) -> Vec<(As, &'static str, MemberKind, String)> {
+        let mut all = Vec::new();
+        for (role, name) in [(Role::Clinician, "a clinician"), (Role::Rater, "a rater")] {
+            all.push((signed_in(&self.service, role).await, name, MemberKind::User, name.to_owned()));
+        }
+        for right in [Right::Read, Right::Run, Right::Answer, Right::Rate] {
+            let name = format!("{:?}", [right]);
+            all.push((token(&self.service, &[right]).await, right.as_str(), MemberKind::Token, name));
+        }
+        all
+    }
+}
+
+/// What the whole service shares: no study is told by it.
+const SHARED: [&str; 5] = ["subjects", "devices", "reference-gaits", "users", "tokens"];
+/// The same of pages.
+const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "references"];
+
+/// Every operation of the description and every page that names something of a study: method, address with placeholders,
+/// and the start that says what it names.
+fn doors() -> Vec<(Method, String, String)> {
+    let mut all = Vec::new();
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        let start = path.split('/').nth(3).unwrap_or_default();
+        if !path.contains("{id}") || SHARED.contains(&start) {
+            continue;
+        }
+        for method in item.as_object().unwrap().keys() {
+            all.push((method.to_uppercase().parse().unwrap(), path.clone(), start.to_owned()));
+        }
+    }
+    let pages = include_str!("../../server/src/http/pages/mod.rs");
+    for line in pages.lines().filter(|line| line.contains(".route(\"")) {
+        let path = line.split('"').nth(1).unwrap();
+        let start = path.split('/').nth(1).unwrap();
+        if !path.contains("{id}") || SHARED_PAGES.contains(&start) {
+            continue;
+        }
+        for (method, word) in [(Method::GET, "get("), (Method::POST, "post(")] {
+            if line.contains(word) {
+                all.push((method, path.to_owned(), start.to_owned()));
+            }
+        }
+    }
+    all
+}
+
+/// Status and text of an answer, without the identifiers of what was asked for and of the request.
+fn told(answer: &Answer, id: &str) -> (StatusCode, String) {
+    let request = answer.headers["x-request-id"].to_str().unwrap();
+    (answer.status, answer.text.replace(id, "ID").replace(request, "REQUEST"))
+}
+
+/// What is sent to a door, and a body that it may or may not accept.
+async fn knock(service: &Service, who: &As, method: &Method, path: &str, id: &str) -> Answer {
+    let address = path.replace("{id}", id).replace("{file}", "rmse.csv");
+    let (kind, body) = if path.starts_with("/api/") { (JSON, "{}") } else { (FORM, "") };
+    send(service, who, method, &address, kind, if *method == Method::GET { "" } else { body }).await
+}
+
+/// The newest row of the audit trail.
+async fn newest_act(service: &Service) -> String {
+    let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
+    format!("{} {}", rows[0].seq, rows[0].action)
+}
+
+#[tokio::test]
+async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() {
+    let closed = Closed::new().await;
+    let outsiders = closed.outsiders().await;
+    let before = newest_act(&closed.service).await;
+    let doors = doors();
+    assert!(doors.len() > 100, "{}", doors.len());
+    let mut refused = BTreeMap::new();
+    for (method, path, start) in &doors {
+        let what = || panic!("{path}: say in this test what it names, or that it is shared");
+        let id = closed.names.get(start.as_str()).unwrap_or_else(what);
+        for (who, name, ..) in &outsiders {
+            let there = knock(&closed.service, who, method, path, id).await;
+            let nowhere = knock(&closed.service, who, method, path, UNKNOWN).await;
+            let said = format!("{method} {path} as {name}: {} {}", there.status, there.text);
+            assert!(matches!(there.status, StatusCode::NOT_FOUND | StatusCode::FORBIDDEN), "{said}");
+            assert_eq!(told(&there, id), told(&nowhere, UNKNOWN), "{said}");
+            *refused.entry(*name).or_insert(0) += usize::from(there.status == StatusCode::NOT_FOUND);
+        }
+    }
+    // Who has a right is refused by the study, and not by the right alone.
+    assert!(refused.values().all(|count| *count > 0) && refused["a clinician"] > 90, "{refused:?}");
+    assert_eq!(newest_act(&closed.service).await, before, "nothing was changed");
+
+    // The same callers as members: every door that their rights open lets them through.
+    for (_, _, kind, name) in &outsiders {
+        member(&closed.service, closed.study, *kind, name).await;
+    }
+    for (method, path, start) in doors.iter().filter(|(method, ..)| *method == Method::GET) {
+        for (who, name, ..) in &outsiders {
+            if path.ends_with("/events") {
+                continue;
+            }
+            let there = knock(&closed.service, who, method, path, &closed.names[start.as_str()]).await;
+            let nowhere = knock(&closed.service, who, method, path, UNKNOWN).await;
+            let said = format!("{method} {path} as {name}: {} {}", there.status, there.text);
+            let same = told(&there, &closed.names[start.as_str()]) == told(&nowhere, UNKNOWN);
+            assert_eq!(same, there.status == StatusCode::FORBIDDEN, "{said}");
+        }
+    }
+    closed.service.stop().await;
+}
+
+#[tokio::test]
+async fn lists_show_a_restricted_study_to_its_members_alone() {
+    let closed = Closed::new().await;
+    let service = &closed.service;
+    let open = service.study(|new| new.trial_budget = 2).await;
+    service.wait_for(open, &[StudyState::Finished]).await;
+    let outsiders = closed.outsiders().await;
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let subject = service.subject().await;
+    let mut lists: Vec<String> =
+        document["paths"].as_object().unwrap().keys().filter(|path| !path.contains('{')).cloned().collect();
+    lists.extend(
+        ["/", "/studies/compare", "/subjects", "/rate", "/lab", "/devices", "/references", "/system"].map(Into::into),
+    );
+    lists.extend([format!("/subjects/{subject}"), format!("/studies/{open}/figures")]);
+    let secrets = [NAME.to_owned(), closed.study.to_string(), closed.study.short(), closed.names["lab"].clone()];
+    let shown = async |who: &As| {
+        let mut shown = Vec::new();
+        for path in &lists {
+            let answer = send(service, who, &Method::GET, path, "", "").await;
+            if secrets.iter().any(|secret| answer.text.contains(secret)) {
+                shown.push(path.clone());
+            }
+        }
+        shown
+    };
+    for (who, name, ..) in &outsiders {
+        assert_eq!(shown(who).await, Vec::<String>::new(), "{name}");
+    }
+    let everywhere = shown(&closed.admin).await;
+    for path in ["/", "/api/v1/studies", "/studies/compare", "/lab"] {
+        assert!(everywhere.contains(&path.to_owned()), "{path}: {everywhere:?}");
+    }
+    member(service, closed.study, MemberKind::User, "a clinician").await;
+    let mut to_member = shown(&outsiders[0].0).await;
+    to_member.push("/api/v1/audit".to_owned());
+    to_member.sort();
+    let mut everywhere = everywhere;
+    everywhere.sort();
+    assert_eq!(to_member, everywhere);
+
+    // What the query names is not reached either.
+    let (other, who) = (open, &outsiders.iter().find(|(_, name, ..)| *name == "read").unwrap().0);
+    let study = closed.study;
+    for path in [
+        format!("/api/v1/compare?ids={other},{{}}"),
+        format!("/studies/compare?a={other}&b={{}}"),
+        format!("/studies/{other}/figures?other={{}}"),
+        format!("/api/v1/studies/{other}/figures/rmse.csv?other={{}}"),
+    ] {
+        let there = send(service, who, &Method::GET, &path.replace("{}", &study.to_string()), "", "").await;
+        let nowhere = send(service, who, &Method::GET, &path.replace("{}", UNKNOWN), "", "").await;
+        assert_eq!(there.status, StatusCode::NOT_FOUND, "{path}: {}", there.text);
+        assert_eq!(told(&there, &study.to_string()), told(&nowhere, UNKNOWN), "{path}");
+    }
+    closed.service.stop().await;
+}
+
+/// A study that asks people, and a rater who is not assigned to it.
+async fn asking() -> (TempDir, Service, StudyId, As) {
+    let (folder, service) = service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let rater = signed_in(&service, Role::Rater).await;
+    (folder, service, study, rater)
+}
+
+#[tokio::test]
+async fn rater_reaches_assigned_studies_alone_until_removed() {
+    let (_folder, service, study, rater) = asking().await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let next = format!("/api/v1/studies/{study}/blind/next");
+    let list = send(&service, &rater, &Method::GET, "/rate", "", "").await;
+    assert!(list.text.contains("You are not assigned to a study yet. Ask"), "{}", list.text);
+    assert_eq!(send(&service, &rater, &Method::POST, &next, JSON, "{}").await.status, StatusCode::NOT_FOUND);
+    let page = send(&service, &rater, &Method::POST, &format!("/rate/{study}"), FORM, "").await;
+    assert_eq!(page.status, StatusCode::NOT_FOUND);
+
+    // A clinician who runs the study assigns the rater.
+    let members = format!("/api/v1/studies/{study}/members");
+    let new = json!({"kind": "user", "name": "a rater"});
+    let added = post(&service, &clinician, &members, &new).await;
+    let again = send(&service, &clinician, &Method::POST, &members, JSON, &new.to_string()).await;
+    assert_eq!(again.status, StatusCode::CONFLICT, "{}", again.text);
+    let nobody = json!({"kind": "user", "name": "R9"}).to_string();
+    let unknown = send(&service, &clinician, &Method::POST, &members, JSON, &nobody).await;
+    assert_eq!((unknown.status, unknown.json()["field"].clone()), (StatusCode::UNPROCESSABLE_ENTITY, json!("name")));
+    let list = send(&service, &rater, &Method::GET, "/rate", "", "").await;
+    assert!(list.text.contains(&format!("/rate/{study}")), "{}", list.text);
+    let pair = post(&service, &rater, &next, &json!({})).await;
+    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
+    let doors = [
+        (Method::GET, format!("/api/v1/blind/{token}/first")),
+        (Method::GET, format!("/api/v1/blind/{token}/second")),
+        (Method::GET, format!("/rate/pair/{token}")),
+    ];
+    for (method, path) in &doors {
+        assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::OK, "{path}");
+    }
+
+    // Removed, the rater does not reach the pair in hand either.
+    let remove = format!("/api/v1/study-members/{}/remove", added["id"].as_str().unwrap());
+    post(&service, &clinician, &remove, &json!({})).await;
+    let twice = send(&service, &clinician, &Method::POST, &remove, JSON, "{}").await;
+    assert_eq!(twice.status, StatusCode::CONFLICT, "{}", twice.text);
+    let (answer, body) = (format!("/api/v1/blind/{token}/answer"), r#"{"answer": "first"}"#);
+    let form = format!("/rate/pair/{token}");
+    for (method, path) in &doors {
+        assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::NOT_FOUND, "{path}");
+    }
+    assert_eq!(send(&service, &rater, &Method::POST, &answer, JSON, body).await.status, StatusCode::NOT_FOUND);
+    let sent = send(&service, &rater, &Method::POST, &form, FORM, "answer=first").await;
+    assert_eq!(sent.status, StatusCode::NOT_FOUND);
+    let back = send(&service, &rater, &Method::POST, &format!("{form}/take-back"), FORM, "").await;
+    assert_eq!(back.status, StatusCode::NOT_FOUND);
+    let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={token}"), "", "").await;
+    assert_eq!(saved.status, StatusCode::NOT_FOUND);
+
+    // Assigned anew, the pair is there again.
+    member(&service, study, MemberKind::User, "a rater").await;
+    post(&service, &rater, &answer, &json!({"answer": "first"})).await;
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn clinician_who_restricts_a_study_stays_a_member_and_its_fork_is_restricted_too() {
+    let (_folder, service, study, _) = asking().await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let script = token(&service, &[Right::Read]).await;
+    let path = format!("/api/v1/studies/{study}");
+    let status = async |who: &As, path: &str| send(&service, who, &Method::GET, path, "", "").await.status;
+    assert_eq!(status(&script, &path).await, StatusCode::OK);
+    let access = post(&service, &clinician, &format!("{path}/access"), &json!({"restricted": true})).await;
+    assert_eq!((&access["restricted"], &access["members"][0]["name"]), (&json!(true), &json!("a clinician")));
+    assert_eq!(status(&script, &path).await, StatusCode::NOT_FOUND);
+    assert_eq!(status(&clinician, &path).await, StatusCode::OK);
+
+    member(&service, study, MemberKind::User, "a rater").await;
+    let fork = post(&service, &clinician, &format!("{path}/fork"), &json!({})).await;
+    let fork = format!("/api/v1/studies/{}", fork["id"].as_str().unwrap());
+    assert_eq!(status(&script, &fork).await, StatusCode::NOT_FOUND);
+    let members = send(&service, &clinician, &Method::GET, &format!("{fork}/members"), "", "").await.json();
+    let names: Vec<_> = members["members"].as_array().unwrap().iter().map(|member| &member["name"]).collect();
+    assert_eq!((&members["restricted"], names), (&json!(true), vec![&json!("a clinician")]), "raters are not copied");
+
+    post(&service, &clinician, &format!("{path}/access"), &json!({"restricted": false})).await;
+    assert_eq!(status(&script, &path).await, StatusCode::OK);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn event_stream_ends_for_whoever_is_removed() {
+    let (_folder, service, study, _) = asking().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    let As::Session(secret) = signed_in(&service, Role::Clinician).await else { panic!("a session") };
+    let added = member(&service, study, MemberKind::User, "a clinician").await;
+    let path = format!("/api/v1/studies/{study}");
+    post(&service, &admin, &format!("{path}/access"), &json!({"restricted": true})).await;
+    let request = Request::get(format!("{path}/events"))
+        .header(header::COOKIE, format!("gaitwright_session={secret}"))
+        .body(Body::empty())
+        .unwrap();
+    let stream = service.router().oneshot(request).await.unwrap();
+    assert_eq!(stream.status(), StatusCode::OK);
+    let read = tokio::spawn(axum::body::to_bytes(stream.into_body(), 1 << 20));
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    assert!(!read.is_finished(), "the stream stays open for a member");
+    post(&service, &admin, &format!("/api/v1/study-members/{}/remove", added.id), &json!({})).await;
+    let ended = tokio::time::timeout(Duration::from_secs(10), read).await;
+    assert!(ended.is_ok(), "the stream goes on");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn rater_is_invited_with_assignment_and_link_in_one_step() {
+    let (_folder, service, study, _) = asking().await;
+    let (admin, clinician) = (signed_in(&service, Role::Admin).await, signed_in(&service, Role::Clinician).await);
+    let invite = format!("/api/v1/studies/{study}/invitations");
+    let by_clinician = send(&service, &clinician, &Method::POST, &invite, JSON, r#"{"name": "R7"}"#).await;
+    assert_eq!(by_clinician.status, StatusCode::FORBIDDEN);
+    let staff = send(&service, &admin, &Method::POST, &invite, JSON, r#"{"name": "a clinician"}"#).await;
+    assert_eq!(staff.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", staff.text);
+    for _ in 0..2 {
+        let invited = post(&service, &admin, &invite, &json!({"name": "R7"})).await;
+        let link = invited["path"].as_str().unwrap();
+        let entered = send(&service, &As::Nobody, &Method::POST, link, FORM, "").await;
+        let rater = gaitwright_tests::callers::session_of(&entered);
+        let list = send(&service, &rater, &Method::GET, "/rate", "", "").await;
+        assert!(list.text.contains(&format!("/rate/{study}")), "{}", list.text);
+    }
+
+    // The same on the page; a clinician assigns and removes there.
+    let page = format!("/studies/{study}/members");
+    let shown = send(&service, &admin, &Method::POST, &page, FORM, "act=invite&name=R8").await;
+    assert!(shown.text.contains("R8 is assigned") && shown.text.contains("/sign-in/"), "{}", shown.text);
+    let refused = send(&service, &clinician, &Method::POST, &page, FORM, "act=invite&name=R9").await;
+    assert_eq!(refused.status, StatusCode::FORBIDDEN);
+    let added = send(&service, &clinician, &Method::POST, &page, FORM, "act=add&who=user+a+rater").await;
+    assert_eq!(added.status, StatusCode::SEE_OTHER, "{}", added.text);
+    let listed = send(&service, &clinician, &Method::GET, &format!("/api/v1{page}"), "", "").await.json();
+    let names: Vec<_> = listed["members"].as_array().unwrap().iter().map(|member| &member["name"]).collect();
+    assert_eq!(names, ["R7", "R8", "a rater"]);
+    let remove = format!("act=remove&member={}", listed["members"][2]["id"].as_str().unwrap());
+    let removed = send(&service, &clinician, &Method::POST, &page, FORM, &remove).await;
+    assert_eq!(removed.status, StatusCode::SEE_OTHER, "{}", removed.text);
+    let shown = send(&service, &clinician, &Method::GET, &page, "", "").await;
+    assert!(shown.text.contains("R8") && !shown.text.contains("aria-label=\"Remove a rater\""), "{}", shown.text);
+    service.stop().await;
+}
