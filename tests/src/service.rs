@@ -7,6 +7,7 @@ use axum::body::Body;
 use axum::http::{HeaderMap, HeaderValue, Method, Request, Response, StatusCode, header};
 use axum::middleware::map_request;
 use gait_optimizer::Gait;
+use gaitwright::access::Reach;
 use gaitwright::http::{Access, AppState, Hosts, router};
 use gaitwright::store::audit::Actor;
 use gaitwright::store::certificates::{self, CertificateOnRecord};
@@ -268,7 +269,7 @@ impl Service {
 async fn pass_every_gait(store: &Store) -> bool {
     let Ok(mut reader) = store.read().await else { return false };
     let mut waiting = Vec::new();
-    for study in studies::page(&mut reader, None, 1000).await.unwrap() {
+    for study in studies::page(&mut reader, Reach::Every, None, 1000).await.unwrap() {
         let found = certificates::of_study(&mut reader, study.id).await.unwrap();
         waiting.extend(found.into_iter().filter(|(_, found)| *found == CertificateOnRecord::NotCertified));
     }

@@ -8,9 +8,9 @@ use crate::gait_table::gait_csv;
 use crate::plots::Figure;
 use clap::{Args, ValueEnum};
 use gait_optimizer::certificate::certify;
-use gait_optimizer::{Gait, SolveStatus};
 use gait_optimizer::export::{ControllerFile, motion_file};
 use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::{Gait, SolveStatus};
 use std::path::PathBuf;
 
 /// What a gait is converted to.

@@ -200,6 +200,14 @@ pub async fn admit(db: &mut Connection, trial: TrialId) -> StoreResult<Result<Wa
     Ok(Grounds::read(db, trial.study_id).await?.admit(&trial))
 }
 
+/// Whether both gaits of a pair that was drawn earlier may still reach a person.
+///
+/// # Errors
+/// What the database reports, with a trial that does not exist.
+pub async fn are_walkable(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<bool> {
+    Ok(admit(db, a).await?.is_ok() && admit(db, b).await?.is_ok())
+}
+
 /// Two different gaits of one study that a person may be asked about.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WalkablePair {

@@ -16,6 +16,7 @@ use crate::studies::comparison::open_question;
 use crate::studies::objections::Objections;
 use crate::studies::preference::{self, Again, Statement};
 use crate::studies::standing::Standing;
+use crate::studies::walkable;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -92,7 +93,7 @@ pub async fn next(
     let closed: Vec<TrialId> = objections.closed.iter().map(|closed| closed.trial).collect();
     let own: Vec<Presentation> = all.iter().filter(|shown| shown.rater == caller.name).cloned().collect();
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
-        if !closed.contains(&open.shown_first) && !closed.contains(&open.shown_second) {
+        if walkable::are_walkable(&mut writer, open.pair()).await? {
             note(&mut writer, caller, open, "presentation.show").await?;
             return Ok((writer, Some(open.clone())));
         }

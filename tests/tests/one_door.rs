@@ -1,0 +1,553 @@
+//! Every way to ask a person, to walk or to reach a device keeps the same rules.
+//!
+//! Doors are taken from the description of the REST interface, the page router and the commands: one that is added and not
+//! classified here fails the test. Every classified door is then tried under every condition that must close it.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::http::openapi;
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::TrialState;
+use gaitwright::store::{StudyId, TrialId, lab_sessions};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use tempfile::TempDir;
+
+const FORM: &str = "application/x-www-form-urlencoded";
+
+/// What a door leads to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Door {
+    /// A preference between two gaits that somebody chose.
+    Preference,
+    /// A note that two gaits cannot be told apart: it skips the pair.
+    Note,
+    /// A rater's answer to a pair that the service drew.
+    RaterAnswer,
+    /// Showing a rater a pair.
+    RaterPair,
+    /// The plan of a lab session.
+    Plan,
+    /// The record of a walk.
+    Walk,
+    /// What a walker says of two walks.
+    WalkAnswer,
+    /// A controller file of a trial.
+    DeviceFile,
+    /// A controller file of a walk.
+    WalkFile,
+    /// Bounds to take.
+    Recommendation,
+    /// Nothing of these; why not.
+    None(&'static str),
+}
+
+/// A condition that must close a door.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rule {
+    /// One of the two gaits was reported unsafe.
+    Safety,
+    /// One of the two gaits has no certificate.
+    Certificate,
+    /// The subject withdrew.
+    Withdrawal,
+    /// The same person has answered.
+    Duplicate,
+    /// Both trials gave the same gait, or are the same trial.
+    EqualGaits,
+    /// One of the two trials has no converged gait.
+    NotConverged,
+}
+
+const RULES: [Rule; 6] =
+    [Rule::Safety, Rule::Certificate, Rule::Withdrawal, Rule::Duplicate, Rule::EqualGaits, Rule::NotConverged];
+
+const READS: Door = Door::None("shows or gives out what is recorded; walks and answers do not follow from it");
+const RETRACTS: Door = Door::None("takes something back");
+const RUNS: Door = Door::None("runs solves or examinations; no person is asked");
+const SETS_UP: Door = Door::None("sets up subjects, devices, references, users or the service");
+
+/// Every operation that changes something or hands something to a device or a person. Reading is the default for GET.
+fn door_of(operation: &str) -> Option<Door> {
+    Some(match operation {
+        "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => Door::Preference,
+        "post /api/v1/studies/{id}/remarks" => Door::Note,
+        "post /api/v1/blind/{token}/answer" | "post /rate/pair/{token}" => Door::RaterAnswer,
+        "post /api/v1/studies/{id}/blind/next" | "post /rate/{id}" => Door::RaterPair,
+        "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => Door::Plan,
+        "post /api/v1/lab/{id}/walks" | "post /lab/{id}" => Door::Walk,
+        "post /api/v1/lab/{id}/answers" | "post /lab/{id}/answer" => Door::WalkAnswer,
+        "get /api/v1/trials/{id}/controller.json" => Door::DeviceFile,
+        "get /api/v1/lab-sessions/{id}/controller.json" => Door::WalkFile,
+        "get /api/v1/studies/{id}/recommendation" | "get /api/v1/studies/{id}/recommendation.csv" => {
+            Door::Recommendation
+        }
+        "post /api/v1/studies/{id}/suggestions" => {
+            Door::None("says which bounds would have been better than a trial: nobody is asked to walk with that one")
+        }
+        "post /api/v1/trials/{id}/safety-reviews" | "post /trials/{id}/safety-review" => {
+            Door::None("decides about a report; `safety_review.rs` holds its rules")
+        }
+        "post /api/v1/preferences/{id}/retract"
+        | "post /api/v1/remarks/{id}/retract"
+        | "post /studies/{id}/retract"
+        | "post /api/v1/lab/{id}/take-back"
+        | "post /lab/{id}/take-back"
+        | "post /api/v1/blind/{token}/take-back"
+        | "post /rate/pair/{token}/take-back" => RETRACTS,
+        "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
+            Door::None("the lab evaluates a trial by itself; figures, and no person's answer")
+        }
+        _ if operation.starts_with("get ") => READS,
+        _ if [
+            "/certif",
+            "/explain",
+            "/explanation",
+            "/cancel",
+            "/retry",
+            "/emg-results",
+            "/process",
+            "/motions",
+            "/electromyograms",
+        ]
+        .iter()
+        .any(|part| operation.contains(part)) =>
+        {
+            RUNS
+        }
+        _ => return set_up(operation),
+    })
+}
+
+/// Operations that set something up, each by name.
+fn set_up(operation: &str) -> Option<Door> {
+    const KNOWN: &str = include_str!("one_door/set_up.txt");
+    KNOWN.lines().any(|line| line == operation).then_some(SETS_UP)
+}
+
+/// Every operation of the REST interface and every page.
+fn operations() -> Vec<String> {
+    let mut all = Vec::new();
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        all.extend(item.as_object().unwrap().keys().map(|method| format!("{method} {path}")));
+    }
+    for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
+        let path = line.split('"').nth(1).unwrap();
+        for method in ["get", "post"] {
+            if line.contains(&format!("{method}(")) {
+                all.push(format!("{method} {path}"));
+            }
+        }
+    }
+    all
+}
+
+/// A service with a study that waits for an answer about its first two gaits, of which one is younger.
+struct Scene {
+    _folder: TempDir,
+    service: Service,
+    study: StudyId,
+    /// Two different converged gaits; nobody has compared them.
+    pair: (TrialId, TrialId),
+    /// A trial without a gait.
+    without_gait: TrialId,
+    /// A converged trial with the very gait of the first of the pair.
+    equal: TrialId,
+}
+
+impl Scene {
+    async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (24, FeedbackMode::Mixed)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        let trials = service.trials(study).await;
+        let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
+        let without_gait = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap().id;
+        let (first, second) = (converged[0], converged[1]);
+        // The same figures to the last bit: what a bound gives that no gait comes near.
+        let equal = converged[2].id;
+        let scene = Self { _folder: folder, service, study, pair: (first.id, second.id), without_gait, equal };
+        let report = serde_json::to_string(first.report.as_ref().unwrap()).unwrap();
+        scene.by_hand("drop trigger trials_result_fixed").await;
+        scene.by_hand(&format!("update trials set report = '{report}' where id = '{equal}'")).await;
+        scene
+    }
+
+    async fn by_hand(&self, sql: &str) {
+        let mut writer = self.service.store.write().await.unwrap();
+        sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut *writer).await.unwrap();
+        gaitwright::store::commit(writer).await.unwrap();
+    }
+
+    /// How many rows each table has that a door may write.
+    async fn rows(&self) -> BTreeMap<&'static str, i64> {
+        let mut reader = self.service.store.read().await.unwrap();
+        let mut counts = BTreeMap::new();
+        for table in
+            ["feedback", "remarks", "presentations", "presentation_answers", "lab_sessions", "lab_acts", "lab_answers"]
+        {
+            let sql = sqlx::AssertSqlSafe(format!("select count(*) from {table}"));
+            counts.insert(table, sqlx::query_scalar(sql).fetch_one(&mut *reader).await.unwrap());
+        }
+        counts
+    }
+
+    async fn post(&self, path: &str, body: &Value) -> Answer {
+        let answer = self.service.post(path, body).await;
+        assert!(answer.status.is_success(), "{path}: {}", answer.text);
+        answer
+    }
+
+    /// Makes a condition true, for `pair`; the pair to try the door with.
+    async fn violate(&self, rule: Rule) -> (TrialId, TrialId) {
+        let (first, second) = self.pair;
+        match rule {
+            Rule::Safety => {
+                let report = json!({"first": first, "second": self.equal, "answer": "unsafe_first", "author": "S"});
+                self.post(&format!("/api/v1/studies/{}/remarks", self.study), &report).await;
+                (first, second)
+            }
+            Rule::Certificate => {
+                self.by_hand("drop trigger certificates_no_delete").await;
+                self.by_hand(&format!("delete from certificates where trial_id = '{first}'")).await;
+                (first, second)
+            }
+            Rule::Withdrawal => {
+                let subject = self.service.subject().await;
+                self.post(&format!("/api/v1/subjects/{subject}/consents"), &json!({"form": "1"})).await;
+                self.post(&format!("/api/v1/subjects/{subject}/withdraw"), &json!({"reason": "asked to"})).await;
+                (first, second)
+            }
+            Rule::Duplicate => {
+                let given = json!({"trial_a": second, "trial_b": first, "answer": "a", "author": "K"});
+                self.post(&format!("/api/v1/studies/{}/preferences", self.study), &given).await;
+                (first, second)
+            }
+            Rule::EqualGaits => (first, self.equal),
+            Rule::NotConverged => (first, self.without_gait),
+        }
+    }
+
+    /// A session with the pair, after so many walks.
+    async fn session(&self, walks: u8) -> String {
+        let body = json!({"gait_one": self.pair.0, "gait_two": self.pair.1});
+        let planned = self.post(&format!("/api/v1/studies/{}/lab-sessions", self.study), &body).await.json();
+        let id = planned["id"].as_str().unwrap().to_owned();
+        for walk in 1..=walks {
+            self.post(&format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+        }
+        id
+    }
+}
+
+/// Sends what opens a door about a pair; `session`: a session of the pair.
+async fn knock(scene: &Scene, operation: &str, pair: (TrialId, TrialId), session: &str) -> Answer {
+    let (a, b) = pair;
+    let (service, study) = (&scene.service, scene.study);
+    let key = "01890000-0000-7000-8000-000000000009";
+    match operation {
+        "post /api/v1/studies/{id}/preferences" => {
+            let body = json!({"trial_a": a, "trial_b": b, "answer": "a", "author": "K"});
+            service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await
+        }
+        "post /studies/{id}/compare" => {
+            let body = format!("a={a}&b={b}&answer=a&source=clinician&author=K&note=&key={key}");
+            service.post_text(&format!("/studies/{study}/compare"), FORM, &body).await
+        }
+        "post /api/v1/studies/{id}/remarks" => {
+            let body = json!({"first": a, "second": b, "answer": "cannot_tell", "author": "K"});
+            service.post(&format!("/api/v1/studies/{study}/remarks"), &body).await
+        }
+        "post /api/v1/studies/{id}/lab-sessions" => {
+            service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &json!({"gait_one": a, "gait_two": b})).await
+        }
+        "post /studies/{id}/lab" => {
+            service
+                .post_text(&format!("/studies/{study}/lab"), FORM, &format!("gait_one={a}&gait_two={b}&notes="))
+                .await
+        }
+        "post /api/v1/lab/{id}/walks" => {
+            service.post(&format!("/api/v1/lab/{session}/walks"), &json!({"walk": 2})).await
+        }
+        "post /lab/{id}" => service.post_text(&format!("/lab/{session}"), FORM, "walk=2&note=").await,
+        "get /api/v1/trials/{id}/controller.json" => {
+            service.fetch(&format!("/api/v1/trials/{a}/controller.json")).await
+        }
+        "get /api/v1/lab-sessions/{id}/controller.json" => {
+            service.fetch(&format!("/api/v1/lab-sessions/{session}/controller.json?walk=2")).await
+        }
+        other => panic!("nobody knows how to knock at {other}"),
+    }
+}
+
+/// What a rule does at a door: `None` where the rule cannot be broken there, with the reason.
+fn expected(door: Door, rule: Rule) -> Result<(), &'static str> {
+    match (door, rule) {
+        (Door::Plan | Door::Walk | Door::DeviceFile | Door::WalkFile, Rule::Duplicate) => {
+            Err("the same gaits may be walked with again")
+        }
+        (Door::Walk | Door::WalkFile, Rule::EqualGaits | Rule::NotConverged) => {
+            Err("a session with such a pair cannot be planned")
+        }
+        (Door::DeviceFile, Rule::EqualGaits) => Err("a file is of one gait"),
+        _ => Ok(()),
+    }
+}
+
+#[test]
+fn every_route_is_classified() {
+    let unknown: Vec<String> = operations().into_iter().filter(|operation| door_of(operation).is_none()).collect();
+    assert!(unknown.is_empty(), "say in tests/tests/one_door.rs what these lead to:\n{}", unknown.join("\n"));
+}
+
+/// What each command has to do with people and devices.
+const COMMANDS: [(&str, &str); 21] = [
+    ("convert", "makes a controller file of a gait file that no record knows: certifies it and says so"),
+    ("import", "writes the rows of an archive as they are, after checking them: `archives.rs` holds its rules"),
+    ("audit", "reads the record"),
+    ("backup", "copies the record"),
+    ("body", "writes a body's figures"),
+    ("certify", "examines a gait file"),
+    ("config", "shows settings"),
+    ("emg", "processes a recording"),
+    ("export", "writes an archive"),
+    ("help", "explains commands"),
+    ("openapi", "prints the description"),
+    ("prune", "drops old trajectories"),
+    ("reference", "makes a reference of a recording"),
+    ("reproduce", "runs automatic studies"),
+    ("restore", "puts a copy in place of a record"),
+    ("serve", "opens the doors that the other tests knock at"),
+    ("solve", "solves for a gait file"),
+    ("sweep", "solves for gait files"),
+    ("tune", "runs an automatic study"),
+    ("users", "lets people in"),
+    ("worker", "solves jobs"),
+];
+
+#[test]
+fn every_command_is_classified() {
+    let help = std::process::Command::new(env!("CARGO_BIN_EXE_gaitwright-cli")).arg("--help").output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let listed = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let commands: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(commands.len() > 15, "{help}");
+    for command in commands {
+        assert!(COMMANDS.iter().any(|(known, _)| *known == command), "say in this file what {command:?} leads to");
+    }
+}
+
+#[tokio::test]
+async fn every_door_is_closed_by_every_rule() {
+    let doors: Vec<(String, Door)> = operations()
+        .into_iter()
+        .filter_map(|operation| door_of(&operation).map(|door| (operation, door)))
+        .filter(|(_, door)| {
+            matches!(door, Door::Preference | Door::Note | Door::Plan | Door::Walk | Door::DeviceFile | Door::WalkFile)
+        })
+        .collect();
+    assert!(doors.len() >= 9, "{doors:?}");
+    let mut matrix = Vec::new();
+    for (operation, door) in &doors {
+        // Without a broken rule the door is open: a refusal for another reason proves nothing.
+        let scene = Scene::new().await;
+        let session = scene.session(1).await;
+        let open = knock(&scene, operation, scene.pair, &session).await;
+        // The analytic solver's gaits are no gaits of the walker: that is found out behind the door.
+        let is_open = open.status.is_success() || open.status.is_redirection() || open.text.contains("contact_rows");
+        assert!(is_open, "{operation}: {} {}", open.status, open.text);
+        scene.service.stop().await;
+        for rule in RULES {
+            if let Err(why) = expected(*door, rule) {
+                matrix.push(format!("{operation:50} {rule:?}: does not apply ({why})"));
+                continue;
+            }
+            let scene = Scene::new().await;
+            let session = scene.session(1).await;
+            let mut pair = scene.violate(rule).await;
+            if (*door, rule) == (Door::DeviceFile, Rule::NotConverged) {
+                pair = (pair.1, pair.0);
+            }
+            let before = scene.rows().await;
+            let refused = knock(&scene, operation, pair, &session).await;
+            assert!(
+                matches!(refused.status, StatusCode::CONFLICT | StatusCode::UNPROCESSABLE_ENTITY),
+                "{operation} with {rule:?}: {} {}",
+                refused.status,
+                refused.text
+            );
+            assert!(!refused.text.contains("contact_rows"), "{operation} with {rule:?}: {}", refused.text);
+            assert_eq!(scene.rows().await, before, "{operation} with {rule:?} changes nothing");
+            matrix.push(format!("{operation:50} {rule:?}: refused"));
+            scene.service.stop().await;
+        }
+    }
+    assert!(matrix.iter().filter(|row| row.ends_with("refused")).count() >= 40, "{}", matrix.join("\n"));
+}
+
+/// A rater's pair and answer under a rule that is broken after the pair was drawn.
+#[tokio::test]
+async fn a_pair_that_was_shown_is_not_answered_after_a_rule_closes_it() {
+    for (rule, statuses) in [
+        (Rule::Safety, [StatusCode::CONFLICT, StatusCode::OK]),
+        (Rule::Certificate, [StatusCode::CONFLICT, StatusCode::OK]),
+        (Rule::Withdrawal, [StatusCode::CONFLICT, StatusCode::CONFLICT]),
+    ] {
+        let scene = Rated::new().await;
+        let token = scene.token().await;
+        scene.close(rule).await;
+        let before = scene.service.feedback(scene.study).await.len();
+        let answer = format!("/api/v1/blind/{token}/answer");
+        let refused = scene.service.post(&answer, &json!({"answer": "first"})).await;
+        assert_eq!(refused.status, statuses[0], "{rule:?}: {}", refused.text);
+        assert_eq!(scene.service.feedback(scene.study).await.len(), before, "{rule:?}");
+        let next = scene.service.post(&format!("/api/v1/studies/{}/blind/next", scene.study), &json!({})).await;
+        assert_eq!(next.status, statuses[1], "{rule:?}: {}", next.text);
+        assert!(
+            next.status != StatusCode::OK || next.json()["pair"]["token"] != json!(token),
+            "{rule:?}: {}",
+            next.text
+        );
+        scene.service.stop().await;
+    }
+}
+
+/// A study of people with a pair to rate.
+struct Rated {
+    _folder: TempDir,
+    service: Service,
+    study: StudyId,
+}
+
+impl Rated {
+    async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+        service.wait_for(study, &[StudyState::Waiting]).await;
+        Self { _folder: folder, service, study }
+    }
+
+    async fn token(&self) -> String {
+        let next = self.service.post(&format!("/api/v1/studies/{}/blind/next", self.study), &json!({})).await.json();
+        next["pair"]["token"].as_str().unwrap().to_owned()
+    }
+
+    async fn close(&self, rule: Rule) {
+        let trials = self.service.trials(self.study).await;
+        let gaits: Vec<TrialId> =
+            trials.iter().filter(|trial| trial.state == TrialState::Converged).map(|trial| trial.id).collect();
+        match rule {
+            Rule::Safety => {
+                let report = json!({"first": gaits[0], "second": gaits[1], "answer": "unsafe_both", "author": "S"});
+                self.service.post(&format!("/api/v1/studies/{}/remarks", self.study), &report).await;
+            }
+            Rule::Certificate => {
+                // Nobody certifies it again before the answer comes.
+                let mut writer = self.service.store.write().await.unwrap();
+                for sql in ["drop trigger certificates_no_delete", "drop trigger gaits_no_delete"] {
+                    let _ = sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut *writer).await;
+                }
+                sqlx::query("delete from certificates").execute(&mut *writer).await.unwrap();
+                sqlx::query("delete from gaits").execute(&mut *writer).await.unwrap();
+                gaitwright::store::commit(writer).await.unwrap();
+            }
+            Rule::Withdrawal => {
+                let subject = self.service.subject().await;
+                self.service.post(&format!("/api/v1/subjects/{subject}/consents"), &json!({"form": "1"})).await;
+                self.service.post(&format!("/api/v1/subjects/{subject}/withdraw"), &json!({"reason": "asked"})).await;
+            }
+            other => panic!("{other:?} is not for raters"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_walkers_answer_about_a_gait_reported_unsafe_meanwhile_is_kept_and_not_heard() {
+    let scene = Scene::new().await;
+    let session = scene.session(3).await;
+    scene.violate(Rule::Safety).await;
+    let before = scene.service.feedback(scene.study).await.len();
+    scene.post(&format!("/api/v1/lab/{session}/answers"), &json!({"number": 1, "answer": "first"})).await;
+    scene.post(&format!("/api/v1/lab-sessions/{session}/unblind"), &json!({"reason": "done"})).await;
+    assert_eq!(scene.service.feedback(scene.study).await.len(), before, "the learner hears nothing");
+    let rows = lab_sessions::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
+    assert!(rows[0].answer().is_some(), "what was said stays in the record");
+    let audit = scene.service.fetch("/api/v1/audit").await.text;
+    assert!(audit.contains("lab_session.answer_not_heard"), "{audit}");
+    scene.service.stop().await;
+}
+
+/// The recommendation names walkable gaits alone.
+#[tokio::test]
+async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certificate() {
+    for rule in [Rule::Safety, Rule::Certificate, Rule::Withdrawal] {
+        let scene = Scene::new().await;
+        let recommended = format!("/api/v1/studies/{}/recommendation", scene.study);
+        let best: TrialId =
+            scene.service.fetch(&recommended).await.json()["trial_id"].as_str().unwrap().parse().unwrap();
+        let other = if scene.pair.1 == best { scene.pair.0 } else { scene.pair.1 };
+        let closed =
+            Scene { pair: (best, other), equal: if scene.equal == best { scene.pair.0 } else { scene.equal }, ..scene };
+        closed.violate(rule).await;
+        let after = closed.service.fetch(&recommended).await;
+        assert!(
+            after.status == StatusCode::CONFLICT || after.json()["trial_id"] != json!(best),
+            "{rule:?}: {}",
+            after.text
+        );
+        closed.service.stop().await;
+    }
+}
+
+#[test]
+fn every_writer_of_the_learners_log_is_the_one_door() {
+    let mut writers = Vec::new();
+    let mut appenders = Vec::new();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/src");
+    let mut folders = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let name = path.strip_prefix(&root).unwrap().to_string_lossy().into_owned();
+                let flat = text.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+                if flat.contains("into feedback ") || flat.contains("into feedback(") {
+                    writers.push(name.clone());
+                }
+                if text.contains("feedback::append(") || text.contains("feedback::{append") {
+                    appenders.push(name);
+                }
+            }
+        }
+    }
+    assert_eq!(writers, ["store/feedback.rs"], "SQL that writes the table");
+    assert_eq!(appenders, ["studies/preference.rs"], "callers of the function that writes it");
+}
+
+#[tokio::test]
+async fn a_plan_made_before_a_safety_report_is_not_written() {
+    let scene = Rated::new().await;
+    let study = scene.service.get(scene.study).await;
+    let standing = gaitwright::studies::standing::Standing::read(&mut scene.service.store.read().await.unwrap(), study)
+        .await
+        .unwrap();
+    let current = async || {
+        let mut writer = scene.service.store.write().await.unwrap();
+        standing.is_current(&mut writer).await.unwrap()
+    };
+    assert!(current().await);
+    let feedback = scene.service.feedback(scene.study).await.len();
+    scene.close(Rule::Safety).await;
+    assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: the learner hears nothing");
+    assert!(!current().await, "and the plan is made anew all the same");
+    scene.service.stop().await;
+}
