@@ -1,6 +1,7 @@
 //! Whom to compare a new trial with, and what Gait RMSE answers.
 
 use super::standing::Standing;
+use crate::compute::OnPool;
 use crate::store::TrialId;
 use crate::store::feedback::Said;
 use crate::store::trials::{Trial, TrialState};
@@ -11,7 +12,7 @@ use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_am
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn partners(standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
+pub fn partners(_: &OnPool, standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
     let Some(new) = standing.trial(new) else { return Ok(Vec::new()) };
     let plan = &standing.study.plan;
     let comparable = standing.comparable();
@@ -50,7 +51,7 @@ fn is_same_gait(one: &Trial, other: &Trial) -> bool {
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn open_question(standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
+pub fn open_question(_: &OnPool, standing: &Standing) -> Result<Option<(TrialId, TrialId)>, LearnerError> {
     let plan = &standing.study.plan;
     let log = standing.log();
     let mut comparable = standing.comparable();
