@@ -1,5 +1,6 @@
 //! What can go wrong in the service. Says nothing of HTTP: one table in `http::problem` does.
 
+use crate::compute::ComputeError;
 use crate::store::StoreError;
 use crate::studies::lifecycle::NotPossible;
 use crate::workers::DispatchError;
@@ -135,6 +136,12 @@ impl From<StoreError> for Error {
             withdrawn if withdrawn.is_withdrawal() => Self::Conflict(StoreError::Withdrawn.to_string()),
             other => Self::Store(other),
         }
+    }
+}
+
+impl From<ComputeError> for Error {
+    fn from(error: ComputeError) -> Self {
+        Self::Internal(error.to_string())
     }
 }
 

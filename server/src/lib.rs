@@ -8,6 +8,7 @@
 
 pub mod access;
 pub mod cli;
+pub mod compute;
 mod document;
 pub mod error;
 mod gait_charts;

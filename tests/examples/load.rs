@@ -138,6 +138,7 @@ async fn main() {
         }
         times
     });
+    #[allow(clippy::disallowed_methods)] // a test waits for a process or a thread
     let (writes, reads) = tokio::task::spawn_blocking(|| {
         let writes = raters.into_iter().flat_map(|rater| rater.join().unwrap()).collect();
         (writes, reader.join().unwrap())

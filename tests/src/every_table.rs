@@ -72,7 +72,7 @@ pub async fn fill(database: &Path) {
         "insert into subject_muscles (subject_id, definition, actor, created_at) \
          select id, '{}', 'K', '' from subjects limit 1",
     ] {
-        sqlx::query(sql).execute(&mut *writer).await.unwrap();
+        sqlx::query(sql).execute(&mut **writer).await.unwrap();
     }
     commit(writer).await.unwrap();
     for (path, body) in [

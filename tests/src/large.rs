@@ -25,6 +25,11 @@ pub async fn service(database: &Path) -> (Service, StudyId, TrialId) {
 
 /// Fills a finished study with trials like its first one.
 pub async fn fill(database: &Path, study: StudyId) {
+    fill_to(database, study, TRIALS).await;
+}
+
+/// Fills a finished study with so many trials like its first one.
+pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     let options = SqliteConnectOptions::new().filename(database).foreign_keys(true);
     let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
     let mut writer = pool.begin().await.unwrap();
@@ -33,19 +38,19 @@ pub async fn fill(database: &Path, study: StudyId) {
          insert into trials (id, study_id, number, action_index, action, reason, best_before, state, status,
              gait_rmse_rad, cost_of_transport, objective, max_violation, iterations, seconds_total, report, violations,
              created_at, started_at, finished_at)
-         select printf('01890000-0000-7000-8000-%012d', i), study_id, i, i % 11664, action, reason, id, state, status,
+         select printf('01890000-0000-7000-8%s-%012d', substr(study_id, 34, 3), i), study_id, i, i % 11664, action, reason, id, state, status,
              gait_rmse_rad + i / 1e6, cost_of_transport, objective, max_violation, iterations, seconds_total, report,
              violations, created_at, started_at, finished_at
          from n join trials on study_id = ?2 and number = 1",
     )
-    .bind(TRIALS)
+    .bind(trials)
     .bind(study.to_string())
     .execute(&mut *writer)
     .await
     .unwrap();
     sqlx::query(
         "insert into feedback (id, study_id, kind, trial_a, category, source, author, created_at)
-         select printf('01890001-0000-7000-8000-%012d', number), study_id, 'label', id, 1, 'convergence', 'x', created_at from trials
+         select printf('01890001-0000-7000-8%s-%012d', substr(study_id, 34, 3), number), study_id, 'label', id, 1, 'convergence', 'x', created_at from trials
          where study_id = ?1 and number > 3",
     )
     .bind(study.to_string())
@@ -54,7 +59,7 @@ pub async fn fill(database: &Path, study: StudyId) {
     .unwrap();
     sqlx::query(
         "insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
-         select printf('01890002-0000-7000-8000-%012d', t.number), t.study_id, 'preference', f.id, t.id, 'clinician', 'x', t.created_at
+         select printf('01890002-0000-7000-8%s-%012d', substr(t.study_id, 34, 3), t.number), t.study_id, 'preference', f.id, t.id, 'clinician', 'x', t.created_at
          from trials t join trials f on f.study_id = t.study_id and f.number = 1
          where t.study_id = ?1 and t.number > 3",
     )
@@ -62,7 +67,12 @@ pub async fn fill(database: &Path, study: StudyId) {
     .execute(&mut *writer)
     .await
     .unwrap();
-    sqlx::query("update studies set trial_budget = 10000").execute(&mut *writer).await.unwrap();
+    sqlx::query("update studies set trial_budget = ?1 where id = ?2")
+        .bind(trials)
+        .bind(study.to_string())
+        .execute(&mut *writer)
+        .await
+        .unwrap();
     writer.commit().await.unwrap();
     pool.close().await;
 }

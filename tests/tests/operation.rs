@@ -118,14 +118,18 @@ async fn old_trajectories_are_dropped_and_the_best_kept() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| new.trial_budget = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    assert_eq!(prune(&service.store, 1).await.unwrap(), 0, "it ended just now");
+    assert_eq!(prune(&mut service.store.clone(), 1).await.unwrap(), 0, "it ended just now");
     let mut kept = 0;
     for trial in service.trials(study).await {
         kept += u32::from(gaits::get(&mut service.store.read().await.unwrap(), trial.id).await.is_ok());
     }
     assert_eq!(kept, 6);
     tokio::time::sleep(std::time::Duration::from_millis(5)).await;
-    assert_eq!(prune(&service.store, 0).await.unwrap(), 0, "each may still be the best that passes its certificate");
+    assert_eq!(
+        prune(&mut service.store.clone(), 0).await.unwrap(),
+        0,
+        "each may still be the best that passes its certificate"
+    );
     let best = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let best = best["trial_id"].as_str().unwrap().parse().unwrap();
     let mut writer = service.store.write().await.unwrap();
@@ -134,7 +138,7 @@ async fn old_trajectories_are_dropped_and_the_best_kept() {
     // What it started from is kept with it: its problem can be solved again.
     let started_from =
         service.trials(study).await.into_iter().find(|trial| trial.id == best).unwrap().warm_started_from;
-    assert_eq!(prune(&service.store, 0).await.unwrap(), 5 - u64::from(started_from.is_some()));
+    assert_eq!(prune(&mut service.store.clone(), 0).await.unwrap(), 5 - u64::from(started_from.is_some()));
     assert!(gaits::get(&mut service.store.read().await.unwrap(), best).await.is_ok());
     service.stop().await;
 }

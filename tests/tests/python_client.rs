@@ -44,6 +44,7 @@ async fn the_example_runs_a_study_to_its_end() {
     let address = format!("http://{}", listener.local_addr().unwrap());
     let router = service.router();
     tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
+    #[allow(clippy::disallowed_methods)] // a test waits for a process or a thread
     let ran = tokio::task::spawn_blocking(move || python(&["example.py", &address])).await.unwrap();
     let Some(text) = ran else { return };
     assert_eq!(text.lines().filter(|line| line.starts_with("trial ")).count(), 10, "{text}");

@@ -189,7 +189,7 @@ async fn what_ended_before_the_process_began_is_examined_until_one_passes_and_th
     assert!(page.contains("The best gait that passed") && !page.contains("being examined"), "{page}");
 
     tokio::time::sleep(Duration::from_millis(5)).await;
-    prune(&service.store, 0).await.unwrap();
+    prune(&mut service.store.clone(), 0).await.unwrap();
     let trials = service.trials(study).await;
     let needed: Vec<_> = trials.iter().filter(|trial| [best[0], best[2]].contains(&trial.id)).collect();
     let needs = |id| needed.iter().any(|trial| trial.id == id || trial.warm_started_from == Some(id));

@@ -35,7 +35,10 @@ static AT_ONCE: Semaphore = Semaphore::const_new(2);
 pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
     let failed = |reason: String| Error::Internal(format!("working on a password: {reason}"));
     let _turn = AT_ONCE.acquire().await.map_err(|e| failed(e.to_string()))?;
-    tokio::task::spawn_blocking(work).await.map_err(|e| failed(e.to_string()))
+    // Bounded by the turn above.
+    #[allow(clippy::disallowed_methods)]
+    let done = tokio::task::spawn_blocking(work);
+    done.await.map_err(|e| failed(e.to_string()))
 }
 
 /// What is stored of a password. Takes tens of milliseconds on purpose: call it [`aside`].

@@ -2,6 +2,7 @@
 
 use super::gait_file::read_gait;
 use super::output::data;
+use crate::compute::Pool;
 use crate::error::Error;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
@@ -21,8 +22,7 @@ impl Certify {
     /// A gait that does not pass is an answer, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let gait = read_gait(&self.gait)?;
-        let certificate =
-            tokio::task::spawn_blocking(move || certify(&gait)).await.map_err(|e| Error::Internal(e.to_string()))??;
+        let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
         if self.json {
             let text = serde_json::to_string_pretty(&certificate).map_err(|e| Error::Internal(e.to_string()))?;
             data(&text)

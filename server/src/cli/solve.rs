@@ -7,6 +7,7 @@ use super::out_file::OutFile;
 use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal, read_document};
 use super::serve::cores_or;
+use crate::compute::Pool;
 use crate::error::Error;
 use crate::studies::solve_input::SolveInput;
 use clap::Args;
@@ -127,7 +128,8 @@ impl Solve {
         let bar = ProgressBar::new_spinner();
         let shown = bar.clone();
         let explain = self.explain;
-        let (outcome, explanation) = tokio::task::spawn_blocking(move || {
+        let pool = Pool::new(1);
+        let solved = pool.run(move |_| {
             let mut observer = |record: &gait_optimizer::IterationRecord| {
                 shown.set_message(format!(
                     "iteration {}, objective {:.6}, violation {:.1e}, barrier {:.1e}",
@@ -143,16 +145,14 @@ impl Solve {
                 None
             };
             Ok::<_, SolveError>((outcome, explanation))
-        })
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))??;
+        });
+        let (outcome, explanation) = solved.await??;
         bar.finish_and_clear();
         let lineage = Lineage::of(&outcome, start.as_ref());
         let converged = outcome.report.status == SolveStatus::Converged;
         let certificate = if self.certify && converged {
             let gait = outcome.gait.clone();
-            let examined = tokio::task::spawn_blocking(move || certify(&gait)).await;
-            Some(examined.map_err(|e| Error::Internal(e.to_string()))??)
+            Some(pool.run(move |_| certify(&gait)).await??)
         } else {
             None
         };

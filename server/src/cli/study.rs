@@ -2,6 +2,7 @@
 
 use super::output::data;
 use super::record::exists;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
@@ -102,8 +103,8 @@ pub(super) struct Prune {
 impl Prune {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.database)?;
-        let store = Store::open(&self.database).await?;
-        let done = prune(&store, self.older_than_days).await;
+        let mut store = Store::open(&self.database).await?;
+        let done = prune(&mut store, self.older_than_days).await;
         store.close().await;
         data(&format!("{} trajectories dropped", done?))
     }
@@ -113,16 +114,15 @@ impl Prune {
 ///
 /// # Errors
 /// What the database or the learner reports.
-pub async fn prune(store: &Store, days: u32) -> Result<u64, Error> {
+pub async fn prune(store: &mut Store, days: u32) -> Result<u64, Error> {
     let before = crate::store::now().plus_seconds(-86_400 * i64::from(days));
     let mut dropped = 0;
-    for study in studies::ended_before(&mut *store.read().await?, before).await? {
+    let ended = studies::ended_before(&mut *store.read().await?, before).await?;
+    for study in ended {
         let id = study.id;
         let standing = Standing::read(&mut *store.read().await?, study).await?;
-        let ranking = tokio::task::spawn_blocking(move || ranking_to_show(&standing, &Beliefs::default()))
-            .await
-            .map_err(|e| Error::Internal(e.to_string()))?
-            .map_err(Error::Learner)?;
+        let rank = move |pool: &OnPool| ranking_to_show(pool, &standing, &Beliefs::default());
+        let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let mut writer = store.write().await?;
         let kept = recommended::worth_keeping(&mut writer, &ranking).await?;
         let count = gaits::drop_of_study(&mut writer, id, &kept).await?;

@@ -7,6 +7,7 @@ use super::output::{data, tell};
 use super::problem::{ProblemFlags, cancelled_by_signal, read};
 use super::serve::cores_or;
 use super::solve::status_word;
+use crate::compute::Pool;
 use crate::error::Error;
 use clap::Args;
 use gait_optimizer::{
@@ -57,12 +58,14 @@ impl Sweep {
         tell(&format!("rows so far: {}", out.part().display()));
         let workers = cores_or(self.workers);
         let stopped = cancel.clone();
-        let table = tokio::task::spawn_blocking(move || {
+        let pool = Pool::new(1);
+        let table = pool.run(move |_| {
             let mut table = Table::begin(out)?;
             solve_all(&problem, &actions, warm.as_ref(), &options, workers, &cancel, &mut table)?;
             Ok::<_, Error>(table)
         });
-        table.await.map_err(|e| Error::Internal(e.to_string()))??.end(stopped.is_cancelled())
+        let table = table.await;
+        table??.end(stopped.is_cancelled())
     }
 }
 

@@ -7,6 +7,7 @@ use super::output::{data, tell};
 use super::problem::ProblemFiles;
 use super::serve::cores_or;
 use super::unattended::{self, Lines, action_line};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Store, commit};
@@ -17,6 +18,7 @@ use crate::studies::summary::{self, Summary};
 use crate::studies::{catalogue, device, recording};
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 #[derive(Debug, Args)]
 pub(super) struct Tune {
@@ -51,7 +53,7 @@ impl Tune {
             (self.files.device()?, self.files.reference()?, self.files.settings()?);
         let solve_options = self.files.options()?;
         let workers = cores_or(self.workers);
-        let store = Store::open(&self.database).await?;
+        let mut store = Store::open(&self.database).await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         let subject = catalogue::subject_with(&mut writer, subject).await?;
@@ -71,11 +73,12 @@ impl Tune {
         };
         let study = Box::pin(unattended::study(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
-        let ran = Box::pin(unattended::run_and_examine(&store, &study, workers, lines)).await;
+        let ran = Box::pin(unattended::run_and_examine(&mut store, &study, workers, lines)).await;
         store.close().await;
         let (ran, judged) = ran?;
-        let belief = ran.beliefs.posterior(&ran.standing).map_err(Error::Learner)?;
-        let best = best_trial(&ran.standing, &belief).map_err(Error::Learner)?;
+        let (standing, beliefs) = (ran.standing.clone(), Arc::clone(&ran.beliefs));
+        let choose = move |pool: &OnPool| best_trial(&standing, &*beliefs.posterior(pool, &standing)?);
+        let best = store.compute(choose).await?.map_err(Error::Learner)?;
         self.print(&summary::of(&ran.standing, best, judged))?;
         if ran.interrupted {
             let done = ran.standing.trials.len() - ran.standing.open();

@@ -94,7 +94,7 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
 
 /// Runs a study and examines its best gaits, if nobody stopped it.
 pub(super) async fn run_and_examine(
-    store: &Store,
+    store: &mut Store,
     study: &Study,
     workers: usize,
     lines: Lines,
@@ -105,9 +105,9 @@ pub(super) async fn run_and_examine(
 }
 
 /// Examines the best gaits of a study.
-pub(super) async fn examined(store: &Store, standing: &Standing, beliefs: &Beliefs) -> Result<Judged, Error> {
+pub(super) async fn examined(store: &mut Store, standing: &Standing, beliefs: &Arc<Beliefs>) -> Result<Judged, Error> {
     tell("examining the best gait");
-    recommended::examine(store, &Actor::terminal(), standing, beliefs).await
+    recommended::examine(store, &Actor::terminal(), standing.clone(), Arc::clone(beliefs)).await
 }
 
 /// Shows progress until the study ends.

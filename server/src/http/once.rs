@@ -7,7 +7,7 @@ use crate::access::{Caller, Permission};
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::idempotency::{self, Kept, fingerprint};
-use crate::store::{Writer, commit};
+use crate::store::{LentWriter, commit};
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
@@ -37,7 +37,7 @@ pub(crate) struct OnceWith<P, T>(pub(crate) Once<P>, pub(crate) T);
 
 impl<P: Permission> Once<P> {
     /// Begins the transaction of the effect. `Err` of the inner result: the answer that was given before.
-    pub(crate) async fn begin(&self, app: &AppState) -> Result<Result<Writer, Response>, Error> {
+    pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<LentWriter<'a>, Response>, Error> {
         let mut writer = app.write().await?;
         let Some(key) = &self.key else { return Ok(Ok(writer)) };
         match idempotency::find(&mut writer, &self.actor, key).await? {
@@ -60,7 +60,7 @@ impl<P: Permission> Once<P> {
     }
 
     /// Begins the transaction of an effect whose answer holds a secret: nothing of it may be kept for repetition.
-    pub(crate) async fn begin_secret(&self, app: &AppState) -> Result<Writer, Error> {
+    pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
         if self.key.is_some() {
             let reason = "Idempotency-Key: the answer holds a secret that is shown once; send this without a key";
             return Err(Error::Malformed(reason.to_owned()));
@@ -72,7 +72,7 @@ impl<P: Permission> Once<P> {
     pub(crate) async fn finish<T: Serialize>(
         &self,
         app: &AppState,
-        mut writer: Writer,
+        mut writer: LentWriter<'_>,
         status: StatusCode,
         location: Option<String>,
         body: &T,

@@ -3,7 +3,8 @@
 use super::host::Hosts;
 use super::metrics::Requests;
 use crate::access::BackOff;
-use crate::store::{Reader, Store, StoreResult, Writer};
+use crate::compute::{ComputeError, OnPool};
+use crate::store::{LentWriter, Reader, Store, StoreResult};
 use crate::studies::belief::Beliefs;
 use crate::studies::director::Director;
 use std::sync::Arc;
@@ -24,6 +25,8 @@ pub struct AppState {
     pub hosts: Hosts,
     /// An answer that takes longer is given up; streams have begun by then.
     pub slowest_answer: Duration,
+    /// The record, with the pool for what requests compute.
+    store: Store,
 }
 
 /// An answer that takes longer is given up.
@@ -58,27 +61,44 @@ impl AppState {
     /// A service over a director.
     pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
         let beliefs = Arc::clone(director.beliefs());
-        Self { director, access, requests: Arc::default(), beliefs, hosts, slowest_answer: SLOWEST_ANSWER }
+        let store = director.store().with_own_pool();
+        Self { director, access, requests: Arc::default(), beliefs, hosts, slowest_answer: SLOWEST_ANSWER, store }
     }
 
     /// The record.
     pub fn store(&self) -> &Store {
-        self.director.store()
+        &self.store
+    }
+
+    /// The record, to be computed with as well: no connection of it is held meanwhile.
+    pub fn store_mut(&mut self) -> &mut Store {
+        &mut self.store
     }
 
     /// A connection to read with.
     ///
     /// # Errors
     /// When none can be had.
-    pub async fn read(&self) -> StoreResult<Reader> {
-        self.store().read().await
+    pub async fn read(&self) -> StoreResult<Reader<'_>> {
+        self.store.read().await
     }
 
     /// A write transaction.
     ///
     /// # Errors
     /// When none can be begun.
-    pub async fn write(&self) -> StoreResult<Writer> {
-        self.store().write().await
+    pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
+        self.store.write().await
+    }
+
+    /// Computes off the threads that answer, while no connection is held.
+    ///
+    /// # Errors
+    /// When the work panics.
+    pub async fn compute<T: Send + 'static>(
+        &mut self,
+        work: impl FnOnce(&OnPool) -> T + Send + 'static,
+    ) -> Result<T, ComputeError> {
+        self.store.compute(work).await
     }
 }

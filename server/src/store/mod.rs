@@ -23,6 +23,7 @@ mod json;
 pub mod lab_answers;
 pub mod lab_recordings;
 pub mod lab_sessions;
+mod lent;
 pub mod listing;
 pub mod members;
 mod migrations;
@@ -49,13 +50,14 @@ pub use id::{
     DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, MemberId, PresentationId, ReferenceGaitId,
     RemarkId, SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
+pub use lent::{Lent, LentWriter, Reader};
 pub use migrations::FORM;
 pub use time::{Instant, now};
 pub use writing::Writer;
 
-use sqlx::pool::PoolConnection;
+use crate::compute::{ComputeError, OnPool, Pool};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{Sqlite, SqliteConnection, SqlitePool};
+use sqlx::{SqliteConnection, SqlitePool};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -63,10 +65,25 @@ use std::time::Duration;
 use tokio::sync::Mutex;
 use writing::Writing;
 
-/// A connection to read with. Sees one consistent state per statement.
-pub type Reader = PoolConnection<Sqlite>;
-
-/// The open record.
+/// The open record. It lends connections and computing, never both at once.
+///
+/// ```compile_fail,E0502
+/// # use gaitwright::store::{Store, StoreResult};
+/// async fn computes_inside_a_connection(mut store: Store) -> StoreResult<()> {
+///     let _reader = store.read().await?;
+///     let _ = store.compute(|_| 1 + 1).await;
+///     Ok(())
+/// }
+/// ```
+///
+/// ```compile_fail,E0502
+/// # use gaitwright::store::{Store, StoreResult};
+/// async fn computes_inside_a_transaction(mut store: Store) -> StoreResult<()> {
+///     let writer = store.write().await?;
+///     let _ = store.compute(|_| 1 + 1).await;
+///     gaitwright::store::commit(writer).await
+/// }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Store {
     /// Read-only connections.
@@ -77,6 +94,8 @@ pub struct Store {
     path: PathBuf,
     /// Held while a copy is made beside the record: two that begin together take two names.
     copying: Arc<Mutex<()>>,
+    /// What is computed from what was read.
+    pool: Pool,
     /// Held as long as any clone lives: a second process that opens the file for writing is refused.
     _owner: Arc<File>,
 }
@@ -114,7 +133,14 @@ impl Store {
         seals::watch(&mut connection).await?;
         let writing = Arc::new(Writing::new(connection));
         let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
-        let store = Self { readers, writing, path: path.to_owned(), copying: Arc::default(), _owner: Arc::new(owner) };
+        let store = Self {
+            readers,
+            writing,
+            path: path.to_owned(),
+            copying: Arc::default(),
+            pool: Pool::default(),
+            _owner: Arc::new(owner),
+        };
         commit(store.write().await?).await?;
         Ok(store)
     }
@@ -123,16 +149,34 @@ impl Store {
     ///
     /// # Errors
     /// When no connection can be had.
-    pub async fn read(&self) -> StoreResult<Reader> {
-        Ok(self.readers.acquire().await?)
+    pub async fn read(&self) -> StoreResult<Reader<'_>> {
+        Ok(Lent::new(self.readers.acquire().await?))
+    }
+
+    /// Computes on a pool: what takes long, off the threads that answer. Whoever calls this holds no connection of this
+    /// handle, and what is computed with is owned.
+    ///
+    /// # Errors
+    /// When the work panics.
+    pub async fn compute<T: Send + 'static>(
+        &mut self,
+        work: impl FnOnce(&OnPool) -> T + Send + 'static,
+    ) -> Result<T, ComputeError> {
+        self.pool.run(work).await
+    }
+
+    /// The same record with a pool of its own, so that what others compute does not hold up its computing.
+    #[must_use]
+    pub fn with_own_pool(&self) -> Self {
+        Self { pool: Pool::default(), ..self.clone() }
     }
 
     /// Begins a write transaction; dropped without [`commit`], it leaves no trace.
     ///
     /// # Errors
     /// When no transaction can be begun.
-    pub async fn write(&self) -> StoreResult<Writer> {
-        self.writing.begin().await
+    pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
+        Ok(Lent::new(self.writing.begin().await?))
     }
 
     /// The file.
@@ -151,9 +195,9 @@ impl Store {
 ///
 /// # Errors
 /// When the database cannot; nothing has happened then.
-pub async fn commit(mut writer: Writer) -> StoreResult<()> {
+pub async fn commit(mut writer: LentWriter<'_>) -> StoreResult<()> {
     seals::seal(&mut writer).await?;
-    writer.commit().await
+    writer.into_writer().commit().await
 }
 
 /// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].

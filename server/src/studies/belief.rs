@@ -2,6 +2,7 @@
 
 use super::seed::{Purpose, derive};
 use super::standing::Standing;
+use crate::compute::OnPool;
 use crate::store::StudyId;
 use crate::store::feedback::{FeedbackRow, LogVersion, Said};
 use gait_learner::{ActionIndex, Agreement, BestProbability, LearnerError, Marginal, Posterior, posterior};
@@ -85,7 +86,7 @@ impl Beliefs {
     ///
     /// # Errors
     /// When the learner refuses the log.
-    pub fn posterior(&self, standing: &Standing) -> Result<Arc<Posterior>, LearnerError> {
+    pub fn posterior(&self, _: &OnPool, standing: &Standing) -> Result<Arc<Posterior>, LearnerError> {
         let plan = &standing.study.plan;
         self.posteriors.get_or(standing, || posterior(&plan.search_space, &standing.log(), &plan.learner))
     }
@@ -94,8 +95,8 @@ impl Beliefs {
     ///
     /// # Errors
     /// When the learner refuses the log.
-    pub fn of(&self, standing: &Standing) -> Result<Arc<Belief>, LearnerError> {
-        self.beliefs.get_or(standing, || Belief::of(standing, self.posterior(standing)?))
+    pub fn of(&self, pool: &OnPool, standing: &Standing) -> Result<Arc<Belief>, LearnerError> {
+        self.beliefs.get_or(standing, || Belief::of(standing, self.posterior(pool, standing)?))
     }
 }
 

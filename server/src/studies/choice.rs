@@ -4,6 +4,7 @@ use super::belief::Beliefs;
 use super::search;
 use super::seed::{Purpose, derive};
 use super::standing::Standing;
+use crate::compute::OnPool;
 use crate::store::TrialId;
 use crate::store::trials::{NewTrial, Trial, TrialState};
 use gait_learner::{LearnerError, Posterior, ProposalReason, propose};
@@ -33,7 +34,7 @@ impl ChoiceError {
 ///
 /// # Errors
 /// [`ChoiceError`], among them that every action was tried.
-pub fn next_trial(standing: &Standing, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
+pub fn next_trial(_: &OnPool, standing: &Standing, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
     let plan = &standing.study.plan;
     let number = standing.trials.last().map_or(1, |trial| trial.number + 1);
     let log = standing.log();
@@ -95,11 +96,11 @@ pub const MANY: usize = 400;
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn ranking_to_show(standing: &Standing, beliefs: &Beliefs) -> Result<Vec<TrialId>, LearnerError> {
+pub fn ranking_to_show(pool: &OnPool, standing: &Standing, beliefs: &Beliefs) -> Result<Vec<TrialId>, LearnerError> {
     if standing.trials.len() >= MANY {
         return Ok(last_believed(standing).into_iter().collect());
     }
-    ranking(standing, &*beliefs.posterior(standing)?)
+    ranking(standing, &*beliefs.posterior(pool, standing)?)
 }
 
 /// What the learner last believed to be best, if that has a gait that nobody called unsafe; it does not take every trial to

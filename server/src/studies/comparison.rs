@@ -2,6 +2,7 @@
 
 use super::standing::Standing;
 use super::walkable::{NotWalkable, WalkablePair, is_same_gait};
+use crate::compute::OnPool;
 use crate::store::TrialId;
 use crate::store::feedback::Said;
 use crate::store::trials::Trial;
@@ -13,7 +14,7 @@ use std::collections::HashSet;
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn partners(standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
+pub fn partners(_: &OnPool, standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
     let Some(new) = standing.trial(new) else { return Ok(Vec::new()) };
     let plan = &standing.study.plan;
     let comparable = standing.comparable();
@@ -47,10 +48,10 @@ pub enum Question {
 }
 
 impl Question {
-    /// The pair, if there is one to be asked about now.
-    pub fn pair(self) -> Option<WalkablePair> {
+    /// The trials of the pair, if there is one to be asked about now: the newest gait first.
+    pub fn trials(&self) -> Option<(TrialId, TrialId)> {
         match self {
-            Self::Pair(pair) => Some(pair),
+            Self::Pair(pair) => Some(pair.trials()),
             Self::None | Self::AfterCertificate(_) => None,
         }
     }
@@ -61,7 +62,7 @@ impl Question {
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn open_question(standing: &Standing) -> Result<Question, LearnerError> {
+pub fn open_question(_: &OnPool, standing: &Standing) -> Result<Question, LearnerError> {
     let plan = &standing.study.plan;
     let log = standing.log();
     let may_be_asked = |trial: &&Trial| standing.grounds.may_become_walkable(trial);

@@ -13,6 +13,7 @@ use super::record;
 use super::rehearsal::{LikelyNext, PREPARED, Prepared, Rehearsals};
 use super::solve_input::SolveInput;
 use super::standing::Standing;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::jobs::Lease;
 use crate::store::studies::{FeedbackMode, Study, StudyState};
@@ -83,6 +84,8 @@ impl Director {
         only: Option<StudyId>,
         after_solves: Option<AfterSolves>,
     ) -> Self {
+        // What requests compute never holds up the planning.
+        let store = store.with_own_pool();
         let beliefs = Arc::<Beliefs>::default();
         let over_record = |AfterSolves { examine, explain }| {
             (Examiner::new(store.clone(), examine, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
@@ -271,18 +274,18 @@ impl Director {
     /// Proposes trials until the study has as many open ones as it may, or moves it to another state. Gives where it
     /// stands when it waits for an answer.
     async fn plan(&self, mut study: Study) -> Result<Option<Standing>, Error> {
+        let mut store = self.0.store.clone();
         loop {
-            let mut reader = self.0.store.read().await?;
+            let mut reader = store.read().await?;
             let standing = Standing::read(&mut reader, study.clone()).await?;
             drop(reader);
             self.certify_for_people(&standing);
             let beliefs = Arc::clone(&self.0.beliefs);
-            let (standing, step) = tokio::task::spawn_blocking(move || {
-                let step = next_step(&standing, &beliefs);
+            let decide = move |pool: &OnPool| {
+                let step = next_step(pool, &standing, &beliefs);
                 (standing, step)
-            })
-            .await
-            .map_err(|e| Error::Internal(e.to_string()))?;
+            };
+            let (standing, step) = store.compute(decide).await?;
             match step? {
                 Step::Nothing => return Ok(Some(standing).filter(|s| s.study.state == StudyState::Waiting)),
                 Step::Act(act, reason) => match self.act(&standing.study, act, &reason).await? {
@@ -416,7 +419,8 @@ impl Director {
         if !likely.knows(standing) {
             self.withdraw(self.0.rehearsals.forget(|other| other != study.id)).await;
         }
-        for new in likely.of(standing).await? {
+        let mut store = self.0.store.clone();
+        for new in likely.of(&mut store, standing).await? {
             if self.busy().await? >= self.0.engine.size() {
                 return Ok(());
             }
@@ -539,23 +543,23 @@ impl Director {
     /// Records what came of an attempt.
     async fn ended(&self, attempt: Attempt, worker: &str, finding: Finding) -> Result<(), Error> {
         self.0.board.close(attempt.trial);
-        let store = &self.0.store;
+        let mut store = self.0.store.clone();
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let (outcome, iterations) = match finding {
             Finding::Ended { outcome, iterations } => (outcome, iterations),
-            Finding::Broke(reason) => return record::broke(store, &lease, &reason).await.map(drop),
+            Finding::Broke(reason) => return record::broke(&store, &lease, &reason).await.map(drop),
         };
-        let packed = tokio::task::spawn_blocking(move || {
+        let pack = move |_: &OnPool| {
             let packed = gaits::PackedGait::new(&outcome, &iterations);
             (outcome, packed)
-        });
-        let (outcome, packed) = packed.await.map_err(|e| Error::Internal(e.to_string()))?;
+        };
+        let (outcome, packed) = store.compute(pack).await?;
         let packed = packed?;
         if packed.is_none() && outcome.report.status == SolveStatus::Converged {
             let reason = "the solver called a gait converged that holds numbers that are not finite";
-            return record::broke(store, &lease, reason).await.map(drop);
+            return record::broke(&store, &lease, reason).await.map(drop);
         }
-        record::ended(store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
+        record::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
     }
 }
 

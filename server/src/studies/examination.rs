@@ -41,12 +41,10 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Examinatio
 ///
 /// # Errors
 /// When the gait is not well-formed.
-pub async fn certificate(examination: Examination) -> Result<Certificate, Error> {
+pub async fn certificate(store: &mut Store, examination: Examination) -> Result<Certificate, Error> {
     match examination {
         Examination::Made(certificate) => Ok(*certificate),
-        Examination::Ahead(gait) => Ok(tokio::task::spawn_blocking(move || certify(&gait))
-            .await
-            .map_err(|e| Error::Internal(e.to_string()))??),
+        Examination::Ahead(gait) => Ok(store.compute(move |_| certify(&gait)).await??),
     }
 }
 

@@ -7,6 +7,7 @@ use super::belief::Beliefs;
 use super::choice::ranking_to_show;
 use super::standing::Standing;
 use super::{examination, recommended};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Store, StoreResult, StudyId, TrialId, consents, events, studies};
@@ -146,7 +147,8 @@ impl Examiner {
 
     /// Examines the next gait of a study. `false`: there is none.
     async fn examine_next(&self, id: StudyId) -> Result<bool, Error> {
-        let mut reader = self.store.read().await?;
+        let mut store = self.store.clone();
+        let mut reader = store.read().await?;
         if consents::is_withdrawn(&mut reader, id).await? {
             return Ok(false);
         }
@@ -158,8 +160,8 @@ impl Examiner {
             return Ok(false);
         }
         let beliefs = Arc::clone(&self.beliefs);
-        let ranking = tokio::task::spawn_blocking(move || ranking_to_show(&standing, &beliefs));
-        let ranking = ranking.await.map_err(|e| Error::Internal(e.to_string()))?.map_err(Error::Learner)?;
+        let rank = move |pool: &OnPool| ranking_to_show(pool, &standing, &beliefs);
+        let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let refused = self.state().refused.clone();
         let next = recommended::next_to_examine(&mut *self.store.read().await?, &ranking, &refused).await?;
         let Some(trial) = next else { return Ok(false) };

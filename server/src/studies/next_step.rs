@@ -5,6 +5,7 @@ use super::choice;
 use super::comparison::{self, Question};
 use super::lifecycle::Act;
 use super::standing::Standing;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::feedback::{FeedbackRow, Said, Source};
 use crate::store::studies::{Evaluation, FeedbackMode, StudyState};
@@ -22,10 +23,10 @@ pub(super) enum Step {
 }
 
 /// Decides it, from the standing alone: `beliefs` spares computing what is known.
-pub(super) fn next_step(standing: &Standing, beliefs: &Beliefs) -> Result<Step, Error> {
+pub(super) fn next_step(pool: &OnPool, standing: &Standing, beliefs: &Beliefs) -> Result<Step, Error> {
     let study = &standing.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
-        match (study.state, comparison::open_question(standing).map_err(Error::Learner)?) {
+        match (study.state, comparison::open_question(pool, standing).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
                 return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into()));
             }
@@ -57,8 +58,8 @@ pub(super) fn next_step(standing: &Standing, beliefs: &Beliefs) -> Result<Step, 
     if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
         return Ok(Step::Nothing);
     }
-    let belief = beliefs.posterior(standing).map_err(Error::Learner)?;
-    match choice::next_trial(standing, &belief) {
+    let belief = beliefs.posterior(pool, standing).map_err(Error::Learner)?;
+    match choice::next_trial(pool, standing, &belief) {
         Ok(new) => Ok(Step::Try(new)),
         Err(e) if e.is_exhausted() && open == 0 => {
             Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
@@ -70,9 +71,9 @@ pub(super) fn next_step(standing: &Standing, beliefs: &Beliefs) -> Result<Step, 
 }
 
 /// The trials that would be proposed next, one for each answer to the question that waits for one.
-pub(super) fn likely_next(standing: &Standing) -> Result<Vec<NewTrial>, Error> {
-    let question = comparison::open_question(standing).map_err(Error::Learner)?;
-    let Some((a, b)) = question.pair().map(|pair| pair.trials()) else { return Ok(Vec::new()) };
+pub(super) fn likely_next(pool: &OnPool, standing: &Standing) -> Result<Vec<NewTrial>, Error> {
+    let question = comparison::open_question(pool, standing).map_err(Error::Learner)?;
+    let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
     for said in [Said::Preference { winner: a, loser: b }, Said::Preference { winner: b, loser: a }, Said::Tie { a, b }]
     {
@@ -91,7 +92,7 @@ pub(super) fn likely_next(standing: &Standing) -> Result<Vec<NewTrial>, Error> {
             retraction: None,
         });
         // What is believed of answers that nobody gave is not kept.
-        if let Step::Try(new) = next_step(&then, &Beliefs::default())?
+        if let Step::Try(new) = next_step(pool, &then, &Beliefs::default())?
             && !likely
                 .iter()
                 .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))

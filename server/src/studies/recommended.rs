@@ -4,11 +4,13 @@ use super::belief::Beliefs;
 use super::choice;
 use super::examination;
 use super::standing::Standing;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Connection, Store, StoreResult, TrialId, certificates, commit, gaits};
 use serde::Serialize;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// So many of the best gaits are examined in search of one that passes.
@@ -144,12 +146,20 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
 ///
 /// # Errors
 /// What learner and database report.
-pub async fn examine(store: &Store, actor: &Actor, standing: &Standing, beliefs: &Beliefs) -> Result<Judged, Error> {
-    let ranking = choice::ranking_to_show(standing, beliefs).map_err(Error::Learner)?;
+pub async fn examine(
+    store: &mut Store,
+    actor: &Actor,
+    standing: Standing,
+    beliefs: Arc<Beliefs>,
+) -> Result<Judged, Error> {
+    let rank = move |pool: &OnPool| choice::ranking_to_show(pool, &standing, &beliefs);
+    let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
     let mut refused = BTreeSet::new();
-    while let Some(trial) = next_to_examine(&mut *store.read().await?, &ranking, &refused).await? {
+    loop {
+        let next = next_to_examine(&mut *store.read().await?, &ranking, &refused).await?;
+        let Some(trial) = next else { break };
         let begun = examination::begin(&mut *store.read().await?, trial).await?;
-        let certificate = match examination::certificate(begun).await {
+        let certificate = match examination::certificate(store, begun).await {
             Ok(certificate) => certificate,
             Err(error) if error.is_input() => {
                 tracing::warn!(%trial, %error, "what a trial gave cannot be examined");

@@ -14,6 +14,12 @@ use crate::store::trials::{TrialEnd, TrialState};
 use crate::store::{Store, TrialId, Writer, commit, events, gaits, jobs, results, studies, trials};
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use serde_json::json;
+use std::time::Duration;
+
+/// So often a result is compared anew because the study heard something meanwhile.
+const TRIES: u32 = 20;
+/// Pause after the first time, longer by as much after each.
+const FIRST_PAUSE: Duration = Duration::from_millis(10);
 
 /// Records a solve that ended by itself. `false`: the lease was not ours any more; what came is kept as evidence, and
 /// nobody hears of it.
@@ -21,7 +27,7 @@ use serde_json::json;
 /// # Errors
 /// What the database or the learner reports; nothing is recorded then.
 pub async fn ended(
-    store: &Store,
+    store: &mut Store,
     lease: &Lease,
     worker: &str,
     outcome: &SolveOutcome,
@@ -39,12 +45,13 @@ pub async fn ended(
         violations: outcome.violations.clone(),
         message: message_of(outcome),
     };
-    loop {
+    for attempt in 0..TRIES {
+        tokio::time::sleep(FIRST_PAUSE * attempt).await;
         let mut reader = store.read().await?;
         let study = studies::get(&mut reader, lease.study).await?;
         let standing = Standing::read(&mut reader, study).await?;
         drop(reader);
-        let answers = answers(&standing, lease.trial, &end).await?;
+        let answers = answers(store, &standing, lease.trial, &end).await?;
 
         let mut writer = store.write().await?;
         if !standing.is_current(&mut writer).await? {
@@ -66,6 +73,8 @@ pub async fn ended(
         commit(writer).await?;
         return Ok(true);
     }
+    // Its worker is free again; the trial is solved anew at most twice, and says why.
+    broke(store, lease, "the study heard answers faster than the result could be compared with them").await
 }
 
 /// Records a failure of the program: the job runs again at most twice, then the trial is `failed`.
@@ -161,17 +170,14 @@ async fn give_up_or_requeue(
 }
 
 /// What Gait RMSE answers about the new trial, unless the study leaves the answers to people.
-async fn answers(standing: &Standing, new: TrialId, end: &TrialEnd) -> Result<Vec<Said>, Error> {
+async fn answers(store: &mut Store, standing: &Standing, new: TrialId, end: &TrialEnd) -> Result<Vec<Said>, Error> {
     let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
     let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
     if standing.study.plan.feedback_mode == FeedbackMode::Human {
         return Ok(Vec::new());
     }
     let standing_there = standing.clone();
-    let partners = tokio::task::spawn_blocking(move || partners(&standing_there, new))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))?
-        .map_err(Error::Learner)?;
+    let partners = store.compute(move |pool| partners(pool, &standing_there, new)).await?.map_err(Error::Learner)?;
     Ok(partners
         .into_iter()
         .filter_map(|id| standing.trial(id)?.gait_rmse_rad.map(|old| by_gait_rmse((new, rmse), (id, old))))

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::reference_gaits::{self, ReferenceGait};
-use crate::store::{Connection, Writer};
+use crate::store::{Connection, Store, Writer};
 use clap::ValueEnum;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, Walker, distance};
 use gait_optimizer::{ReferenceGait as Definition, Subject};
@@ -152,10 +152,8 @@ impl NewReferenceGait {
     ///
     /// # Errors
     /// As [`Self::definition`].
-    pub async fn definition_aside(self) -> Result<Definition, Error> {
-        tokio::task::spawn_blocking(move || self.definition("recording", "forces"))
-            .await
-            .map_err(|e| Error::Internal(e.to_string()))?
+    pub async fn definition_aside(self, store: &mut Store) -> Result<Definition, Error> {
+        store.compute(move |_| self.definition("recording", "forces")).await?
     }
 }
 

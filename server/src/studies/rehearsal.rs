@@ -8,7 +8,7 @@ use super::standing::Standing;
 use crate::error::Error;
 use crate::store::feedback::LogVersion;
 use crate::store::trials::NewTrial;
-use crate::store::{StudyId, TrialId};
+use crate::store::{Store, StudyId, TrialId};
 use crate::workers::{Assignment, Attempt, Finding, News, Receipt};
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -157,11 +157,10 @@ impl LikelyNext {
     ///
     /// # Errors
     /// What the learner reports.
-    pub(super) async fn of(&mut self, standing: &Standing) -> Result<Vec<NewTrial>, Error> {
+    pub(super) async fn of(&mut self, store: &mut Store, standing: &Standing) -> Result<Vec<NewTrial>, Error> {
         if !self.knows(standing) {
             let there = standing.clone();
-            let likely = tokio::task::spawn_blocking(move || likely_next(&there));
-            let likely = likely.await.map_err(|e| Error::Internal(e.to_string()))??;
+            let likely = store.compute(move |pool| likely_next(pool, &there)).await??;
             self.0.insert(standing.study.id, (standing.version, likely));
         }
         Ok(self.0.get(&standing.study.id).map(|(_, likely)| likely.clone()).unwrap_or_default())

@@ -9,13 +9,14 @@ use super::comparison::{by_gait_rmse, partners};
 use super::preference;
 use super::standing::Standing;
 use crate::access::Caller;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
 use crate::store::feedback::Said;
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, Told, Trial, TrialState};
-use crate::store::{Connection, StudyId, TrialId, Writer, events, studies, trials};
+use crate::store::{Store, StudyId, TrialId, Writer, events, studies, trials};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::sync::Arc;
@@ -45,27 +46,29 @@ pub enum Suggestion {
 /// # Errors
 /// [`Error::Conflict`] when the study gives out no trial now, [`Error::Invalid`] for the worker's name.
 pub async fn suggest(
-    db: &mut Connection,
+    store: &mut Store,
     study: StudyId,
     worker: &str,
     beliefs: &Arc<Beliefs>,
 ) -> Result<Suggestion, Error> {
     let beliefs = Arc::clone(beliefs);
     let worker = printable::name("worker", worker, 80)?;
-    let study = studies::get(db, study).await?;
+    let mut db = store.read().await?;
+    let study = studies::get(&mut db, study).await?;
     if study.plan.evaluation != Evaluation::Script {
         return Err(Error::conflict(
             "the program evaluates the trials of this study; make one with evaluation \"script\"",
         ));
     }
-    if let Some(open) = trials::open_of(db, study.id, worker).await? {
+    if let Some(open) = trials::open_of(&mut db, study.id, worker).await? {
         return Ok(Suggestion::Same(open));
     }
     if study.state != StudyState::Running {
         let reason = format!("the study is {}: {}", study.state.as_str(), study.state_reason);
         return Err(Error::conflict(reason.trim_end_matches(": ")));
     }
-    let standing = Standing::read(db, study).await?;
+    let standing = Standing::read(&mut db, study).await?;
+    drop(db);
     let plan = &standing.study.plan;
     if standing.trials.len() >= plan.trial_budget as usize {
         return Err(Error::conflict(format!("all {} trials were given out", plan.trial_budget)));
@@ -73,13 +76,12 @@ pub async fn suggest(
     if standing.open() >= plan.parallel_trials as usize {
         return Err(Error::conflict(format!("{} trials are open already: tell what they gave first", standing.open())));
     }
-    let (standing, chosen) = tokio::task::spawn_blocking(move || {
-        let believed = beliefs.posterior(&standing).map_err(ChoiceError::Learner);
-        let chosen = believed.and_then(|belief| choice::next_trial(&standing, &belief));
+    let choose = move |pool: &OnPool| {
+        let believed = beliefs.posterior(pool, &standing).map_err(ChoiceError::Learner);
+        let chosen = believed.and_then(|belief| choice::next_trial(pool, &standing, &belief));
         (standing, chosen)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let (standing, chosen) = store.compute(choose).await?;
     match chosen {
         Ok(new) => Ok(Suggestion::New(Box::new(standing), Box::new(new))),
         Err(e) if e.is_exhausted() => Err(Error::conflict("every action of the search space was tried")),
@@ -160,29 +162,30 @@ pub struct Heard {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the trial is not open to be told.
-pub async fn hear(db: &mut Connection, id: TrialId, tell: &Tell) -> Result<Heard, Error> {
-    let trial = trials::get(db, id).await?;
+pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, Error> {
+    let mut db = store.read().await?;
+    let trial = trials::get(&mut db, id).await?;
     if trial.asked_by.is_none() {
         return Err(Error::conflict("the program evaluates this trial"));
     }
     if trial.state != TrialState::Running {
         return Err(Error::conflict(format!("the trial is {} already", trial.state.as_str())));
     }
-    let study = studies::get(db, trial.study_id).await?;
+    let study = studies::get(&mut db, trial.study_id).await?;
     let told = checked(&study, tell)?;
-    let standing = Standing::read(db, study).await?;
+    let standing = Standing::read(&mut db, study).await?;
+    drop(db);
     let (TrialState::Converged, Some(rmse)) = (told.state, told.gait_rmse_rad) else {
         return Ok(Heard { standing, told, answers: Vec::new() });
     };
     if standing.study.plan.feedback_mode == FeedbackMode::Human {
         return Ok(Heard { standing, told, answers: Vec::new() });
     }
-    let (standing, partners) = tokio::task::spawn_blocking(move || {
-        let partners = partners(&standing, id);
+    let find = move |pool: &OnPool| {
+        let partners = partners(pool, &standing, id);
         (standing, partners)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let (standing, partners) = store.compute(find).await?;
     let partners = partners.map_err(Error::Learner)?;
     let answers = partners
         .into_iter()

@@ -128,6 +128,11 @@ pub trait Dispatch: Send + Sync + 'static {
     /// Whether jobs that were submitted go on when this process ends.
     fn outlives_process(&self) -> bool;
 
+    /// Why it cannot work now, in words; none: it can.
+    fn trouble(&self) -> Option<String> {
+        None
+    }
+
     /// Hands a job over. Handing the same attempt over twice has the effect of once.
     fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>>;
 

@@ -11,6 +11,7 @@ use super::output::{data, tell};
 use super::problem::reference_of;
 use super::unattended::{self, Lines};
 use crate::access::Reach;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::studies::{self, Study, StudyState};
 use crate::store::{Store, commit, gaits, reference_gaits};
@@ -85,8 +86,8 @@ impl Reproduce {
         let files = ["report.html", "iterations.csv", "studies.csv", "angles.csv"];
         let files: Vec<OutFile> =
             files.iter().map(|name| OutFile::open(&self.folder.join(name), &[])).collect::<Result<_, _>>()?;
-        let store = Store::open(&self.folder.join("studies.db")).await?;
-        let outcomes = Box::pin(self.studies(&store, &reference)).await;
+        let mut store = Store::open(&self.folder.join("studies.db")).await?;
+        let outcomes = Box::pin(self.studies(&mut store, &reference)).await;
         store.close().await;
         let Some((outcomes, failures)) = outcomes? else {
             tell("interrupted; the same command goes on from there");
@@ -116,7 +117,7 @@ impl Reproduce {
     /// somebody stopped it.
     async fn studies(
         &self,
-        store: &Store,
+        store: &mut Store,
         reference: &ReferenceGait,
     ) -> Result<Option<(Vec<Outcome>, Vec<String>)>, Error> {
         let (mut outcomes, mut failures) = (Vec::new(), Vec::new());
@@ -188,17 +189,18 @@ impl Reproduce {
 /// What a study came to.
 #[allow(clippy::too_many_arguments)] // what is compared, and where from
 async fn outcome(
-    store: &Store,
+    store: &mut Store,
     subject: u32,
     muscles: bool,
     seed: u64,
     standing: &Standing,
-    beliefs: &Beliefs,
+    beliefs: &Arc<Beliefs>,
     judged: Judged,
     reference: &ReferenceGait,
 ) -> Result<Outcome, Error> {
-    let belief = beliefs.posterior(standing).map_err(Error::Learner)?;
-    let best = best_trial(standing, &belief).map_err(Error::Learner)?;
+    let (there, beliefs) = (standing.clone(), Arc::clone(beliefs));
+    let choose = move |pool: &OnPool| best_trial(&there, &*beliefs.posterior(pool, &there)?);
+    let best = store.compute(choose).await?.map_err(Error::Learner)?;
     let milestones = history::of(standing, best);
     let best = best.and_then(|id| standing.trial(id));
     let gait = match best {

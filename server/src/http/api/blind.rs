@@ -49,21 +49,22 @@ pub(super) struct NextPair {
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn next(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Rate>,
     once: Once<Rate>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let (writer, shown) = blind::next(&mut *app.read().await?, app.store(), &once.caller, id).await?;
+    let answering = app.clone();
+    let (writer, shown) = blind::next(app.store_mut(), &once.caller, id).await?;
     let pair = shown.map(|shown| Pair {
         first: format!("/api/v1/blind/{}/first", shown.token),
         second: format!("/api/v1/blind/{}/second", shown.token),
         token: shown.token,
         number: shown.number,
     });
-    once.finish(&app, writer, StatusCode::OK, None, &NextPair { pair }).await
+    once.finish(&answering, writer, StatusCode::OK, None, &NextPair { pair }).await
 }
 
 /// `GET /blind/{token}/first`: 101 figures over one stride, each ten places: hip, shoulder, then knee, ankle, heel, toe

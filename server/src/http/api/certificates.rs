@@ -43,7 +43,7 @@ pub(super) async fn get(
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
     once: Once<Run>,
 ) -> Result<Response, Error> {
@@ -51,7 +51,7 @@ pub(super) async fn create(
         return Ok(before);
     }
     let begun = examination::begin(&mut *app.read().await?, id).await?;
-    let certificate = examination::certificate(begun).await?;
+    let certificate = examination::certificate(app.store_mut(), begun).await?;
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),

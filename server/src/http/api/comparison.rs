@@ -1,6 +1,7 @@
 //! Several studies side by side.
 
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -8,8 +9,7 @@ use crate::http::may::May;
 use crate::http::reached::Named;
 use crate::store::studies::{self, StudyState};
 use crate::store::trials::{self, TrialCounts};
-use crate::store::{Connection, StudyId, consents, schema};
-use crate::studies::belief::Beliefs;
+use crate::store::{StudyId, consents, schema};
 use crate::studies::choice::ranking_to_show;
 use crate::studies::standing::Standing;
 use axum::Json;
@@ -62,34 +62,35 @@ pub(super) struct Compared {
 )]
 pub(super) async fn get(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Params(which): Params<Which>,
 ) -> Result<Json<Vec<Compared>>, Error> {
     let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
     if !(2..=MOST).contains(&named.len()) {
         return Err(Error::invalid("ids", which.ids, &format!("2 to {MOST} identifiers, with commas between them")));
     }
-    let mut reader = app.read().await?;
     let mut rows = Vec::with_capacity(named.len());
     for id in named {
         let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
-        let id = id.reached(&mut reader, may.caller.reach()).await?;
-        rows.push(row(&mut reader, id, Arc::clone(&app.beliefs)).await?);
+        let id = id.reached(&mut *app.read().await?, may.caller.reach()).await?;
+        rows.push(row(&mut app, id).await?);
     }
     Ok(Json(rows))
 }
 
-async fn row(db: &mut Connection, id: StudyId, beliefs: Arc<Beliefs>) -> Result<Compared, Error> {
-    let study = studies::get(db, id).await?;
-    consents::may_be_shown(db, id).await?;
-    let counts = trials::counts(db, id).await?;
-    let standing = Standing::read(db, study).await?;
-    let (standing, best) = tokio::task::spawn_blocking(move || {
-        let best = ranking_to_show(&standing, &beliefs);
+async fn row(app: &mut AppState, id: StudyId) -> Result<Compared, Error> {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    consents::may_be_shown(&mut reader, id).await?;
+    let counts = trials::counts(&mut reader, id).await?;
+    let standing = Standing::read(&mut reader, study).await?;
+    drop(reader);
+    let beliefs = Arc::clone(&app.beliefs);
+    let rank = move |pool: &OnPool| {
+        let best = ranking_to_show(pool, &standing, &beliefs);
         (standing, best)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let (standing, best) = app.compute(rank).await?;
     let best = best.map_err(Error::Learner)?.first().and_then(|id| standing.trial(*id));
     Ok(Compared {
         id,

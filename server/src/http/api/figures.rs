@@ -1,6 +1,7 @@
 //! Figures as files: SVG that stands alone, PNG, and the numbers behind them as CSV.
 
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -36,13 +37,14 @@ pub(super) struct Beside<T> {
 )]
 pub(super) async fn of_study(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(Beside { other }): Params<Beside<StudyId>>,
 ) -> Result<Response, Error> {
     let other = reached(&mut *app.read().await?, may.caller.reach(), other).await?;
-    answer(figures::of_study(&app, id, other).await?.into_figures(), file).await
+    let figures = figures::of_study(&mut app, id, other).await?.into_figures();
+    answer(&mut app, figures, file).await
 }
 
 /// `GET /trials/{id}/figures/{file}`: those of the page of a gait; while its solve runs, how far that is. With another trial
@@ -61,17 +63,17 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn of_trial(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(Beside { other }): Params<Beside<TrialId>>,
 ) -> Result<Response, Error> {
     let other = reached(&mut *app.read().await?, may.caller.reach(), other).await?;
     let figures = match other {
-        None => figures::of_trial(&app, id).await?,
-        Some(other) => figures::of_pair(&app, id, other).await?,
+        None => figures::of_trial(&mut app, id).await?,
+        Some(other) => figures::of_pair(&mut app, id, other).await?,
     };
-    answer(figures, file).await
+    answer(&mut app, figures, file).await
 }
 
 /// `GET /lab-sessions/{id}/figures/{file}`: muscle activity and limit cycles of a lab session.
@@ -88,11 +90,12 @@ pub(super) async fn of_trial(
 )]
 pub(super) async fn of_session(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<LabSessionId, Read>,
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Error> {
-    answer(figures::of_session(&app, id).await?, file).await
+    let figures = figures::of_session(&mut app, id).await?;
+    answer(&mut app, figures, file).await
 }
 
 /// `GET /studies/{id}/belief/figures/{file}`: what the learner believes, as on its page.
@@ -111,12 +114,13 @@ pub(super) async fn of_session(
 )]
 pub(super) async fn of_belief(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
     Params(choice): Params<belief::Choice>,
 ) -> Result<Response, Error> {
-    answer(belief::figures(&app, id, choice).await?, file).await
+    let figures = belief::figures(&mut app, id, choice).await?;
+    answer(&mut app, figures, file).await
 }
 
 /// `GET /reference-gaits/{id}/figures/{file}`: the joint angles of a reference gait.
@@ -133,16 +137,16 @@ pub(super) async fn of_belief(
 )]
 pub(super) async fn of_reference(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<ReferenceGaitId, Read>,
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Error> {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;
-    answer(figures::of_reference(&reference), file).await
+    answer(&mut app, figures::of_reference(&reference), file).await
 }
 
 /// One of the figures in the form that the name of the file says.
-async fn answer(figures: Vec<Figure>, file: String) -> Result<Response, Error> {
+async fn answer(app: &mut AppState, figures: Vec<Figure>, file: String) -> Result<Response, Error> {
     let missing = || Error::NotFound { what: "the figure".to_owned(), id: file.clone() };
     let (name, form) = file.rsplit_once('.').ok_or_else(missing)?;
     let figure = figures.into_iter().find(|figure| figure.name == name).ok_or_else(missing)?;
@@ -152,12 +156,12 @@ async fn answer(figures: Vec<Figure>, file: String) -> Result<Response, Error> {
         "csv" => ("text/csv; charset=utf-8", Form::Csv),
         _ => return Err(missing()),
     };
-    let drawn = tokio::task::spawn_blocking(move || match form {
+    let draw = move |_: &OnPool| match form {
         Form::Svg => Ok(figure.svg().into_bytes()),
         Form::Csv => Ok(figure.csv().into_bytes()),
         Form::Png => figure.png(),
-    });
-    let bytes = drawn.await.map_err(|e| Error::Internal(e.to_string()))?.map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let bytes = app.compute(draw).await?.map_err(|e| Error::Internal(e.to_string()))?;
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{file}\"")),

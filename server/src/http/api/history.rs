@@ -1,6 +1,7 @@
 //! The best action by iteration.
 
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
@@ -27,11 +28,11 @@ use std::sync::Arc;
 )]
 pub(super) async fn of_study(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
-    let history = read(&app, id).await?;
+    let history = read(&mut app, id).await?;
     if wants_csv(&headers) { table(id, &history) } else { Ok(Json(history).into_response()) }
 }
 
@@ -46,23 +47,23 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn of_study_csv(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Error> {
-    table(id, &read(&app, id).await?)
+    table(id, &read(&mut app, id).await?)
 }
 
-async fn read(app: &AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
+async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
-    let compute = move || {
-        let best = ranking_to_show(&standing, &beliefs)?.first().copied();
+    let compute = move |pool: &OnPool| {
+        let best = ranking_to_show(pool, &standing, &beliefs)?.first().copied();
         Ok(history::of(&standing, best))
     };
-    tokio::task::spawn_blocking(compute).await.map_err(|e| Error::Internal(e.to_string()))?.map_err(Error::Learner)
+    app.compute(compute).await?.map_err(Error::Learner)
 }
 
 fn table(study: StudyId, history: &[Milestone]) -> Result<Response, Error> {

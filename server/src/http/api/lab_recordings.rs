@@ -74,14 +74,14 @@ pub(super) async fn file(
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn electromyogram(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, new): OnceWith<Run, NewEmg>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let checked = new.checked().await?;
+    let checked = new.checked(app.store_mut()).await?;
     keep(&app, id, &once, &checked).await
 }
 
@@ -96,14 +96,14 @@ pub(super) async fn electromyogram(
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn motion(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, new): OnceWith<Run, NewMotion>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let checked = new.checked().await?;
+    let checked = new.checked(app.store_mut()).await?;
     keep(&app, id, &once, &checked).await
 }
 
@@ -137,20 +137,20 @@ pub(super) struct Processing {
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn process(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     OnceWith(once, processing): OnceWith<Run, Processing>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let result = lab::compute(&mut *app.read().await?, id, processing.settings).await?;
+    let result = lab::compute(app.store_mut(), id, processing.settings).await?;
+    let view = lab::beside_model(app.store_mut(), id, result).await?;
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    lab::keep_result(&mut writer, &once.actor, id, &result).await?;
-    let view = lab::emg(&mut writer, id).await?;
+    lab::keep_result(&mut writer, &once.actor, id, &view.result).await?;
     once.finish(&app, writer, StatusCode::CREATED, None, &view).await
 }
 
@@ -166,10 +166,10 @@ pub(super) async fn process(
 )]
 pub(super) async fn result(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<LabSessionId, Read>,
 ) -> Result<Json<Option<EmgView>>, Error> {
-    Ok(Json(lab::emg(&mut *app.read().await?, id).await?))
+    Ok(Json(lab::emg(app.store_mut(), id).await?))
 }
 
 /// `GET /lab-sessions/{id}/limit-cycles`: angle and velocity of every joint that was recorded.
@@ -183,8 +183,8 @@ pub(super) async fn result(
 )]
 pub(super) async fn limit_cycles(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<LabSessionId, Read>,
 ) -> Result<Json<Vec<LimitCycles>>, Error> {
-    Ok(Json(lab::limit_cycles(&mut *app.read().await?, id).await?))
+    Ok(Json(lab::limit_cycles(app.store_mut(), id).await?))
 }

@@ -1,6 +1,7 @@
 //! What a study recommends.
 
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
@@ -79,10 +80,10 @@ impl Recommended {
 )]
 pub(super) async fn of_study(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Json<Recommendation>, Error> {
-    Ok(Json(read(&app, id).await?))
+    Ok(Json(read(&mut app, id).await?))
 }
 
 /// `GET /studies/{id}/recommendation.csv`: the bounds alone, each with what it limits and its unit.
@@ -99,10 +100,10 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn of_study_csv(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Error> {
-    let Recommendation { best, certificate, .. } = read(&app, id).await?;
+    let Recommendation { best, certificate, .. } = read(&mut app, id).await?;
     let bounds = TunedBounds::NAMES.iter().zip(best.bounds.to_array()).zip(TunedBounds::MEANINGS);
     let rows = bounds
         .map(|((name, value), meaning)| {
@@ -120,19 +121,18 @@ pub(super) async fn of_study_csv(
     csv_answer(&format!("bounds-trial-{}.csv", best.number), &columns, rows)
 }
 
-async fn read(app: &AppState, id: StudyId) -> Result<Recommendation, Error> {
+async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let standing = Standing::read(&mut reader, study).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
-    let (standing, ranking) = tokio::task::spawn_blocking(move || {
+    let rank = move |pool: &OnPool| {
         let unanswered = standing.waits_for_first_answer();
-        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(&standing, &beliefs) };
+        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(pool, &standing, &beliefs) };
         (standing, ranking)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let (standing, ranking) = app.compute(rank).await?;
     let ranking = ranking.map_err(Error::Learner)?;
     let best = *ranking.first().ok_or_else(|| {
         Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better")

@@ -37,13 +37,13 @@ pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Js
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     OnceWith(once, new): OnceWith<Run, NewReferenceGait>,
 ) -> Result<Response, Error> {
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let definition = new.definition_aside().await?;
+    let definition = new.definition_aside(app.store_mut()).await?;
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),

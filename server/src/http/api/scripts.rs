@@ -11,6 +11,7 @@ use crate::studies::script::{self, Ask, Tell};
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
+use std::sync::Arc;
 
 /// So often a decision is made anew when the study moved on meanwhile.
 const TRIES: usize = 20;
@@ -26,13 +27,14 @@ const TRIES: usize = 20;
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn ask(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     OnceWith(once, ask): OnceWith<Run, Ask>,
 ) -> Result<Response, Error> {
     let worker = ask.worker.as_deref().unwrap_or(&once.caller.name).trim();
     for _ in 0..TRIES {
-        let suggestion = script::suggest(&mut *app.read().await?, id, worker, &app.beliefs).await;
+        let beliefs = Arc::clone(&app.beliefs);
+        let suggestion = script::suggest(app.store_mut(), id, worker, &beliefs).await;
         let mut writer = match once.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),
@@ -56,12 +58,12 @@ pub(super) async fn ask(
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn tell(
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
     OnceWith(once, tell): OnceWith<Run, Tell>,
 ) -> Result<Response, Error> {
     for _ in 0..TRIES {
-        let heard = script::hear(&mut *app.read().await?, id, &tell).await;
+        let heard = script::hear(app.store_mut(), id, &tell).await;
         let mut writer = match once.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),

@@ -11,7 +11,7 @@ use crate::http::reached::Id;
 use crate::http::revision::{IfMatch, tagged};
 use crate::store::studies::{self, Study};
 use crate::store::trials::{self, TrialCounts};
-use crate::store::{Connection, StudyId, Writer};
+use crate::store::{Connection, LentWriter, StudyId};
 use crate::studies::change::{self, Change, Extend, Fork};
 use crate::studies::command;
 use crate::studies::lifecycle::{Act, acts_of_people};
@@ -313,7 +313,7 @@ pub(super) async fn fork(
 async fn answer(
     app: &AppState,
     once: &Once<Run>,
-    mut writer: Writer,
+    mut writer: LentWriter<'_>,
     study: Study,
     status: StatusCode,
 ) -> Result<Response, Error> {

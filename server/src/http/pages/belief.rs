@@ -5,6 +5,7 @@ use super::error::{Page, page};
 use super::format::{self, meaning, percent, signed};
 use super::study::answer_in_words;
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -89,24 +90,27 @@ struct AnswerRow {
 /// `GET /studies/{id}/belief`.
 pub(super) async fn get(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
     let study = studies::get(&mut *app.read().await?, id).await?;
-    page(&match believed(&app, id).await? {
+    page(&match believed(&mut app, id).await? {
         Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
         Believed::There(standing, belief) => {
             let beliefs = Arc::clone(&app.beliefs);
-            let draw = move || {
+            let draw = move |pool: &OnPool| {
                 // As on the page of the study: nothing before people have answered.
                 let silent = standing.waits_for_first_answer();
-                let ranking =
-                    if silent { Vec::new() } else { ranking_to_show(&standing, &beliefs).map_err(Error::Learner)? };
+                let ranking = if silent {
+                    Vec::new()
+                } else {
+                    ranking_to_show(pool, &standing, &beliefs).map_err(Error::Learner)?
+                };
                 let recommended = ranking.first().copied();
                 show(id, &standing, &belief, recommended, &choice)
             };
-            let shown = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))??;
+            let shown = app.compute(draw).await.map_err(Error::from)??;
             BeliefPage { study, absent: None, shown: Some(shown) }
         }
     })
@@ -116,15 +120,15 @@ pub(super) async fn get(
 ///
 /// # Errors
 /// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or what the database and the learner report.
-pub(crate) async fn figures(app: &AppState, id: StudyId, choice: Choice) -> Result<Vec<Figure>, Error> {
+pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: Choice) -> Result<Vec<Figure>, Error> {
     let Believed::There(standing, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
-    let draw = move || {
+    let draw = move |_: &OnPool| {
         let chosen = chosen(belief.posterior.space(), &choice)?;
         let mut figures = marginals(&belief);
         figures.extend(maps(&belief, &standing, chosen).map_err(Error::Learner)?.figures);
         Ok(figures)
     };
-    tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?
+    app.compute(draw).await?
 }
 
 /// What the learner believes of a study, or why it is not told.
@@ -133,7 +137,7 @@ enum Believed {
     There(Box<Standing>, Arc<Belief>),
 }
 
-async fn believed(app: &AppState, id: StudyId) -> Result<Believed, Error> {
+async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     let too_many = |what: String| {
         Ok(Believed::Absent(format!("From {what} on the belief takes longer to compute than a page may.")))
     };
@@ -153,9 +157,9 @@ async fn believed(app: &AppState, id: StudyId) -> Result<Believed, Error> {
         return too_many(format!("{MOST_ANSWERS} answers"));
     }
     let beliefs = app.beliefs.clone();
-    let compute = move || beliefs.of(&standing).map(|belief| Believed::There(Box::new(standing), belief));
-    let found = tokio::task::spawn_blocking(compute).await.map_err(|e| Error::Internal(e.to_string()))?;
-    found.map_err(Error::Learner)
+    let think =
+        move |pool: &OnPool| beliefs.of(pool, &standing).map(|belief| Believed::There(Box::new(standing), belief));
+    app.compute(think).await?.map_err(Error::Learner)
 }
 
 fn show(

@@ -78,11 +78,11 @@ impl CheckInWords {
 /// `POST /trials/{id}/certify`.
 pub(super) async fn post(
     may: May<Run>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
     let begun = examination::begin(&mut *app.read().await.map_err(crate::error::Error::from)?, id).await?;
-    let certificate = examination::certificate(begun).await?;
+    let certificate = examination::certificate(app.store_mut(), begun).await?;
     let mut writer = app.write().await?;
     examination::record(&mut writer, &may.caller.actor, id, &certificate).await?;
     commit(writer).await?;

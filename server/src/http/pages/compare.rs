@@ -5,6 +5,7 @@ use super::error::{Page, PageError, page};
 use super::figures;
 use super::study::{answer_in_words, remark_in_words};
 use crate::access::{self, Caller, Read};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::{Form, Params};
@@ -137,7 +138,7 @@ const CERTIFIED_AT_ONCE: usize = 10;
 /// `GET /studies/{id}/compare`.
 pub(super) async fn get(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
@@ -148,12 +149,12 @@ pub(super) async fn get(
     }
     if choice.a.is_some() && choice.a == choice.b {
         let refused = "Gait A and gait B were the same: choose two different ones.".to_owned();
-        return show(&app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused)).await;
+        return show(&mut app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused)).await;
     }
-    show(&app, id, choice, typed, None).await
+    show(&mut app, id, choice, typed, None).await
 }
 
-async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
+async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
     let last_event = events::last(&mut reader, id).await?;
     let study = studies::get(&mut reader, id).await?;
@@ -169,8 +170,14 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         Some(saved) => read_back(&mut reader, &standing, saved).await?,
         None => None,
     };
-    let question = if large { Question::None } else { open_question(&standing).map_err(Error::Learner)? };
-    let question = question.pair().map(|pair| pair.trials());
+    drop(reader);
+    let ask = move |pool: &OnPool| {
+        let question = if large { Ok(Question::None) } else { open_question(pool, &standing) };
+        (standing, question)
+    };
+    let (standing, question) = app.compute(ask).await.map_err(Error::from)?;
+    let question = question.map_err(Error::Learner)?.trials();
+    let mut reader = app.read().await?;
     let waits = question.is_some();
     let mut being_certified = 0;
     for trial in
@@ -211,7 +218,7 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         _ => None,
     };
     drop(reader);
-    let draw = move || {
+    let draw = move |_: &OnPool| {
         let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return (Vec::new(), Vec::new()) };
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
         let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
@@ -219,7 +226,7 @@ async fn show(app: &AppState, id: StudyId, choice: Choice, typed: Submitted, ref
         let stride = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
         (charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect())
     };
-    let (charts, strides) = tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))?;
+    let (charts, strides) = app.compute(draw).await.map_err(Error::from)?;
     page(&ComparePage {
         study: standing.study,
         trials,
@@ -348,7 +355,7 @@ enum Given {
 /// `POST /studies/{id}/compare`.
 pub(super) async fn post(
     may: May<access::Answer>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, access::Answer>,
     Form(form): Form<Submitted>,
 ) -> Result<Response, PageError> {
@@ -373,7 +380,7 @@ pub(super) async fn post(
         Err(other) => return Err(other.into()),
     };
     let choice = Choice { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
-    Ok((status, show(&app, id, choice, form, Some(why)).await?).into_response())
+    Ok((status, show(&mut app, id, choice, form, Some(why)).await?).into_response())
 }
 
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {

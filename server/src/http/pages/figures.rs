@@ -5,6 +5,7 @@ use super::error::{Page, page};
 use super::side_by_side::Side;
 use super::{lab_charts, study};
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::gait_charts;
 use crate::http::AppState;
@@ -15,10 +16,10 @@ use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, band_in_words};
 use crate::store::studies::Study;
 use crate::store::{
-    Connection, LabSessionId, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials,
+    Connection, LabSessionId, Store, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies,
+    trials,
 };
 use crate::studies::answer;
-use crate::studies::belief::Beliefs;
 use crate::studies::lab::{self, LimitCycles, SessionView};
 use askama::Template;
 use axum::extract::State;
@@ -68,22 +69,22 @@ struct Best {
 }
 
 impl Best {
-    async fn read(db: &mut Connection, id: StudyId, beliefs: &Arc<Beliefs>) -> Result<Self, Error> {
-        let beliefs = Arc::clone(beliefs);
-        let side = Side::read(db, id).await?;
-        let (side, figures) = tokio::task::spawn_blocking(move || {
-            let figures = side.figures(&beliefs);
+    async fn read(app: &mut AppState, id: StudyId) -> Result<Self, Error> {
+        let beliefs = Arc::clone(&app.beliefs);
+        let side = Side::read(&mut *app.read().await?, id).await?;
+        let draw = move |pool: &OnPool| {
+            let figures = side.figures(pool, &beliefs);
             (side, figures)
-        })
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))?;
+        };
+        let (side, figures) = app.compute(draw).await?;
         let figures = figures?;
+        let mut reader = app.read().await?;
         let trial = match figures.best {
-            Some(id) => Some((id, trials::get(db, id).await?.number)),
+            Some(id) => Some((id, trials::get(&mut reader, id).await?.number)),
             None => None,
         };
         let gait = match trial {
-            Some((id, _)) => gait_of(db, id).await?,
+            Some((id, _)) => gait_of(&mut reader, id).await?,
             None => None,
         };
         Ok(Self { side, figures, trial, gait })
@@ -107,21 +108,20 @@ async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Option<Gait>, Error
 ///
 /// # Errors
 /// A conflict when the subject of one of them withdrew, [`Error::NotFound`], or what the database reports.
-pub(crate) async fn of_study(app: &AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
-    let mut reader = app.read().await?;
-    let mut shown = vec![Best::read(&mut reader, id, &app.beliefs).await?];
+pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
+    let mut shown = vec![Best::read(app, id).await?];
     if let Some(other) = other.filter(|other| *other != id) {
-        shown.push(Best::read(&mut reader, other, &app.beliefs).await?);
+        shown.push(Best::read(app, other).await?);
     }
+    let mut reader = app.read().await?;
     let reference = shown[0].side.standing.study.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
     drop(reader);
-    let (shown, sections) = tokio::task::spawn_blocking(move || {
+    let draw = move |_: &OnPool| {
         let sections = sections(&shown, &reference);
         (shown, sections)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let (shown, sections) = app.compute(draw).await?;
     let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
     let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
     let tree = study::warm_starts(&first.side.standing, first.figures.best);
@@ -169,7 +169,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
 ///
 /// # Errors
 /// [`Error::NotFound`], or what the database reports.
-pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
+pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
     if let Some(running) = app.director.board().track(id) {
         return Ok(gait_charts::solve(&running.records).into_iter().collect());
     }
@@ -180,23 +180,22 @@ pub(crate) async fn of_trial(app: &AppState, id: TrialId) -> Result<Vec<Figure>,
     let Some(gait) = gait_of(&mut reader, id).await? else { return Ok(Vec::new()) };
     let iterations = gaits::iterations(&mut reader, id).await?;
     drop(reader);
-    tokio::task::spawn_blocking(move || {
+    let draw = move |_: &OnPool| {
         let mut figures = vec![gait_charts::tiles(stick_figures(&gait)?)];
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
         }
         figures.extend(gait_charts::solve(&iterations));
         Ok(figures)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?
+    };
+    app.compute(draw).await?
 }
 
 /// The joint angles of two gaits of a study, as on the page that compares them.
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] for a trial of another study, or what the database reports.
-pub(crate) async fn of_pair(app: &AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
+pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, a).await?;
     let other = answer::comparable(&mut reader, trial.study_id, "other", b).await?;
@@ -206,8 +205,8 @@ pub(crate) async fn of_pair(app: &AppState, a: TrialId, b: TrialId) -> Result<Ve
         return Ok(Vec::new());
     };
     drop(reader);
-    let draw = move || pair((trial.number, &gait_a), (other.number, &gait_b), &reference);
-    tokio::task::spawn_blocking(draw).await.map_err(|e| Error::Internal(e.to_string()))
+    let draw = move |_: &OnPool| pair((trial.number, &gait_a), (other.number, &gait_b), &reference);
+    Ok(app.compute(draw).await?)
 }
 
 /// Two gaits, each with the number of its trial, over the reference gait.
@@ -227,25 +226,27 @@ pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
 ///
 /// # Errors
 /// [`Error::NotFound`], or what the database reports.
-pub(crate) async fn of_session(app: &AppState, id: LabSessionId) -> Result<Vec<Figure>, Error> {
+pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<Vec<Figure>, Error> {
+    let (emg, cycles) = (lab::emg(app.store_mut(), id).await?, measured_cycles(app.store_mut(), id).await?);
     let mut reader = app.read().await?;
     let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
-    let mut figures = match lab::emg(&mut reader, id).await? {
-        Some(emg) => lab_charts::electromyograms(&session, &emg),
-        None => Vec::new(),
+    drop(reader);
+    let draw = move |_: &OnPool| {
+        let mut figures = emg.map_or_else(Vec::new, |emg| lab_charts::electromyograms(&session, &emg));
+        figures.extend(lab_charts::limit_cycles(&session, &cycles));
+        figures
     };
-    figures.extend(lab_charts::limit_cycles(&session, &measured_cycles(&mut reader, id).await?));
-    Ok(figures)
+    Ok(app.compute(draw).await?)
 }
 
 /// The limit cycles of each walk, with its gait where that may be known.
 pub(super) async fn measured_cycles(
-    db: &mut Connection,
+    store: &mut Store,
     id: LabSessionId,
 ) -> Result<Vec<(LimitCycles, Option<Gait>)>, Error> {
     let mut found = Vec::new();
-    for cycles in lab::limit_cycles(db, id).await? {
-        let gait = lab::known_gait(db, id, cycles.walk).await?;
+    for cycles in lab::limit_cycles(store, id).await? {
+        let gait = lab::known_gait(&mut *store.read().await?, id, cycles.walk).await?;
         found.push((cycles, gait));
     }
     Ok(found)
@@ -279,7 +280,7 @@ pub(super) struct Beside {
 /// `GET /studies/{id}/figures`.
 pub(super) async fn get(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Params(beside): Params<Beside>,
 ) -> Page {
@@ -291,7 +292,7 @@ pub(super) async fn get(
     };
     let reach = may.caller.reach();
     let other = reached(&mut *app.read().await?, reach, other).await?;
-    let StudyFigures { study, best, without_gait, sections, .. } = of_study(&app, id, other).await?;
+    let StudyFigures { study, best, without_gait, sections, .. } = of_study(&mut app, id, other).await?;
     let mut reader = app.read().await?;
     let mut offered = studies::page(&mut reader, reach, None, OFFERED).await?;
     offered.retain(|offered| offered.id != id);

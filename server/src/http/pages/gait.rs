@@ -65,7 +65,7 @@ impl GaitPage {
 }
 
 /// `GET /trials/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<TrialId, Read>) -> Page {
+pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(id, _): Shown<TrialId, Read>) -> Page {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -95,9 +95,8 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id, _
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
     let action = trial.action;
-    let drawn = tokio::task::spawn_blocking(move || draw(id, gait.as_ref(), &reference, &iterations, &action))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))??;
+    let drawn = app.compute(move |_| draw(id, gait.as_ref(), &reference, &iterations, &action));
+    let drawn = drawn.await.map_err(Error::from)??;
     page(&GaitPage {
         state: words(trial.state.as_str()),
         rmse: format::figure(trial.gait_rmse_rad),

@@ -7,6 +7,7 @@ use super::format::{self, words};
 use super::lab_charts;
 use super::lab_recordings::{Forms, Settings};
 use crate::access::{Administer, Caller, Permission, Read, Run};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Form;
@@ -229,22 +230,44 @@ struct WalkRow {
 }
 
 /// `GET /lab-sessions/{id}`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<LabSessionId, Read>) -> Page {
-    show(&app, id, &may.caller, Forms::default(), None).await
+pub(super) async fn get(
+    may: May<Read>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<LabSessionId, Read>,
+) -> Page {
+    show(&mut app, id, &may.caller, Forms::default(), None).await
 }
 
-async fn show(app: &AppState, id: LabSessionId, caller: &Caller, mut forms: Forms, refused: Option<String>) -> Page {
+/// The charts of a session.
+struct Drawings {
+    emg: Vec<Drawn>,
+    portraits: Vec<Drawn>,
+}
+
+async fn show(
+    app: &mut AppState,
+    id: LabSessionId,
+    caller: &Caller,
+    mut forms: Forms,
+    refused: Option<String>,
+) -> Page {
+    let emg = lab::emg(app.store_mut(), id).await?;
+    let cycles = measured_cycles(app.store_mut(), id).await?;
     let mut reader = app.read().await?;
     let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
     let study = studies::get(&mut reader, session.study_id).await?;
     let one = trials::get(&mut reader, session.gait_one).await?.number;
     let two = trials::get(&mut reader, session.gait_two).await?.number;
     let recordings = lab_recordings::of_session(&mut reader, id).await?;
-    let emg = lab::emg(&mut reader, id).await?;
-    let portraits = lab_charts::limit_cycles(&session, &measured_cycles(&mut reader, id).await?);
-    let files = format!("/api/v1/lab-sessions/{id}/figures");
-    let drawn = |figures: &[Figure]| figures.iter().map(|figure| Drawn::of(figure, &files, "")).collect();
     drop(reader);
+    let draw = move |_: &OnPool| {
+        let files = format!("/api/v1/lab-sessions/{id}/figures");
+        let drawn = |figures: &[Figure]| figures.iter().map(|figure| Drawn::of(figure, &files, "")).collect();
+        let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::electromyograms(&session, emg)));
+        let drawings = Drawings { emg: of_emg, portraits: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
+        (session, emg, drawings)
+    };
+    let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
     page(&SessionPage {
         study,
         state: words(session.state.as_str()),
@@ -264,10 +287,8 @@ async fn show(app: &AppState, id: LabSessionId, caller: &Caller, mut forms: Form
             .take()
             .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
         forms,
-        measured: emg
-            .as_ref()
-            .map(|emg| Measured::of(&session, emg, drawn(&lab_charts::electromyograms(&session, emg)))),
-        portraits: drawn(&portraits),
+        measured: emg.as_ref().map(|emg| Measured::of(&session, emg, drawings.emg)),
+        portraits: drawings.portraits,
         refused,
         said: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
         session,
@@ -293,38 +314,40 @@ pub(super) struct Note {
 /// `POST /lab-sessions/{id}/close`.
 pub(super) async fn close(
     may: May<Run>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(Note { note }): Form<Note>,
 ) -> Result<Response, PageError> {
-    let mut writer = app.write().await?;
-    let done = match lab::close(&mut writer, &may.caller.actor, id, &note).await {
-        Ok(_) => Ok(commit(writer).await?),
-        Err(error) => Err(error),
+    let done = async {
+        let mut writer = app.write().await?;
+        lab::close(&mut writer, &may.caller.actor, id, &note).await?;
+        Ok(commit(writer).await?)
     };
-    answer(&app, id, &may.caller, done, Forms::default()).await
+    let done = done.await;
+    answer(&mut app, id, &may.caller, done, Forms::default()).await
 }
 
 /// `POST /lab-sessions/{id}/unblind`.
 pub(super) async fn unblind(
     may: May<Administer>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Administer>,
     Form(Note { note }): Form<Note>,
 ) -> Result<Response, PageError> {
-    let mut writer = app.write().await?;
-    let done = match lab::unblind(&mut writer, &may.caller.actor, id, &note).await {
-        Ok(_) => Ok(commit(writer).await?),
-        Err(error) => Err(error),
+    let done = async {
+        let mut writer = app.write().await?;
+        lab::unblind(&mut writer, &may.caller.actor, id, &note).await?;
+        Ok(commit(writer).await?)
     };
+    let done = done.await;
     // The learner may have heard something.
     app.director.changed();
-    answer(&app, id, &may.caller, done, Forms::default()).await
+    answer(&mut app, id, &may.caller, done, Forms::default()).await
 }
 
 /// Shows the session anew; what was refused, with the reason.
 pub(super) async fn answer(
-    app: &AppState,
+    app: &mut AppState,
     id: LabSessionId,
     caller: &Caller,
     done: Result<(), Error>,

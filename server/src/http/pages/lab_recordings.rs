@@ -125,25 +125,31 @@ impl MotionFields {
 /// `POST /lab-sessions/{id}/electromyograms`.
 pub(super) async fn electromyogram(
     may: May<Run>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<EmgFields>,
 ) -> Result<Response, PageError> {
-    let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
+    let kept = async {
+        let checked = fields.read()?.checked(app.store_mut()).await?;
+        keep(&app, &may, id, checked).await
+    };
     let kept = kept.await;
-    lab::answer(&app, id, &may.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
+    lab::answer(&mut app, id, &may.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
 }
 
 /// `POST /lab-sessions/{id}/motions`.
 pub(super) async fn motion(
     may: May<Run>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<MotionFields>,
 ) -> Result<Response, PageError> {
-    let kept = async { keep(&app, &may, id, fields.read()?.checked().await?).await };
+    let kept = async {
+        let checked = fields.read()?.checked(app.store_mut()).await?;
+        keep(&app, &may, id, checked).await
+    };
     let kept = kept.await;
-    lab::answer(&app, id, &may.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() }).await
+    lab::answer(&mut app, id, &may.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() }).await
 }
 
 async fn keep(app: &AppState, may: &May<Run>, id: LabSessionId, checked: Checked) -> Result<(), Error> {
@@ -187,7 +193,7 @@ pub(super) struct Forms {
 /// `POST /lab-sessions/{id}/process`.
 pub(super) async fn process(
     may: May<Run>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
     Form(typed): Form<Settings>,
 ) -> Result<Response, PageError> {
@@ -198,12 +204,12 @@ pub(super) async fn process(
             envelope_hz: number("envelope_hz", &typed.envelope_hz)?,
             order: number("order", &typed.order)?,
         };
-        let result = session::compute(&mut *app.read().await?, id, settings).await?;
+        let result = session::compute(app.store_mut(), id, settings).await?;
         let mut writer = app.write().await?;
         session::keep_result(&mut writer, &may.caller.actor, id, &result).await?;
         Ok(commit(writer).await?)
     };
     let processed = processed.await;
     let forms = Forms { filters: Some(typed), open: "filters", ..Forms::default() };
-    lab::answer(&app, id, &may.caller, processed, forms).await
+    lab::answer(&mut app, id, &may.caller, processed, forms).await
 }

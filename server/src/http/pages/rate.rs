@@ -149,10 +149,10 @@ async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Sa
 /// `POST /rate/{id}`: takes the next pair.
 pub(super) async fn next(
     may: May<Rate>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Rate>,
 ) -> Result<Redirect, PageError> {
-    let (writer, shown) = blind::next(&mut *app.read().await?, app.store(), &may.caller, id).await?;
+    let (writer, shown) = blind::next(app.store_mut(), &may.caller, id).await?;
     commit(writer).await?;
     Ok(match shown {
         Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.token)),
@@ -161,11 +161,11 @@ pub(super) async fn next(
 }
 
 /// `GET /rate/pair/{token}`.
-pub(super) async fn pair(may: May<Rate>, State(app): State<AppState>, Path(token): Path<String>) -> Page {
-    show(&app, &may.caller, &token, None).await
+pub(super) async fn pair(may: May<Rate>, State(mut app): State<AppState>, Path(token): Path<String>) -> Page {
+    show(&mut app, &may.caller, &token, None).await
 }
 
-async fn show(app: &AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
+async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
     let (token, number) = (shown.token.clone(), shown.number);
@@ -179,15 +179,14 @@ async fn show(app: &AppState, caller: &Caller, token: &str, refused: Option<Stri
         pair.extend(gaits::get(&mut reader, trial).await.ok());
     }
     drop(reader);
-    let strides = tokio::task::spawn_blocking(move || {
+    let strides = app.compute(move |_| {
         let stride = |gait: &Gait| stick_figures(gait).ok().and_then(|figures| Stride::of(&figures));
         match &pair[..] {
             [first, second] => stride(first).zip(stride(second)).map(|(first, second)| [first, second]),
             _ => None,
         }
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    });
+    let strides = strides.await.map_err(Error::from)?;
     page(&PairPage { token, number, saved: None, refused, strides })
 }
 
@@ -204,7 +203,7 @@ pub(super) struct Submitted {
 /// `POST /rate/pair/{token}`.
 pub(super) async fn answer(
     may: May<Rate>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Path(token): Path<String>,
     Form(form): Form<Submitted>,
 ) -> Result<Response, PageError> {
@@ -220,13 +219,14 @@ pub(super) async fn answer(
         }
         Ok(())
     };
-    told(&app, &may.caller, &token, answered.await).await
+    let answered = answered.await;
+    told(&mut app, &may.caller, &token, answered).await
 }
 
 /// `POST /rate/pair/{token}/take-back`.
 pub(super) async fn take_back(
     may: May<Rate>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Response, PageError> {
     let taken_back = async {
@@ -236,11 +236,17 @@ pub(super) async fn take_back(
         app.director.changed();
         Ok(())
     };
-    told(&app, &may.caller, &token, taken_back.await).await
+    let taken_back = taken_back.await;
+    told(&mut app, &may.caller, &token, taken_back).await
 }
 
 /// What was done; what was refused because of what was done before, on the page of the pair.
-async fn told(app: &AppState, caller: &Caller, token: &str, done: Result<(), Error>) -> Result<Response, PageError> {
+async fn told(
+    app: &mut AppState,
+    caller: &Caller,
+    token: &str,
+    done: Result<(), Error>,
+) -> Result<Response, PageError> {
     match done {
         Ok(()) => Ok(Redirect::to(&format!("/rate?saved={token}")).into_response()),
         Err(error @ Error::Conflict(_)) => {

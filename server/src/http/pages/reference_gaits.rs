@@ -120,11 +120,11 @@ pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Params(to)
 /// `POST /references`.
 pub(super) async fn import(
     may: May<Run>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Submitted(fields): Submitted<Fields>,
 ) -> Result<Response, PageError> {
     let definition = match fields.read() {
-        Ok(new) => new.definition_aside().await,
+        Ok(new) => new.definition_aside(app.store_mut()).await,
         Err(error) => Err(error),
     };
     let definition = match definition {

@@ -5,6 +5,7 @@ use super::error::{Page, page};
 use super::format::{self, words};
 use super::study::{COURSE, Figures, course, figures};
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -59,7 +60,7 @@ struct Compared {
 }
 
 /// `GET /studies/compare`.
-pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(choice): Params<Choice>) -> Page {
     let reach = may.caller.reach();
     let mut reader = app.read().await?;
     let offered = studies::page(&mut reader, reach, None, OFFERED).await?;
@@ -72,13 +73,12 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Params(choi
             let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);
             drop(reader);
             let beliefs = Arc::clone(&app.beliefs);
-            Some(
-                tokio::task::spawn_blocking(move || compare(a, b, &beliefs))
-                    .await
-                    .map_err(|e| Error::Internal(e.to_string()))??,
-            )
+            Some(app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??)
         }
-        _ => None,
+        _ => {
+            drop(reader);
+            None
+        }
     };
     page(&SideBySide { offered, a, b, compared })
 }
@@ -104,8 +104,8 @@ impl Side {
         Ok(Self { standing, subject, counts })
     }
 
-    pub(super) fn figures(&self, beliefs: &Beliefs) -> Result<Figures, Error> {
-        figures(&self.standing, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+    pub(super) fn figures(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Figures, Error> {
+        figures(pool, &self.standing, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
     }
 
     /// What the study is, and what it found.
@@ -136,8 +136,8 @@ impl Side {
     }
 }
 
-fn compare(a: Side, b: Side, beliefs: &Beliefs) -> Result<Compared, Error> {
-    let (of_a, of_b) = (a.figures(beliefs)?, b.figures(beliefs)?);
+fn compare(pool: &OnPool, a: Side, b: Side, beliefs: &Beliefs) -> Result<Compared, Error> {
+    let (of_a, of_b) = (a.figures(pool, beliefs)?, b.figures(pool, beliefs)?);
     let chart = course(&[(&a.standing, &of_a), (&b.standing, &of_b)]).map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.standing.study.id);
         Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.standing.study.id))

@@ -10,7 +10,9 @@ use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
 use crate::store::trials::TrialState;
-use crate::store::{Connection, Instant, StudyId, TrialId, Writer, consents, events, members, now, studies};
+use crate::store::{
+    Connection, Instant, LentWriter, Store, StudyId, TrialId, Writer, consents, events, members, now, studies,
+};
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::objections::Objections;
@@ -55,38 +57,35 @@ struct Question {
     converged: Vec<Instant>,
 }
 
-async fn question(db: &mut Connection, study: StudyId) -> Result<Question, Error> {
-    let study = studies::get(db, study).await?;
-    consents::may_be_shown(db, study.id).await?;
+async fn question(store: &mut Store, study: StudyId) -> Result<Question, Error> {
+    let mut db = store.read().await?;
+    let study = studies::get(&mut db, study).await?;
+    consents::may_be_shown(&mut db, study.id).await?;
     let (study_id, seed) = (study.id, study.plan.seed);
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
         return Ok(Question { seed, pair: None, converged: Vec::new() });
     }
-    let standing = Standing::read(db, study).await?;
+    let standing = Standing::read(&mut db, study).await?;
+    drop(db);
     let found = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged);
     let converged = found.filter_map(|trial| trial.finished_at).collect();
-    let found = tokio::task::spawn_blocking(move || open_question(&standing))
-        .await
-        .map_err(|e| Error::Internal(e.to_string()))?;
+    let found = store.compute(move |pool| open_question(pool, &standing)).await?;
     // What the learner says names bounds: it is logged, and the rater hears that the program failed.
     let found = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
-    let pair = found.pair().map(|pair| pair.trials());
+    let pair = found.trials();
     Ok(Question { seed, pair, converged })
 }
 
 /// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
 ///
-/// `reader` looks, `writer` writes: what is computed between them holds no transaction.
-///
 /// # Errors
 /// [`Error::NotFound`], or what the database and the learner report.
-pub async fn next(
-    reader: &mut Connection,
-    store: &crate::store::Store,
+pub async fn next<'a>(
+    store: &'a mut Store,
     caller: &Caller,
     study: StudyId,
-) -> Result<(Writer, Option<Presentation>), Error> {
-    let question = question(reader, study).await?;
+) -> Result<(LentWriter<'a>, Option<Presentation>), Error> {
+    let question = question(store, study).await?;
     let mut writer = store.write().await?;
     let all = presentations::of_study(&mut writer, study).await?;
     let objections = Objections::read(&mut writer, study).await?;

@@ -1,13 +1,14 @@
 //! What was made of the recordings: muscle activity over the cycle, limit cycles; beside the model where the gait of a
 //! walk may be known.
 
-use super::recording::{EmgReading, MotionReading, WHAT, aside};
+use super::recording::{EmgReading, MotionReading, WHAT};
 use super::session::{still_shown, trial_of};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
 use crate::store::lab_sessions::{self, Act};
-use crate::store::{Connection, LabRecordingId, LabSessionId, StoreError, Writer, gaits};
+use crate::store::{Connection, LabRecordingId, LabSessionId, Store, StoreError, Writer, gaits};
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
 use gait_optimizer::phase_portrait::PhasePortrait;
@@ -53,18 +54,20 @@ fn newest(recordings: &[LabRecording], kind: RecordingKind) -> Vec<&LabRecording
 ///
 /// # Errors
 /// [`Error::Invalid`] naming a setting, [`Error::Conflict`] without a recording of walk 1.
-pub async fn compute(db: &mut Connection, id: LabSessionId, settings: EmgSettings) -> Result<EmgResult, Error> {
-    still_shown(db, id).await?;
-    let recordings = lab_recordings::of_session(db, id).await?;
+pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings) -> Result<EmgResult, Error> {
+    let mut db = store.read().await?;
+    still_shown(&mut db, id).await?;
+    let recordings = lab_recordings::of_session(&mut db, id).await?;
     let mut files: Vec<(u8, LabRecordingId, EmgReading, String)> = Vec::new();
     for recording in newest(&recordings, RecordingKind::Electromyogram) {
-        let (reading, text) = lab_recordings::file(db, recording.id).await?;
+        let (reading, text) = lab_recordings::file(&mut db, recording.id).await?;
         files.push((recording.walk, recording.id, reading, text));
     }
+    drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
         return Err(Error::conflict("there is no electromyogram of walk 1, which the others are measured by"));
     }
-    aside(move || {
+    let process = move |_: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();
         let mut normal: Vec<CycleActivity> = Vec::new();
         for (walk, recording_id, reading, text) in &files {
@@ -80,8 +83,8 @@ pub async fn compute(db: &mut Connection, id: LabSessionId, settings: EmgSetting
             walks.push(WalkActivity { walk: *walk, recording_id: *recording_id, channels, averages, emg_rmse });
         }
         Ok(EmgResult { settings, walks })
-    })
-    .await
+    };
+    store.compute(process).await?
 }
 
 /// Keeps what was made of a session's electromyograms.
@@ -125,17 +128,38 @@ pub struct EmgView {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn emg(db: &mut Connection, id: LabSessionId) -> Result<Option<EmgView>, Error> {
-    let Some(result) = lab_recordings::newest_result::<EmgResult>(db, id).await? else { return Ok(None) };
-    let mut model = Vec::new();
+pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>, Error> {
+    let mut db = store.read().await?;
+    let Some(result) = lab_recordings::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
+    drop(db);
+    beside_model(store, id, result).await.map(Some)
+}
+
+/// A result of a session with the model's muscles beside it, where its gaits may be known.
+///
+/// # Errors
+/// What the database reports.
+pub async fn beside_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<EmgView, Error> {
+    let mut db = store.read().await?;
+    let mut gaits = Vec::new();
     for walk in &result.walks {
-        if let Some(gait) = known_gait(db, id, walk.walk).await? {
-            let muscles = walk.channels.iter().filter_map(|channel| model_activity(&gait, channel)).collect();
-            model.push(WalkModel { walk: walk.walk, muscles });
+        gaits.extend(known_gait(&mut db, id, walk.walk).await?.map(|gait| (walk.walk, gait)));
+    }
+    drop(db);
+    Ok(store.compute(move |_| view(result, &gaits)).await?)
+}
+
+/// A result with the model's muscles beside it.
+fn view(result: EmgResult, gaits: &[(u8, Gait)]) -> EmgView {
+    let mut model = Vec::new();
+    for (number, gait) in gaits {
+        let channels = result.walks.iter().filter(|walk| walk.walk == *number).flat_map(|walk| &walk.channels);
+        let muscles: Vec<ModelActivity> = channels.filter_map(|channel| model_activity(gait, channel)).collect();
+        if !muscles.is_empty() {
+            model.push(WalkModel { walk: *number, muscles });
         }
     }
-    model.retain(|walk| !walk.muscles.is_empty());
-    Ok(Some(EmgView { result, model }))
+    EmgView { result, model }
 }
 
 /// The gait of a walk; none without the device, as long as the order is blinded, and where its trajectory was dropped.
@@ -172,14 +196,21 @@ pub struct LimitCycles {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn limit_cycles(db: &mut Connection, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
-    let recordings = lab_recordings::of_session(db, id).await?;
-    let mut found = Vec::new();
+pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
+    let mut db = store.read().await?;
+    let recordings = lab_recordings::of_session(&mut db, id).await?;
+    let mut files: Vec<(u8, LabRecordingId, MotionReading, String)> = Vec::new();
     for recording in newest(&recordings, RecordingKind::Motion) {
-        let (reading, text): (MotionReading, String) = lab_recordings::file(db, recording.id).await?;
-        let cutoff_hz = reading.cutoff_hz;
-        let joints = aside(move || reading.portraits(&text)).await?;
-        found.push(LimitCycles { walk: recording.walk, recording_id: recording.id, cutoff_hz, joints });
+        let (reading, text) = lab_recordings::file(&mut db, recording.id).await?;
+        files.push((recording.walk, recording.id, reading, text));
     }
-    Ok(found)
+    drop(db);
+    let process = move |_: &OnPool| {
+        let cycles = |(walk, recording_id, reading, text): (u8, LabRecordingId, MotionReading, String)| {
+            let joints = reading.portraits(&text)?;
+            Ok(LimitCycles { walk, recording_id, cutoff_hz: reading.cutoff_hz, joints })
+        };
+        files.into_iter().map(cycles).collect()
+    };
+    store.compute(process).await?
 }

@@ -12,7 +12,8 @@ mod session;
 
 pub use answer::{AnswerView, NewAnswer, give as answer, take_back};
 pub use measured::{
-    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
+    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, beside_model, compute, emg, keep_result, known_gait,
+    limit_cycles,
 };
 pub use recording::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, keep};
 pub use session::{

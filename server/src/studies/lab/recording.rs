@@ -1,11 +1,12 @@
 //! What is measured in a walk: brought as a file, read whole or refused with line, column and reason, kept as it was.
 
 use super::session::{checked_walk, still_open};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, PackedRecording, RecordingKind};
 use crate::store::lab_sessions::Act;
-use crate::store::{Connection, LabRecordingId, LabSessionId, Writer};
+use crate::store::{Connection, LabRecordingId, LabSessionId, Store, Writer};
 use crate::studies::recording::Unit;
 use clap::ValueEnum;
 use gait_optimizer::ModelError;
@@ -194,14 +195,14 @@ impl NewEmg {
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub async fn checked(self) -> Result<Checked, Error> {
-        aside(move || {
+    pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
+        let check = move |_: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
             let packed = PackedRecording::new(RecordingKind::Electromyogram, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
-        })
-        .await
+        };
+        store.compute(check).await?
     }
 }
 
@@ -210,22 +211,15 @@ impl NewMotion {
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub async fn checked(self) -> Result<Checked, Error> {
-        aside(move || {
+    pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
+        let check = move |_: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
             let packed = PackedRecording::new(RecordingKind::Motion, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
-        })
-        .await
+        };
+        store.compute(check).await?
     }
-}
-
-/// CPU work on a thread of its own.
-pub(super) async fn aside<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Error> + Send + 'static,
-) -> Result<T, Error> {
-    tokio::task::spawn_blocking(work).await.map_err(|e| Error::Internal(e.to_string()))?
 }
 
 /// A file as it was brought, byte for byte.

@@ -2,6 +2,7 @@
 
 use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
 use super::{AGAIN, BROKER_HEARTBEAT, EXPIRES, Link, unreachable};
+use crate::compute::Pool;
 use crate::store::TrialId;
 use crate::workers::Assignment;
 use crate::workers::dispatch::{Dispatch, DispatchError, News, Receipt};
@@ -11,8 +12,8 @@ use futures_util::StreamExt;
 use futures_util::future::BoxFuture;
 use std::fmt;
 use std::time::Duration;
-use tokio::sync::Mutex;
 use tokio::sync::mpsc::{self, Receiver, Sender};
+use tokio::sync::{Mutex, watch};
 use tokio_util::sync::{CancellationToken, DropGuard};
 
 /// News that wait for the service; more wait in the broker.
@@ -23,40 +24,55 @@ pub struct JetStream {
     link: Link,
     size: usize,
     heard: Mutex<Receiver<News>>,
+    /// Packs jobs.
+    pool: Pool,
+    /// Why nothing is heard of workers; none: it is.
+    listening: watch::Receiver<Option<String>>,
     _ends: DropGuard,
 }
 
 impl JetStream {
-    /// Connects to a broker. At most `size` jobs are out at the same time.
+    /// Hands jobs to a broker, at most `size` at the same time. A broker that is not there yet is waited for.
     ///
     /// # Errors
-    /// [`DispatchError::Unreachable`] when it does not answer or has no JetStream.
+    /// [`DispatchError::Unreachable`] for an address that is none.
     pub async fn connect(url: &str, queue: &str, size: usize, lease: Duration) -> Result<Self, DispatchError> {
         let link = Link::open(url, queue, lease).await?;
-        // Says at start, and not at the first job, that the broker is not what is needed.
-        link.jobs().await?;
-        link.results().await?;
         let (news, heard) = mpsc::channel(WAITING);
         let ends = CancellationToken::new();
+        let (trouble, listening) = watch::channel(None);
         for task in [0, 1] {
-            let (link, news, ends) = (link.clone(), news.clone(), ends.clone());
+            let (link, news, ends, trouble) = (link.clone(), news.clone(), ends.clone(), trouble.clone());
             tokio::spawn(ends.run_until_cancelled_owned(async move {
                 loop {
-                    let ended = if task == 0 { signs(&link, &news).await } else { results(&link, &news).await };
+                    let ended = match task {
+                        0 => signs(&link, &news).await,
+                        _ => results(&link, &news, &trouble).await,
+                    };
                     if let Err(error) = ended {
                         tracing::warn!(%error, "listening to workers; trying again");
+                        if task == 1 {
+                            trouble.send_replace(Some(error.to_string()));
+                        }
                     }
                     tokio::time::sleep(AGAIN).await;
                 }
             }));
         }
-        Ok(Self { link, size: size.max(1), heard: Mutex::new(heard), _ends: ends.drop_guard() })
+        Ok(Self {
+            link,
+            size: size.max(1),
+            heard: Mutex::new(heard),
+            pool: Pool::default(),
+            listening,
+            _ends: ends.drop_guard(),
+        })
     }
 
     async fn publish(&self, assignment: Assignment) -> Result<(), DispatchError> {
         let subject = self.link.job_subject(assignment.attempt);
         let order = Order { program: PROGRAM.to_owned(), assignment };
-        let bytes = tokio::task::spawn_blocking(move || pack(&order)).await.map_err(unreachable)??;
+        let bytes = self.pool.run(move |_| pack(&order)).await.map_err(unreachable)??;
         self.link.fits("a job", &bytes)?;
         let jobs = self.link.jobs().await?;
         match jobs.get_last_raw_message_by_subject(&subject).await {
@@ -87,6 +103,10 @@ impl Dispatch for JetStream {
 
     fn lease(&self) -> Duration {
         self.link.lease
+    }
+
+    fn trouble(&self) -> Option<String> {
+        self.link.trouble().or_else(|| self.listening.borrow().clone())
     }
 
     fn outlives_process(&self) -> bool {
@@ -148,20 +168,27 @@ async fn signs(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
 }
 
 /// Brings results until the broker refuses.
-async fn results(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
+async fn results(
+    link: &Link,
+    news: &Sender<News>,
+    trouble: &watch::Sender<Option<String>>,
+) -> Result<(), DispatchError> {
+    let pool = Pool::default();
     let recorder = link.recorder().await?;
     let messages = recorder.stream().max_messages_per_batch(16).expires(EXPIRES).heartbeat(BROKER_HEARTBEAT);
     let mut messages = messages.messages().await.map_err(unreachable)?;
+    link.jobs().await?;
+    trouble.send_replace(None);
     while let Some(message) = messages.next().await {
         let message = message.map_err(unreachable)?;
-        bring(message, news).await?;
+        bring(message, news, &pool).await?;
     }
     Ok(())
 }
 
-async fn bring(message: jetstream::Message, news: &Sender<News>) -> Result<(), DispatchError> {
+async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) -> Result<(), DispatchError> {
     let (message, acker) = message.split();
-    let read = tokio::task::spawn_blocking(move || unpack::<Brought>(&message.payload)).await.map_err(unreachable)?;
+    let read = pool.run(move |_| unpack::<Brought>(&message.payload)).await.map_err(unreachable)?;
     let brought = match read {
         Ok(brought) => brought,
         Err(error) => {

@@ -15,6 +15,7 @@ pub use worker::Worker;
 
 use super::dispatch::{Attempt, DispatchError};
 use crate::store::TrialId;
+use async_nats::connection::State;
 use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
 use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stream};
 use async_nats::jetstream::{self, Context};
@@ -38,11 +39,12 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Connects; from then on the connection is made again by itself whenever it breaks.
+    /// Connects when the broker is there; the connection is made again by itself whenever it breaks.
     async fn open(url: &str, queue: &str, lease: Duration) -> Result<Self, DispatchError> {
         let client = async_nats::ConnectOptions::new()
             .name(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
             .reconnect_delay_callback(|_| AGAIN)
+            .retry_on_initial_connect()
             .connect(url)
             .await
             .map_err(|error| DispatchError::Unreachable(format!("the NATS broker cannot be reached: {error}")))?;
@@ -121,10 +123,17 @@ impl Link {
         self.lease / ACK_WAITS_PER_LEASE
     }
 
+    /// Why nothing reaches the broker now.
+    fn trouble(&self) -> Option<String> {
+        (self.context.client().connection_state() != State::Connected)
+            .then(|| "the NATS broker cannot be reached".to_owned())
+    }
+
     /// Refuses what the broker would cut the connection for.
     fn fits(&self, what: &'static str, bytes: &[u8]) -> Result<(), DispatchError> {
         // Subject and headers count as well.
-        let limit = self.context.client().server_info().max_payload.saturating_sub(1024);
+        let Some(info) = self.context.client().try_server_info() else { return Err(unreachable("not connected yet")) };
+        let limit = info.max_payload.saturating_sub(1024);
         if bytes.len() > limit {
             return Err(DispatchError::TooLarge { what, bytes: bytes.len(), limit });
         }

@@ -2,6 +2,7 @@
 
 use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
 use super::{AGAIN, Link, unreachable};
+use crate::compute::Pool;
 use crate::store::TrialId;
 use crate::workers::dispatch::{Attempt, Dispatch, DispatchError, Finding, News};
 use crate::workers::{Evaluate, InProcess};
@@ -21,6 +22,10 @@ use tokio_util::task::TaskTracker;
 const PULL: Duration = Duration::from_secs(5);
 /// Results that were not brought when the worker is told to stop have so long to reach the broker.
 const DRAIN: Duration = Duration::from_secs(20);
+/// A result that the broker refuses for so many leases is given up: by then its job is lost or run elsewhere.
+const GIVE_UP_AFTER_LEASES: u32 = 10;
+/// Longest pause before a result is brought again.
+const LONGEST_PAUSE: Duration = Duration::from_secs(15);
 /// Signs of life are not sent more often than this, however fast the iterations are.
 const SIGN_EVERY: Duration = Duration::from_millis(300);
 
@@ -31,6 +36,8 @@ pub struct Worker {
     engine: InProcess,
     slots: Arc<Semaphore>,
     results: TaskTracker,
+    /// Packs results.
+    pool: Pool,
 }
 
 /// A job that was taken from the broker.
@@ -48,10 +55,10 @@ struct Held {
 type Job = (jetstream::Message, OwnedSemaphorePermit);
 
 impl Worker {
-    /// Connects to a broker, to run at most `size` jobs at the same time.
+    /// Runs at most `size` jobs of a broker at the same time. A broker that is not there yet is waited for.
     ///
     /// # Errors
-    /// [`DispatchError::Unreachable`] when it does not answer or has no JetStream.
+    /// [`DispatchError::Unreachable`] for an address that is none.
     pub async fn connect(
         url: &str,
         queue: &str,
@@ -61,9 +68,9 @@ impl Worker {
         evaluate: Arc<dyn Evaluate>,
     ) -> Result<Self, DispatchError> {
         let link = Link::open(url, queue, lease).await?;
-        link.workers().await?;
         let slots = Arc::new(Semaphore::new(size.max(1)));
-        Ok(Self { link, name, engine: InProcess::new(size, evaluate), slots, results: TaskTracker::new() })
+        let engine = InProcess::new(size, evaluate);
+        Ok(Self { link, name, engine, slots, results: TaskTracker::new(), pool: Pool::default() })
     }
 
     /// Works until told to stop; jobs that run then are given back to the broker.
@@ -175,7 +182,14 @@ impl Worker {
                 if held.get(&attempt.trial).is_some_and(|job| job.number == attempt.number)
                     && let Some(job) = held.remove(&attempt.trial)
                 {
-                    self.results.spawn(bring(self.link.clone(), self.name.clone(), attempt, finding, job));
+                    self.results.spawn(bring(
+                        self.link.clone(),
+                        self.pool.clone(),
+                        self.name.clone(),
+                        attempt,
+                        finding,
+                        job,
+                    ));
                 }
             }
         }
@@ -213,11 +227,12 @@ impl Worker {
     }
 }
 
-/// Publishes a result until the broker has it, then says that the job is done.
-async fn bring(link: Link, worker: String, attempt: Attempt, finding: Finding, job: Held) {
+/// Publishes a result, again and again with longer pauses where the broker refuses it, then says that the job is done. A result
+/// that cannot be brought is given up, its slot freed and its job left to others.
+async fn bring(link: Link, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: Held) {
     let Held { acker, permit, .. } = job;
     let brought = Brought { attempt, worker, finding };
-    let bytes = tokio::task::spawn_blocking(move || {
+    let bytes = pool.run(move |_| {
         let fits = |bytes: Vec<u8>| link.fits("a result", &bytes).map(|()| bytes);
         let bytes = pack(&brought)
             .and_then(fits)
@@ -227,9 +242,9 @@ async fn bring(link: Link, worker: String, attempt: Attempt, finding: Finding, j
     let Ok((link, bytes)) = bytes.await else { return };
     match bytes {
         Ok(bytes) => {
-            while let Err(error) = publish(&link, attempt, &bytes).await {
-                tracing::warn!(%error, "a result did not reach the broker; trying again");
-                tokio::time::sleep(AGAIN).await;
+            if let Err(error) = publish_within(&link, attempt, &bytes, link.lease * GIVE_UP_AFTER_LEASES).await {
+                tracing::error!(trial = %attempt.trial, %error, "a result is given up; its job is left to others");
+                return answer(&acker, AckKind::Nak(None)).await;
             }
             if let Err(error) = acker.double_ack().await {
                 tracing::warn!(%error, "the broker does not know that a job is done; it will be run again in vain");
@@ -238,6 +253,22 @@ async fn bring(link: Link, worker: String, attempt: Attempt, finding: Finding, j
         Err(error) => tracing::error!(%error, "a result cannot be written"),
     }
     drop(permit);
+}
+
+/// Publishes a result, tried again with longer and longer pauses until `limit`.
+async fn publish_within(link: &Link, attempt: Attempt, bytes: &[u8], limit: Duration) -> Result<(), DispatchError> {
+    let begun = Instant::now();
+    let mut pause = AGAIN;
+    loop {
+        match publish(link, attempt, bytes).await {
+            Err(error) if begun.elapsed() < limit => {
+                tracing::warn!(trial = %attempt.trial, %error, "a result did not reach the broker; trying again");
+                tokio::time::sleep(pause).await;
+                pause = (pause * 2).min(LONGEST_PAUSE);
+            }
+            done => return done,
+        }
+    }
 }
 
 async fn publish(link: &Link, attempt: Attempt, bytes: &[u8]) -> Result<(), DispatchError> {

@@ -9,6 +9,7 @@ use super::drawn::Drawn;
 use super::error::{Page, PageError, page};
 use super::format::{self, Bound, words};
 use crate::access::{Administer, Caller, Permission, Read, Run};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::gait_charts;
 use crate::http::AppState;
@@ -187,7 +188,7 @@ const SHOWN: u32 = 200;
 /// `GET /studies/{id}`.
 pub(super) async fn get(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
@@ -202,7 +203,8 @@ pub(super) async fn get(
     let device = devices::get(&mut reader, study.plan.device_id).await?;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
     drop(reader);
-    let live = read_live(&app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
+    let live =
+        read_live(&mut app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = may.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
     page(&StudyPage { study, subject, device, reference, live, last_event, variant, answers_by, may_administer })
@@ -211,11 +213,11 @@ pub(super) async fn get(
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
 pub(super) async fn live(
     may: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Params(choice): Params<Choice>,
 ) -> Page {
-    page(&read_live(&app, &may.caller, id, choice).await?)
+    page(&read_live(&mut app, &may.caller, id, choice).await?)
 }
 
 /// How far a running solve is.
@@ -313,7 +315,7 @@ impl Figures {
     }
 }
 
-async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice) -> Result<Live, Error> {
+async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Choice) -> Result<Live, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
@@ -327,12 +329,11 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
     let remarks = remarks::of_study(&mut reader, id).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
-    let (standing, figures) = tokio::task::spawn_blocking(move || {
-        let figures = figures(&standing, large, &beliefs);
+    let draw = move |pool: &OnPool| {
+        let figures = figures(pool, &standing, large, &beliefs);
         (standing, figures)
-    })
-    .await
-    .map_err(|e| Error::Internal(e.to_string()))?;
+    };
+    let (standing, figures) = app.compute(draw).await?;
     let mut figures = figures.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
     figures.judged = recommended::judged(&mut reader, &figures.ranking).await?;
@@ -360,6 +361,7 @@ async fn read_live(app: &AppState, caller: &Caller, id: StudyId, choice: Choice)
 }
 
 pub(super) fn figures(
+    pool: &OnPool,
     standing: &Standing,
     large: bool,
     beliefs: &Beliefs,
@@ -371,12 +373,12 @@ pub(super) fn figures(
         let question = standing.study.state == StudyState::Waiting;
         return Ok(Figures { best, ranking, history, question, ..Figures::default() });
     }
-    let question =
-        standing.study.plan.feedback_mode != FeedbackMode::Automatic && open_question(standing)?.pair().is_some();
+    let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic
+        && open_question(pool, standing)?.trials().is_some();
     if standing.waits_for_first_answer() {
         return Ok(Figures { unanswered: true, question, ..Figures::default() });
     }
-    let ranking = ranking_to_show(standing, beliefs)?;
+    let ranking = ranking_to_show(pool, standing, beliefs)?;
     let best = ranking.first().copied();
     let history = history::of(standing, best);
     Ok(Figures { best, ranking, history, question, ..Figures::default() })
