@@ -329,7 +329,7 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
     assert!(!page.text.contains("name=\"present\""), "{}", page.text);
     let mut writer = service.store.write().await.unwrap();
     let age = "update sessions set created_at = '2026-01-01T00:00:00.000000Z' where ended_at is null";
-    sqlx::query(age).execute(&mut *writer).await.unwrap();
+    sqlx::query(age).execute(&mut **writer).await.unwrap();
     commit(writer).await.unwrap();
     let page = send(&service, &fresh, &Method::GET, "/account", FORM, "").await;
     assert!(page.text.contains("name=\"present\""), "{}", page.text);

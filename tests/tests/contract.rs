@@ -35,7 +35,9 @@ async fn documents_keep_their_shape() {
     let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
 
     // tune --json; the last trial comes first, because it has everything.
-    let best = ranking_to_show(&standing, &Beliefs::default()).unwrap().first().copied();
+    let there = standing.clone();
+    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &there, &Beliefs::default())).await;
+    let best = rank.unwrap().unwrap().first().copied();
     let mut tune = serde_json::to_value(summary::of(&standing, best, Judged::default())).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();
     insta::assert_json_snapshot!("tune", shape(&tune));

@@ -180,7 +180,7 @@ impl Scene {
 
     async fn by_hand(&self, sql: &str) {
         let mut writer = self.service.store.write().await.unwrap();
-        sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut *writer).await.unwrap();
+        sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut **writer).await.unwrap();
         gaitwright::store::commit(writer).await.unwrap();
     }
 
@@ -192,7 +192,7 @@ impl Scene {
             ["feedback", "remarks", "presentations", "presentation_answers", "lab_sessions", "lab_acts", "lab_answers"]
         {
             let sql = sqlx::AssertSqlSafe(format!("select count(*) from {table}"));
-            counts.insert(table, sqlx::query_scalar(sql).fetch_one(&mut *reader).await.unwrap());
+            counts.insert(table, sqlx::query_scalar(sql).fetch_one(&mut **reader).await.unwrap());
         }
         counts
     }
@@ -451,10 +451,10 @@ impl Rated {
                 // Nobody certifies it again before the answer comes.
                 let mut writer = self.service.store.write().await.unwrap();
                 for sql in ["drop trigger certificates_no_delete", "drop trigger gaits_no_delete"] {
-                    let _ = sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut *writer).await;
+                    let _ = sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut **writer).await;
                 }
-                sqlx::query("delete from certificates").execute(&mut *writer).await.unwrap();
-                sqlx::query("delete from gaits").execute(&mut *writer).await.unwrap();
+                sqlx::query("delete from certificates").execute(&mut **writer).await.unwrap();
+                sqlx::query("delete from gaits").execute(&mut **writer).await.unwrap();
                 gaitwright::store::commit(writer).await.unwrap();
             }
             Rule::Withdrawal => {

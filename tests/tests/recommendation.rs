@@ -141,7 +141,8 @@ async fn settled(service: &Service, study: StudyId) -> Value {
 async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
     let study = service.get(study).await;
     let standing = Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    ranking_to_show(&standing, &Beliefs::default()).unwrap()
+    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &standing, &Beliefs::default())).await;
+    rank.unwrap().unwrap()
 }
 
 /// The trials whose gaits the service examined by itself, in order.

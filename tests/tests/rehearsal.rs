@@ -25,7 +25,8 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
         }
         tokio::time::sleep(thinks).await;
         let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
-        let question = service.store.clone().compute(move |pool| open_question(pool, &standing)).await.unwrap();
+        let there = standing.clone();
+        let question = service.store.clone().compute(move |pool| open_question(pool, &there)).await.unwrap();
         let Some((a, b)) = question.unwrap().trials() else { continue };
         let rmse = |id| standing.trial(id).unwrap().gait_rmse_rad.unwrap();
         let answer = json!({"trial_a": a, "trial_b": b, "answer": if rmse(a) < rmse(b) { "a" } else { "b" }});
