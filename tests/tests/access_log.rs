@@ -180,7 +180,7 @@ async fn access_log_is_append_only_and_pruned_by_age_alone() {
     commit(writer).await.unwrap();
     for sql in ["delete from access_log", "update access_log set actor = 'nobody'"] {
         let mut writer = service.store.write().await.unwrap();
-        assert!(sqlx::query(sql).execute(&mut *writer).await.is_err(), "{sql}");
+        assert!(sqlx::query(sql).execute(&mut **writer).await.is_err(), "{sql}");
     }
     let mut writer = service.store.write().await.unwrap();
     assert_eq!(access_log::prune(&mut writer, &Actor::program(), 365, 100).await.unwrap(), 2);
