@@ -71,6 +71,11 @@ pub async fn fill(database: &Path) {
         "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
         "insert into subject_muscles (subject_id, definition, actor, created_at) \
          select id, '{}', 'K', '' from subjects limit 1",
+        "insert into subject_corrections (subject_id, height_m, body_mass_kg, reason, actor, created_at) \
+         select id, 1.8, 70.0, 'r', 'K', '' from subjects limit 1",
+        "insert into access_log (created_at, last_at, times, kind, actor, address, method, route, object, status) \
+         values ('', '', 1, 'view', 'K', '', 'GET', '/', '/', 200)",
+        "insert into access_prunings (up_to, older_than_days, actor, created_at) values (0, 1, 'K', '')",
     ] {
         sqlx::query(sql).execute(&mut **writer).await.unwrap();
     }

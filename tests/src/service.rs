@@ -58,7 +58,7 @@ impl Answer {
     pub async fn of(response: Response<Body>) -> Self {
         let (status, headers) = (response.status(), response.headers().clone());
         let bytes = response.into_body().collect().await.unwrap().to_bytes();
-        Self { status, headers, text: String::from_utf8(bytes.to_vec()).unwrap() }
+        Self { status, headers, text: String::from_utf8_lossy(&bytes).into_owned() }
     }
 
     /// The body as JSON.

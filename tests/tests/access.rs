@@ -67,7 +67,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 66] = [
+const PAGES: [(&str, Option<Right>); 68] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -88,6 +88,7 @@ const PAGES: [(&str, Option<Right>); 66] = [
     ("get /subjects/{id}", Some(Right::Read)),
     ("post /subjects/{id}/consent", Some(Right::Run)),
     ("post /subjects/{id}/withdraw", Some(Right::Run)),
+    ("post /subjects/{id}/correct", Some(Right::Run)),
     ("get /subjects/{id}/muscles", Some(Right::Read)),
     ("post /subjects/{id}/muscles", Some(Right::Run)),
     ("get /devices", Some(Right::Read)),
@@ -122,6 +123,7 @@ const PAGES: [(&str, Option<Right>); 66] = [
     ("get /people", Some(Right::Administer)),
     ("post /people", Some(Right::Administer)),
     ("get /audit", Some(Right::Administer)),
+    ("get /access-log", Some(Right::Administer)),
     ("get /system", Some(Right::Read)),
     ("post /system/backup", Some(Right::Administer)),
     ("get /glossary", None),

@@ -187,6 +187,8 @@ async fn what_is_answered_has_the_properties_that_the_description_names() {
     let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await.json();
     let given = given["id"].as_str().unwrap().to_owned();
     service.post(&format!("/api/v1/preferences/{given}/retract"), &json!({"reason": "r"})).await;
+    let right = json!({"height_m": 1.75, "body_mass_kg": 70, "reason": "measured again"});
+    service.post(&format!("/api/v1/subjects/{}/corrections", service.subject().await), &right).await;
     service.post("/api/v1/users", &json!({"name": "R", "role": "rater"})).await;
     service.post("/api/v1/tokens", &json!({"name": "t", "scopes": ["read"]})).await;
 
@@ -221,6 +223,8 @@ async fn what_is_answered_has_the_properties_that_the_description_names() {
         ("/users", ""),
         ("/tokens", ""),
         ("/audit", ""),
+        ("/access-log", ""),
+        ("/subjects/{id}/corrections", &subject),
         ("/health", ""),
     ] {
         let path = format!("/api/v1{path}");

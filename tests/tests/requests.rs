@@ -3,17 +3,20 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::body::Body;
-use axum::extract::Path;
+use axum::extract::{ConnectInfo, Path};
 use axum::http::{Request, StatusCode, Version, header};
 use axum::middleware::map_request;
 use axum::routing::{get, post};
 use axum::{Json, Router};
-use gaitwright::http::{openapi, router, with_layers};
+use gaitwright::access::Role;
+use gaitwright::http::{Hosts, Proxies, ProxyHeaders, openapi, router, with_layers};
 use gaitwright::store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers;
 use gaitwright_tests::service::{Answer, Service, for_localhost};
 use http_body_util::BodyExt;
 use serde_json::{Value, json};
+use std::net::SocketAddr;
 use std::time::Duration;
 use tempfile::TempDir;
 use tower::ServiceExt;
@@ -228,5 +231,74 @@ async fn a_request_without_exactly_one_host_is_refused() {
     assert_eq!(status(&["evil.example"], old, path).await, 403);
     assert_eq!(status(&["localhost"], new, "http://evil.example/health").await, 400);
     assert_eq!(status(&["localhost"], new, "http://localhost/health").await, 200);
+    service.stop().await;
+}
+
+/// A service that believes a proxy on this machine and answers to one name.
+async fn behind_a_proxy() -> (TempDir, Service, Router) {
+    let (folder, service) = callers::service().await;
+    let mut state = service.state();
+    state.hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &["gait.example".to_owned()]);
+    state.proxies = Proxies::new(&["127.0.0.1".parse().unwrap()], ProxyHeaders::XForwarded);
+    (folder, service, router(state))
+}
+
+/// A request from an address.
+fn from(peer: &str, method: &str, path: &str, headers: &[(&str, &str)]) -> Request<Body> {
+    let mut request = Request::builder().method(method).uri(path);
+    for (name, value) in headers {
+        request = request.header(*name, *value);
+    }
+    let peer: SocketAddr = peer.parse().unwrap();
+    request.extension(ConnectInfo(peer)).body(Body::empty()).unwrap()
+}
+
+const PROXY: &str = "127.0.0.1:50000";
+const STRANGER: &str = "192.0.2.7:50000";
+
+#[tokio::test]
+async fn cookies_and_origins_follow_what_a_trusted_proxy_says() {
+    let (_folder, service, router) = behind_a_proxy().await;
+    let (_, link) = callers::user(&service, "Ada", Role::Admin).await;
+    let send = async |request: Request<Body>| Answer::of(router.clone().oneshot(request).await.unwrap()).await;
+    let forwarded = [
+        ("host", "127.0.0.1:8080"),
+        ("x-forwarded-for", "192.0.2.9"),
+        ("x-forwarded-proto", "https"),
+        ("x-forwarded-host", "gait.example"),
+    ];
+    let with = |more: &[(&'static str, &'static str)]| [&forwarded[..], more].concat();
+    let path = format!("/sign-in/{link}");
+    let signed_in = send(from(PROXY, "POST", &path, &with(&[("origin", "https://gait.example")]))).await;
+    assert_eq!(signed_in.status, StatusCode::SEE_OTHER, "{}", signed_in.text);
+    assert!(signed_in.headers["set-cookie"].to_str().unwrap().ends_with("; Secure"), "{:?}", signed_in.headers);
+    assert!(signed_in.headers.contains_key("strict-transport-security"));
+    // The browser is at the forwarded origin: that of the proxy's own connection is another one.
+    for (origin, allowed) in [
+        ("https://gait.example", true),
+        ("http://gait.example", false),
+        ("http://127.0.0.1:8080", false),
+        ("https://evil.example", false),
+    ] {
+        let answer = send(from(PROXY, "POST", "/sign-out", &with(&[("origin", origin)]))).await;
+        assert_eq!(answer.status != StatusCode::FORBIDDEN, allowed, "{origin}");
+    }
+    let plain = send(from(PROXY, "GET", "/health", &[("host", "localhost")])).await;
+    assert!(plain.status.is_success() && !plain.headers.contains_key("strict-transport-security"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn forwarded_headers_of_strangers_change_nothing() {
+    let (_folder, service, router) = behind_a_proxy().await;
+    let send = async |request: Request<Body>| Answer::of(router.clone().oneshot(request).await.unwrap()).await;
+    let lie = [("host", "gait.example"), ("x-forwarded-proto", "https"), ("x-forwarded-for", "127.0.0.1")];
+    let answer = send(from(STRANGER, "GET", "/health", &lie)).await;
+    assert!(answer.status.is_success() && !answer.headers.contains_key("strict-transport-security"));
+    let host = [("host", "evil.example"), ("x-forwarded-host", "gait.example")];
+    assert_eq!(send(from(STRANGER, "GET", "/health", &host)).await.status, StatusCode::FORBIDDEN);
+    assert_eq!(send(from(PROXY, "GET", "/health", &host)).await.status, StatusCode::OK);
+    let garbled = [("host", "gait.example"), ("x-forwarded-for", "somebody")];
+    is_complete_problem(&send(from(PROXY, "GET", "/health", &garbled)).await, 400, "/problems/malformed");
     service.stop().await;
 }

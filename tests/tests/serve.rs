@@ -23,13 +23,13 @@ struct Process {
 
 impl Process {
     fn start(folder: &Path, arguments: &[&str], ready: &str) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--workers", "1"])
-            .args(arguments)
-            .current_dir(folder)
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"));
+        command.args(["serve", "--listen", "127.0.0.1:0", "--workers", "1"]).args(arguments).current_dir(folder);
+        Self::watch(command, ready)
+    }
+
+    fn watch(mut command: Command, ready: &str) -> Self {
+        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
         let mut said = Vec::new();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
         while !said.last().is_some_and(|line: &String| line.contains(ready)) {
@@ -160,4 +160,35 @@ fn it_speaks_https_with_a_certificate_from_files() {
     assert!(text.contains("\"status\":\"ready\""), "{text} {}", String::from_utf8_lossy(&answer.stderr));
     assert!(text.contains("strict-transport-security"), "{text}");
     assert!(get(process.address(), "/health").is_err(), "plain HTTP is not answered");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn silent_connections_above_the_descriptor_limit_leave_health_answering() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = format!(
+        "ulimit -n 1024; exec {} serve --no-sign-in --workers 1 --listen 127.0.0.1:0",
+        env!("CARGO_BIN_EXE_gaitwright-cli")
+    );
+    // Of one address, and with so high a limit for one that the total bites.
+    for limit in ["100", "60000"] {
+        let mut command = Command::new("bash");
+        command.args(["-c", &service]).env("GAITWRIGHT_CONNECTIONS_PER_ADDRESS", limit).current_dir(folder.path());
+        let process = Process::watch(command, "listening on ");
+        let silent: Vec<TcpStream> = (0..1500).filter_map(|_| TcpStream::connect(process.address()).ok()).collect();
+        assert_eq!(silent.len(), 1500);
+        std::thread::sleep(Duration::from_millis(400));
+        for call in 0..8 {
+            let begun = std::time::Instant::now();
+            let answer = get(process.address(), "/health").unwrap();
+            assert_eq!(answer.status, 200, "call {call}");
+            assert!(begun.elapsed() < Duration::from_secs(2), "call {call} took {:?}", begun.elapsed());
+        }
+        let open = std::fs::read_dir(format!("/proc/{}/fd", process.child.id())).unwrap().count();
+        assert!(open < if limit == "100" { 200 } else { 1000 }, "{open} descriptors");
+        drop(silent);
+        let said = process.end().join("\n");
+        assert!(said.contains("too many connections"), "{said}");
+        assert!(!said.contains('\u{1b}'), "colour codes in a file: {said}");
+    }
 }

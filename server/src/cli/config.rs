@@ -3,6 +3,8 @@
 use super::numbers::workers;
 use super::output::data;
 use crate::error::Error;
+use crate::http::connections::Limits;
+use crate::http::{NETWORKS, Network, Proxies, ProxyHeaders};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -14,7 +16,7 @@ use tracing_subscriber::EnvFilter;
 const DEFAULT_FILE: &str = "gaitwright.toml";
 
 /// What can be set: name in the file, default, meaning. Flag and environment follow from the name.
-const KNOWN: [(&str, &str, &str); 12] = [
+const KNOWN: &[(&str, &str, &str)] = &[
     ("listen", "127.0.0.1:8080", "where to listen"),
     ("database", "gaitwright.db", "the SQLite file"),
     (
@@ -29,6 +31,19 @@ const KNOWN: [(&str, &str, &str); 12] = [
     ("idle_minutes", "60", "a session without a sign of life for so long ends"),
     ("tls_certificate", "", "PEM file with the certificate chain; with tls_key, the service speaks HTTPS"),
     ("tls_key", "", "PEM file with the private key"),
+    (
+        "trusted_proxies",
+        "",
+        "addresses and networks of reverse proxies that are believed about client, scheme and host; commas between",
+    ),
+    (
+        "proxy_headers",
+        "x-forwarded",
+        "what these proxies write: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
+    ),
+    ("connections", "1000", "most connections at the same time, as far as there are descriptors"),
+    ("connections_per_address", "100", "most connections of one address; trusted proxies have no such limit"),
+    ("access_log_days", "0", "rows of the access log that are older are dropped; 0: all are kept"),
     ("log", "warn,gaitwright=info", "what is logged, as RUST_LOG"),
     ("log_format", "text", "text or json"),
 ];
@@ -63,6 +78,12 @@ pub(super) struct Flags {
     /// A session without a sign of life for so long ends; default 60.
     #[arg(long, value_name = "MINUTES")]
     idle_minutes: Option<String>,
+    /// Address or network of a reverse proxy that is believed about client, scheme and host; may be given several times.
+    #[arg(long, value_delimiter = ',', value_name = "ADDRESS[/BITS]")]
+    trusted_proxy: Vec<String>,
+    /// What trusted proxies write: x-forwarded (default) or forwarded.
+    #[arg(long, value_name = "KIND")]
+    proxy_headers: Option<String>,
     /// PEM file with the certificate chain; with --tls-key, the service speaks HTTPS.
     #[arg(long, value_name = "FILE")]
     tls_certificate: Option<String>,
@@ -111,7 +132,7 @@ impl Settings {
         };
         let file = parse(&path, file.as_deref().unwrap_or(""))?;
         let mut found = BTreeMap::new();
-        for (name, default, _) in KNOWN {
+        for &(name, default, _) in KNOWN {
             let variable = format!("GAITWRIGHT_{}", name.to_uppercase());
             let value = if let Some(value) = flags.get(name) {
                 (value, Origin::Flag)
@@ -184,6 +205,35 @@ impl Settings {
         }
     }
 
+    /// The reverse proxies that are believed.
+    pub(super) fn proxies(&self) -> Result<Proxies, Error> {
+        let names = self.text("trusted_proxies").split(',').map(str::trim).filter(|name| !name.is_empty());
+        let trusted: Result<Vec<Network>, _> = names.map(str::parse).collect();
+        let headers = match self.text("proxy_headers") {
+            "x-forwarded" => ProxyHeaders::XForwarded,
+            "forwarded" => ProxyHeaders::Forwarded,
+            _ => return Err(self.refused("proxy_headers", "x-forwarded, forwarded")),
+        };
+        Ok(Proxies::new(&trusted.map_err(|_| self.refused("trusted_proxies", NETWORKS))?, headers))
+    }
+
+    /// Rows of the access log that are older are dropped; `None`: all are kept.
+    pub(super) fn access_log_days(&self) -> Result<Option<u32>, Error> {
+        let allowed = "0 to 36500";
+        let days: u32 = self.parsed("access_log_days", allowed)?;
+        if days <= 36_500 { Ok((days > 0).then_some(days)) } else { Err(self.refused("access_log_days", allowed)) }
+    }
+
+    /// How many connections are held.
+    pub(super) fn connections(&self) -> Result<Limits, Error> {
+        let number = |name: &str| {
+            let allowed = "1 to 60000";
+            let number = self.parsed(name, allowed)?;
+            if (1..=60_000).contains(&number) { Ok(number) } else { Err(self.refused(name, allowed)) }
+        };
+        Ok(Limits { total: number("connections")?, per_address: number("connections_per_address")? })
+    }
+
     /// Certificate and key, both or neither.
     pub(super) fn tls(&self) -> Result<Option<(PathBuf, PathBuf)>, Error> {
         match (self.text("tls_certificate"), self.text("tls_key")) {
@@ -217,6 +267,8 @@ impl Flags {
             "nats_queue" => self.nats_queue.clone(),
             "sign_in" => self.no_sign_in.then(|| "false".to_owned()),
             "idle_minutes" => self.idle_minutes.clone(),
+            "trusted_proxies" => Some(self.trusted_proxy.join(",")).filter(|proxies| !proxies.is_empty()),
+            "proxy_headers" => self.proxy_headers.clone(),
             "tls_certificate" => self.tls_certificate.clone(),
             "tls_key" => self.tls_key.clone(),
             _ => None,
@@ -266,7 +318,7 @@ fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>, Error> {
     let mut values = BTreeMap::new();
     for (name, value) in table {
         if !KNOWN.iter().any(|(known, ..)| *known == name) {
-            let known = KNOWN.map(|(known, ..)| known).join(", ");
+            let known = KNOWN.iter().map(|(known, ..)| *known).collect::<Vec<_>>().join(", ");
             return Err(malformed(format!("{name} is not a setting; known: {known}")));
         }
         let value = match value {
@@ -301,7 +353,7 @@ impl Config {
     pub(super) fn run(self) -> Result<(), Error> {
         let ConfigCommand::Show { flags } = self.what;
         let settings = Settings::read(&flags)?;
-        for (name, _, meaning) in KNOWN {
+        for &(name, _, meaning) in KNOWN {
             let origin = settings.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
             let value = without_password(settings.text(name));
             data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;

@@ -2,7 +2,9 @@
 
 use super::output::{data, tell};
 use crate::error::Error;
-use crate::store::{Connection, StoreError, audit, backup, restore, seals};
+use crate::store::access_log::{Access, Kind};
+use crate::store::audit::Actor;
+use crate::store::{Connection, StoreError, access_spool, audit, backup, restore, seals};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -71,6 +73,7 @@ impl Backup {
             return Err(Error::conflict(format!("{} exists; choose a new file", self.to.display())));
         }
         backup::of_file(&self.database, &self.to).await?;
+        note_export(&self.database, "backup", "the whole record", Vec::new());
         tell("copied and checked");
         data(&self.to.display().to_string())
     }
@@ -93,6 +96,24 @@ impl Restore {
         }
         tell(&format!("restored {}", self.database.display()));
         Ok(())
+    }
+}
+
+/// Notes for the access log that data of subjects leaves the record. Where nothing can be written beside the record, as on a
+/// read-only medium, a warning stays.
+pub(super) fn note_export(database: &Path, command: &str, object: &str, named: Vec<String>) {
+    let access = Access {
+        kind: Kind::Export,
+        actor: Actor::terminal().as_str().to_owned(),
+        address: String::new(),
+        method: String::new(),
+        route: format!("gaitwright {command}"),
+        object: object.to_owned(),
+        status: 0,
+        named,
+    };
+    if let Err(error) = access_spool::note(database, &access) {
+        tell(&format!("gaitwright: the access log does not hear of this {command}: {error}"));
     }
 }
 

@@ -4,6 +4,8 @@ use super::config::{Flags, Settings};
 use super::output::tell;
 use crate::access::people;
 use crate::error::Error;
+use crate::http::access_log::keep_pruning;
+use crate::http::connections::{LimitedListener, Peer};
 use crate::http::{Access, AppState, Hosts, router};
 use crate::store::audit::Actor;
 use crate::store::{Store, commit};
@@ -11,8 +13,8 @@ use crate::studies::catalogue;
 use crate::studies::director::Director;
 use crate::workers::nats::JetStream;
 use crate::workers::{AfterSolves, Dispatch, GaitSolver, InProcess, LEASE};
-use axum_server::Handle;
-use axum_server::tls_rustls::RustlsConfig;
+use axum_server::tls_rustls::{RustlsAcceptor, RustlsConfig};
+use axum_server::{Handle, Server};
 use clap::Args;
 use hyper_util::rt::{TokioExecutor, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
@@ -48,15 +50,9 @@ impl Serve {
             return Err(settings.refused("listen", allowed));
         }
         let local = listen.ip().is_loopback();
-        let nobody_administers = || {
-            let allowed = "a loopback address until there is an administrator with a password: start on 127.0.0.1, open \
-                           the sign-in link, set a password under Account";
-            settings.refused("listen", allowed)
-        };
         let (workers, idle_seconds, database) = (settings.workers()?, settings.idle_seconds()?, settings.database());
-        if !local && !database.exists() {
-            return Err(nobody_administers());
-        }
+        let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
+        let access_log_days = settings.access_log_days()?;
         // What can be refused is refused before a file is made.
         let tls = match tls {
             Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
@@ -70,13 +66,11 @@ impl Serve {
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         commit(writer).await?;
-        if !local && !people::has_admin(&mut *store.read().await?).await? {
-            return Err(nobody_administers());
-        }
         let mut access = if sign_in { Access::by_sign_in(idle_seconds) } else { Access::without_sign_in() };
         access.secure = tls.is_some();
 
-        let origin = format!("{}://{address}", if access.secure { "https" } else { "http" });
+        let scheme = if access.secure { "https" } else { "http" };
+        let origin = format!("{scheme}://{address}");
         let link = if sign_in { self.link(&store).await? } else { None };
 
         let size = cores_or(workers);
@@ -86,18 +80,33 @@ impl Serve {
         };
         let director = Director::new(store.clone(), engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
-        let app = router(AppState::new(director.clone(), Arc::new(access), hosts));
+        let access = Arc::new(access);
+        // What commands exported while no service ran.
+        access.log.write(&store, true).await?;
+        let pruning = access_log_days.map(|days| tokio::spawn(keep_pruning(store.clone(), days)));
+        let mut state = AppState::new(director.clone(), Arc::clone(&access), hosts);
+        state.proxies = proxies.clone();
+        let app = router(state);
         let work = tokio::spawn({
             let director = director.clone();
             async move { Box::pin(director.run()).await }
         });
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
+        if !local && scheme == "http" && !proxies.are_any() {
+            tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");
+        }
         if let Some(secret) = link {
-            tell(&format!("sign in (once, within a day): {origin}/sign-in/{secret}"));
+            // All addresses are none that a browser can open.
+            let here = if address.ip().is_unspecified() {
+                format!("localhost:{}", address.port())
+            } else {
+                address.to_string()
+            };
+            tell(&format!("sign in (once, within a day): {scheme}://{here}/sign-in/{secret}"));
         }
 
         // Streams end when the director stops, so that the drain is not held up by them.
-        let handle = Handle::<SocketAddr>::new();
+        let handle = Handle::<Peer>::new();
         tokio::spawn({
             let (director, handle, interrupted) = (director.clone(), handle.clone(), interrupted());
             async move {
@@ -107,19 +116,19 @@ impl Serve {
             }
         });
         let service = app.into_make_service_with_connect_info::<SocketAddr>();
-        let served = if let Some(config) = tls {
-            let server = axum_server::from_tcp_rustls(listener, config).map_err(cannot_listen)?;
-            let mut server = server.handle(handle).http1_only();
-            cut_off_silence(server.http_builder());
-            server.serve(service).await
-        } else {
-            let server = axum_server::from_tcp(listener).map_err(cannot_listen)?;
-            let mut server = server.handle(handle).http1_only();
-            cut_off_silence(server.http_builder());
-            server.serve(service).await
+        let listener = LimitedListener::new(listener, limits, proxies).map_err(cannot_listen)?;
+        let mut server = Server::<Peer>::from_listener(listener).handle(handle);
+        cut_off_silence(server.http_builder());
+        let served = match tls {
+            Some(config) => server.acceptor(RustlsAcceptor::new(config)).http1_only().serve(service).await,
+            None => server.http1_only().serve(service).await,
         };
         director.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
+        if let Some(pruning) = pruning {
+            pruning.abort();
+        }
+        access.log.write(&store, true).await?;
         store.close().await;
         served.map_err(|e| Error::Internal(e.to_string()))
     }

@@ -1,7 +1,7 @@
 //! `gaitwright export` and `gaitwright import`: a whole study as one file. `gaitwright prune`: retention.
 
 use super::output::data;
-use super::record::exists;
+use super::record::{exists, note_export};
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::archive::Archive;
@@ -36,6 +36,7 @@ impl Export {
         };
         pool.close().await;
         let bytes = packed?;
+        note_export(&self.database, "export", &format!("study {}", self.study), vec![self.study.to_string()]);
         let cannot = |e: std::io::Error| Error::Malformed(format!("cannot write {}: {e}", self.to.display()));
         let mut file = std::fs::File::create_new(&self.to).map_err(cannot)?;
         std::io::Write::write_all(&mut file, &bytes).and_then(|()| file.sync_all()).map_err(cannot)?;

@@ -4,13 +4,12 @@ use super::identify::AnsweredTo;
 use super::pages::error::{is_for_programs, shown};
 use super::problem::Problem;
 use super::problem_kinds::Kind;
-use axum::extract::Request;
+use axum::extract::{MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::any::Any;
 use tracing::Instrument;
-use tracing::field::Empty;
 use uuid::Uuid;
 
 static REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -19,21 +18,21 @@ static REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// be it a time-out or a panic, is answered with a problem document.
 pub(super) async fn complete(request: Request, next: Next) -> Response {
     let id = Uuid::now_v7().simple().to_string();
-    // The route is recorded once it is known; an address may hold a secret.
-    let span = tracing::error_span!("request", %id, method = %request.method(), route = Empty);
+    let span = span_of(&request, &id);
     let for_programs = is_for_programs(request.uri().path());
-    let answer = async {
-        let answer = next.run(request).await;
-        if answer.status().is_server_error() && answer.extensions().get::<Problem>().is_none() {
-            tracing::error!(status = answer.status().as_u16(), "a request was given up");
-        }
-        answer
-    };
-    let mut answer = with_problem(answer.instrument(span).await, &id, for_programs);
+    let mut answer = with_problem(next.run(request).instrument(span).await, &id, for_programs);
     if let Ok(id) = HeaderValue::from_str(&id) {
         answer.headers_mut().insert(REQUEST_ID.clone(), id);
     }
     answer
+}
+
+/// What log lines say of their request: its route and not its address, which holds the secret of a sign-in link or the
+/// token of a blind pair.
+fn span_of(request: &Request, id: &str) -> tracing::Span {
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str);
+    // Of the level of errors, so that no filter takes the identifier away from a line that it lets through.
+    tracing::error_span!("request", id, method = %request.method(), route)
 }
 
 /// The answer; where it is a refusal or failure, with a problem document that has the identifier of the request.

@@ -49,7 +49,6 @@ impl Requests {
 pub(super) async fn count(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
     let method = named(request.method()).to_owned();
-    tracing::Span::current().record("route", route.as_str());
     let begun = Instant::now();
     let answer = next.run(request).await;
     app.requests.add(method, route, answer.status(), begun.elapsed().as_secs_f64());

@@ -1,10 +1,13 @@
 //! The HTTP face: REST under `/api/v1`, pages for people, static files.
 
+pub mod access_log;
 mod answers;
 pub mod api;
 mod blind_motion;
 mod client_address;
+pub mod connections;
 mod extract;
+mod forwarded;
 mod host;
 mod identify;
 mod may;
@@ -25,6 +28,7 @@ mod state;
 mod static_files;
 
 pub use client_address::ClientAddress;
+pub use forwarded::{NETWORKS, Network, Proxies, ProxyHeaders};
 pub use host::Hosts;
 pub use router::{router, with_layers};
 pub use state::{Access, AppState};

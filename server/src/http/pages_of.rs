@@ -44,7 +44,8 @@ impl<K> After<K> {
     }
 }
 
-fn checked(limit: Option<&str>, most: u32) -> Result<u32, Error> {
+/// How many rows, by default as many as are allowed.
+pub(crate) fn checked(limit: Option<&str>, most: u32) -> Result<u32, Error> {
     let Some(text) = limit else { return Ok(most) };
     let refused = || Error::invalid("limit", text, &format!("1 to {most}"));
     text.parse().ok().filter(|limit| (1..=most).contains(limit)).ok_or_else(refused)
@@ -58,6 +59,19 @@ pub(crate) fn linked<T: Serialize>(path: &str, rows: Vec<T>, limit: u32, key: im
 /// The same for the page `after` the last one.
 pub(crate) fn linked_after<T: Serialize>(path: &str, rows: Vec<T>, limit: u32, key: impl Fn(&T) -> String) -> Response {
     page(path, "after", rows, limit, key)
+}
+
+/// The same as [`linked`], and the next page is chosen by the same parameters.
+pub(crate) fn linked_with<T: Serialize>(
+    path: &str,
+    chosen: &[(&str, &str)],
+    rows: Vec<T>,
+    limit: u32,
+    key: impl Fn(&T) -> String,
+) -> Response {
+    let chosen = serde_urlencoded::to_string(chosen).unwrap_or_default();
+    let parameter = if chosen.is_empty() { "before".to_owned() } else { format!("{chosen}&before") };
+    page(path, &parameter, rows, limit, key)
 }
 
 fn page<T: Serialize>(

@@ -1,17 +1,16 @@
 //! The table of contents of the HTTP face.
 
 use super::{
-    AppState, BODY_LIMIT_BYTES, answers, api, client_address, host, identify, metrics, openapi, pages, same_origin,
-    static_files,
+    AppState, BODY_LIMIT_BYTES, access_log, answers, api, client_address, host, identify, metrics, openapi, pages,
+    same_origin, static_files,
 };
 use crate::error::Error;
 use axum::Router;
-use axum::extract::{DefaultBodyLimit, MatchedPath, Request};
+use axum::extract::{DefaultBodyLimit, Request};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use tower::util::option_layer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
@@ -41,18 +40,21 @@ pub fn router(state: AppState) -> Router {
 /// Routes within everything that holds for all of them: who calls, which names and origins are answered, time-outs,
 /// problem documents, security headers.
 pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
-    let secure = state.access.secure;
     let header = |name: HeaderName, value: &'static str| {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
     };
     routes
+        .layer(middleware::from_fn(access_log::say_caller))
         .layer(middleware::from_fn_with_state(state.clone(), identify::identify))
+        .layer(middleware::from_fn_with_state(state.clone(), access_log::note))
         .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
         .layer(middleware::from_fn_with_state(state.hosts.clone(), host::check))
         .layer(TimeoutLayer::with_status_code(StatusCode::SERVICE_UNAVAILABLE, state.slowest_answer))
         .layer(DefaultBodyLimit::max(BODY_LIMIT_BYTES))
         .layer(CatchPanicLayer::custom(answers::after_panic))
+        .layer(TraceLayer::new_for_http().make_span_with(|_: &Request| tracing::Span::current()))
+        .layer(middleware::from_fn_with_state(state.clone(), client_address::note))
         .layer(middleware::from_fn(answers::complete))
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))
         .layer(header(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
@@ -62,17 +64,7 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         .layer(header(HeaderName::from_static("cross-origin-opener-policy"), "same-origin"))
         .layer(header(HeaderName::from_static("cross-origin-resource-policy"), "same-origin"))
         .layer(header(HeaderName::from_static("permissions-policy"), "camera=(), geolocation=(), microphone=()"))
-        .layer(option_layer(secure.then(|| header(header::STRICT_TRANSPORT_SECURITY, "max-age=31536000"))))
-        .layer(middleware::from_fn(client_address::note))
-        .layer(TraceLayer::new_for_http().make_span_with(span_of))
         .with_state(state)
-}
-
-/// What log lines say of their request: its route and not its address, which holds the secret of a sign-in link or the
-/// token of a blind pair.
-fn span_of(request: &Request) -> tracing::Span {
-    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str);
-    tracing::info_span!("request", method = %request.method(), route)
 }
 
 /// `GET /api/openapi.json`.

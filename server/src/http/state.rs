@@ -1,5 +1,7 @@
 //! What every handler can reach.
 
+use super::access_log::AccessLog;
+use super::forwarded::Proxies;
 use super::host::Hosts;
 use super::metrics::Requests;
 use crate::access::BackOff;
@@ -23,6 +25,8 @@ pub struct AppState {
     pub beliefs: Arc<Beliefs>,
     /// The names that the service answers to.
     pub hosts: Hosts,
+    /// The reverse proxies that are believed.
+    pub proxies: Proxies,
     /// An answer that takes longer is given up; streams have begun by then.
     pub slowest_answer: Duration,
     /// The record, with the pool for what requests compute.
@@ -39,6 +43,8 @@ pub struct Access {
     pub open: bool,
     /// A session without a sign of life for so long has ended.
     pub idle_seconds: f64,
+    /// Who saw what, before it is written.
+    pub log: AccessLog,
     /// Browsers reach the service through TLS.
     pub secure: bool,
     /// Failed attempts.
@@ -48,7 +54,7 @@ pub struct Access {
 impl Access {
     /// Everybody signs in.
     pub fn by_sign_in(idle_seconds: f64) -> Self {
-        Self { open: false, idle_seconds, secure: false, back_off: BackOff::default() }
+        Self { open: false, idle_seconds, secure: false, log: AccessLog::default(), back_off: BackOff::default() }
     }
 
     /// Nobody signs in: for one person on one machine.
@@ -62,7 +68,8 @@ impl AppState {
     pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
         let beliefs = Arc::clone(director.beliefs());
         let store = director.store().with_own_pool();
-        Self { director, access, requests: Arc::default(), beliefs, hosts, slowest_answer: SLOWEST_ANSWER, store }
+        let (requests, proxies) = (Arc::default(), Proxies::default());
+        Self { director, access, requests, beliefs, hosts, proxies, slowest_answer: SLOWEST_ANSWER, store }
     }
 
     /// The record.

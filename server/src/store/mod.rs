@@ -4,6 +4,8 @@
 //! writes go through one connection, one after the other, so that no writer ever meets `SQLITE_BUSY`.
 //! A transaction never spans CPU or network work.
 
+pub mod access_log;
+pub mod access_spool;
 pub mod archive;
 pub mod audit;
 pub mod backup;

@@ -2,6 +2,15 @@
 
 use utoipa::ToSchema;
 
+/// Height and mass of a subject.
+#[derive(Debug, ToSchema)]
+pub struct Body {
+    /// Body height, m.
+    pub height_m: f64,
+    /// Body mass, kg.
+    pub body_mass_kg: f64,
+}
+
 /// The tuned bounds of one action.
 #[derive(Debug, ToSchema)]
 pub struct Bounds {

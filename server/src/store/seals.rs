@@ -29,10 +29,11 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 32] = [
+pub const TABLES: [Sealed; 35] = [
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
+    sealed("subject_corrections", &["seq"]),
     sealed("devices", &["id"]),
     sealed("reference_gaits", &["id"]),
     sealed("studies", &["id"]),
@@ -62,6 +63,8 @@ pub const TABLES: [Sealed; 32] = [
     sealed("study_members", &["id"]),
     sealed("study_member_ends", &["member_id"]),
     sealed("study_restrictions", &["seq"]),
+    sealed("access_log", &["seq"]),
+    sealed("access_prunings", &["seq"]),
 ];
 
 /// Tables whose rows come and go with the work, or only repeat what others say.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::access::Reach;
 use gait_learner::{LearnerSettings, SearchSpace};
-use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sqlx::Row;
@@ -131,6 +131,9 @@ pub struct StudyPlan {
     pub name: String,
     /// Who walks.
     pub subject_id: SubjectId,
+    /// Height and mass that it solves with, also after a correction; none: those that were entered first.
+    #[schema(value_type = Option<schema::Body>)]
+    pub body: Option<Body>,
     /// With which device.
     pub device_id: DeviceId,
     /// What Gait RMSE is measured against.
@@ -174,7 +177,13 @@ impl StudyPlan {
     /// Whether a study of the other plan would try the same: same person, problem, learner and draws. Name, priority
     /// and how many trials run at the same time do not matter.
     pub fn tries_the_same_as(&self, other: &Self) -> bool {
-        let own = |plan: &Self| Self { name: String::new(), priority: 0, parallel_trials: 1, ..plan.clone() };
+        // Studies from before there were corrections do not say what they solve with: it is what was entered.
+        let bodies_differ = self.body.is_some() && other.body.is_some() && self.body != other.body;
+        if bodies_differ {
+            return false;
+        }
+        let own =
+            |plan: &Self| Self { name: String::new(), body: None, priority: 0, parallel_trials: 1, ..plan.clone() };
         own(self) == own(other)
     }
 }
@@ -226,8 +235,8 @@ pub async fn insert(
     sqlx::query(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
-         seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at) \
-         values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at, \
+         height_m, body_mass_kg) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(&plan.name)
@@ -252,6 +261,8 @@ pub async fn insert(
     .bind(forked_from)
     .bind(at)
     .bind(at)
+    .bind(plan.body.map(|body| body.height_m))
+    .bind(plan.body.map(|body| body.body_mass_kg))
     .execute(db)
     .await?;
     Ok(Study {
@@ -446,12 +457,18 @@ pub async fn set_state(db: &mut Connection, study: &Study, state: StudyState, re
     Ok(done.rows_affected() == 1)
 }
 
+fn body_of(row: &SqliteRow) -> StoreResult<Option<Body>> {
+    let (height, mass): (Option<f64>, Option<f64>) = (row.try_get("height_m")?, row.try_get("body_mass_kg")?);
+    Ok(height.zip(mass).map(|(height_m, body_mass_kg)| Body { height_m, body_mass_kg }))
+}
+
 fn from_row(row: &SqliteRow) -> StoreResult<Study> {
     Ok(Study {
         id: row.try_get("id")?,
         plan: StudyPlan {
             name: row.try_get("name")?,
             subject_id: row.try_get("subject_id")?,
+            body: body_of(row)?,
             device_id: row.try_get("device_id")?,
             reference_gait_id: row.try_get("reference_gait_id")?,
             muscles: row.try_get("muscles")?,

@@ -33,6 +33,35 @@ impl Subject {
     }
 }
 
+/// A row as it stands: the newest correction in place of what was entered first.
+macro_rules! select {
+    ($rest:literal) => {
+        concat!(
+            "select s.id, s.pseudonym, s.notes, s.created_at, coalesce(c.height_m, s.height_m) as height_m, ",
+            "coalesce(c.body_mass_kg, s.body_mass_kg) as body_mass_kg from subjects s left join subject_corrections c ",
+            "on c.seq = (select max(seq) from subject_corrections where subject_id = s.id) ",
+            $rest
+        )
+    };
+}
+
+/// A correction of height and mass.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Correction {
+    /// Order.
+    pub seq: i64,
+    /// Body height from then on, m.
+    pub height_m: f64,
+    /// Body mass from then on, kg.
+    pub body_mass_kg: f64,
+    /// Why.
+    pub reason: String,
+    /// By whom.
+    pub actor: String,
+    /// When.
+    pub created_at: Instant,
+}
+
 /// The unique pseudonym, as SQLite names it in a violation.
 pub const PSEUDONYM_UNIQUE: &str = "subjects.pseudonym";
 
@@ -68,7 +97,7 @@ pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &st
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
 pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
-    let row = sqlx::query("select * from subjects where id = ?").bind(id).fetch_optional(db).await?;
+    let row = sqlx::query(select!("where s.id = ?")).bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "subject", id: id.to_string() })
 }
 
@@ -77,7 +106,7 @@ pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
 /// # Errors
 /// What the database reports.
 pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<Option<Subject>> {
-    let row = sqlx::query("select * from subjects where pseudonym = ?").bind(pseudonym).fetch_optional(db).await?;
+    let row = sqlx::query(select!("where s.pseudonym = ?")).bind(pseudonym).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
 }
 
@@ -86,7 +115,7 @@ pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<O
 /// # Errors
 /// What the database reports.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
-    let rows = sqlx::query("select * from subjects order by id desc").fetch_all(db).await?;
+    let rows = sqlx::query(select!("order by s.id desc")).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
@@ -95,13 +124,77 @@ pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
 /// # Errors
 /// What the database reports.
 pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) -> StoreResult<Vec<Subject>> {
-    let rows = sqlx::query("select * from subjects where ? is null or id < ? order by id desc limit ?")
+    let rows = sqlx::query(select!("where ? is null or s.id < ? order by s.id desc limit ?"))
         .bind(before)
         .bind(before)
         .bind(limit)
         .fetch_all(db)
         .await?;
     rows.iter().map(from_row).collect()
+}
+
+/// Height and mass as they were entered first: what studies solve with that were made before there were corrections.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn body_as_entered(db: &mut Connection, id: SubjectId) -> StoreResult<Body> {
+    let row =
+        sqlx::query("select height_m, body_mass_kg from subjects where id = ?").bind(id).fetch_optional(db).await?;
+    let row = row.ok_or_else(|| StoreError::Missing { what: "subject", id: id.to_string() })?;
+    Ok(Body { height_m: row.try_get("height_m")?, body_mass_kg: row.try_get("body_mass_kg")? })
+}
+
+/// Writes down the right height and mass of a subject.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn correct(
+    db: &mut Connection,
+    actor: &Actor,
+    id: SubjectId,
+    body: Body,
+    reason: &str,
+) -> StoreResult<Correction> {
+    let at = now();
+    let row = sqlx::query(
+        "insert into subject_corrections (subject_id, height_m, body_mass_kg, reason, actor, created_at) \
+         values (?, ?, ?, ?, ?, ?) returning seq",
+    )
+    .bind(id)
+    .bind(body.height_m)
+    .bind(body.body_mass_kg)
+    .bind(reason)
+    .bind(actor.as_str())
+    .bind(at)
+    .fetch_one(db)
+    .await?;
+    Ok(Correction {
+        seq: row.try_get("seq")?,
+        height_m: body.height_m,
+        body_mass_kg: body.body_mass_kg,
+        reason: reason.to_owned(),
+        actor: actor.as_str().to_owned(),
+        created_at: at,
+    })
+}
+
+/// Every correction of a subject, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<Correction>> {
+    let rows = sqlx::query("select * from subject_corrections where subject_id = ? order by seq").bind(id);
+    let correction = |row: &SqliteRow| {
+        Ok(Correction {
+            seq: row.try_get("seq")?,
+            height_m: row.try_get("height_m")?,
+            body_mass_kg: row.try_get("body_mass_kg")?,
+            reason: row.try_get("reason")?,
+            actor: row.try_get("actor")?,
+            created_at: row.try_get("created_at")?,
+        })
+    };
+    rows.fetch_all(db).await?.iter().map(correction).collect()
 }
 
 /// How the muscles of a subject differ from the published table; the table, where nothing is written down.

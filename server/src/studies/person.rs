@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
-use crate::store::subjects::{self, PSEUDONYM_UNIQUE, Subject};
+use crate::store::subjects::{self, Correction, PSEUDONYM_UNIQUE, Subject};
 use crate::store::{OnConstraint, SubjectId, Writer};
 use gait_optimizer::Subject as Body;
 use gait_optimizer::muscle::MuscleParameters;
@@ -45,6 +45,46 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result
     let detail = json!({ "pseudonym": pseudonym, "height_m": body.height_m, "body_mass_kg": body.body_mass_kg });
     audit::append(writer, actor, "subject.add", &format!("subject {}", subject.id), &detail).await?;
     Ok(subject)
+}
+
+/// The right height and mass of a subject.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewCorrection {
+    /// Body height, m.
+    #[schema(minimum = 1.4, maximum = 2.2)]
+    pub height_m: f64,
+    /// Body mass, kg.
+    #[schema(minimum = 35, maximum = 160)]
+    pub body_mass_kg: f64,
+    /// Why it is corrected.
+    #[schema(min_length = 1, max_length = 2000, pattern = "\\S")]
+    pub reason: String,
+}
+
+/// Corrects height and mass of a subject. Studies made from now on solve with them; those that are there keep theirs.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], a conflict when nothing would change or the subject withdrew.
+pub async fn correct(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: SubjectId,
+    new: &NewCorrection,
+) -> Result<Correction, Error> {
+    let before = subjects::get(writer, id).await?.body();
+    let body = Body::new(new.height_m, new.body_mass_kg)?;
+    let reason = printable::reason("reason", &new.reason, ": why it is corrected")?;
+    if body == before {
+        return Err(Error::conflict("height and mass are these already"));
+    }
+    let correction = subjects::correct(writer, actor, id, body, reason).await?;
+    let detail = json!({
+        "height_m": body.height_m, "body_mass_kg": body.body_mass_kg, "reason": reason,
+        "before": { "height_m": before.height_m, "body_mass_kg": before.body_mass_kg },
+    });
+    audit::append(writer, actor, "subject.correct", &format!("subject {id}"), &detail).await?;
+    Ok(correction)
 }
 
 /// Writes down how the muscles of a subject differ from the published table: studies made from now on take it up.

@@ -178,7 +178,11 @@ pub(super) async fn create_from(
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
     // A fork has the very set-up of its parent.
     let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
-    let plan = check(writer, new).await?;
+    let mut plan = check(writer, new).await?;
+    if let Some(parent) = forked_from {
+        // Also where the subject was corrected meanwhile: the two are compared with each other.
+        plan.body = studies::get(writer, parent).await?.plan.body;
+    }
     let study = studies::insert(writer, &plan, state, forked_from).await?;
     let payload = json!({ "state": study.state, "reason": "created" });
     events::append(writer, study.id, "study_changed", &payload).await?;
@@ -251,6 +255,7 @@ async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
     Ok(StudyPlan {
         name,
         subject_id: subject.id,
+        body: Some(subject.body()),
         device_id,
         reference_gait_id,
         muscles: new.muscles,

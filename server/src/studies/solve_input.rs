@@ -64,7 +64,10 @@ impl SolveInput {
         bounds: TunedBounds,
         start: Option<TrialId>,
     ) -> Result<Self, Error> {
-        let subject = subjects::get(db, plan.subject_id).await?.body();
+        let subject = match plan.body {
+            Some(body) => body,
+            None => subjects::body_as_entered(db, plan.subject_id).await?,
+        };
         let device = devices::get(db, plan.device_id).await?.definition;
         let reference = reference_gaits::get(db, plan.reference_gait_id).await?.definition;
         let warm_start = match start {

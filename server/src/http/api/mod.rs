@@ -1,6 +1,7 @@
 //! REST under `/api/v1`: one file per resource. Route and description are one thing: what is not described here is
 //! not reachable.
 
+mod access_log;
 mod archive;
 mod audit;
 mod backups;
@@ -54,6 +55,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(subjects::get))
         .routes(routes!(subjects::consents, subjects::consent))
         .routes(routes!(subjects::withdraw))
+        .routes(routes!(subjects::corrections, subjects::correct))
         .routes(routes!(subjects::muscles, subjects::set_muscles))
         .routes(routes!(reference_gaits::of_subject))
         .routes(routes!(devices::list, devices::create))
@@ -152,5 +154,6 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(jobs::workers))
         .routes(routes!(backups::create))
         .routes(routes!(audit::list))
+        .routes(routes!(access_log::list))
         .routes(routes!(health::get))
 }

@@ -10,9 +10,9 @@ use crate::http::pages_of::{Before, linked};
 use crate::http::reached::Id;
 use crate::store::SubjectId;
 use crate::store::consents::{self, Consent};
-use crate::store::subjects::{self, Subject};
+use crate::store::subjects::{self, Correction, Subject};
 use crate::studies::consent::{self, NewConsent, Withdrawal};
-use crate::studies::person::{self, NewSubject};
+use crate::studies::person::{self, NewCorrection, NewSubject};
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -145,6 +145,49 @@ pub(super) async fn withdraw(
         app.director.cancel_solve(trial).await;
     }
     Ok(answer)
+}
+
+/// `GET {id}/corrections`: corrections of height and mass, oldest first; the last one counts.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/corrections",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "Oldest first", body = Vec<Correction>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn corrections(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Result<Json<Vec<Correction>>, Error> {
+    let mut reader = app.read().await?;
+    subjects::get(&mut reader, id).await?;
+    Ok(Json(subjects::corrections(&mut reader, id).await?))
+}
+
+/// `POST {id}/corrections`: the right height and mass. Studies made from now on solve with them; those that are there keep
+/// the numbers that they were made with.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/corrections",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body = NewCorrection,
+    responses((status = 201, description = "Corrected", body = Correction)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn correct(
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    OnceWith(once, new): OnceWith<Run, NewCorrection>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = person::correct(&mut writer, &once.actor, id, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
 }
 
 /// `GET {id}/muscles`: how the subject's muscles differ from the published table.

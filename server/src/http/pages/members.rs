@@ -5,6 +5,7 @@ use super::people::origin;
 use crate::access::{Administer, Caller, Permission, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
+use crate::http::client_address::Secure;
 use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::http::problem::Problem;
@@ -97,6 +98,7 @@ pub(super) async fn post(
     may: May<Run>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
+    secure: Secure,
     headers: HeaderMap,
     Form(asked): Form<Asked>,
 ) -> Result<Response, PageError> {
@@ -109,7 +111,7 @@ pub(super) async fn post(
                 // Whoever removed himself does not reach the study any more.
                 return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
             };
-            let link = Some((name, format!("{}/sign-in/{secret}", origin(&app, &headers))));
+            let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
             Ok(show(&app, &may.caller, id, Shown { link, ..Shown::default() }).await?.into_response())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {

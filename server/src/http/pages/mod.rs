@@ -1,5 +1,6 @@
 //! Pages for people: rendered on the server, usable without scripts.
 
+mod access_log;
 mod audit;
 pub(super) mod belief;
 mod bound_use;
@@ -59,6 +60,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/subjects/{id}", get(subject::get))
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
+        .route("/subjects/{id}/correct", post(subject::correct))
         .route("/subjects/{id}/muscles", get(muscles::get).post(muscles::post))
         .route("/devices", get(devices::list))
         .route("/devices/{id}", get(devices::get).post(devices::post))
@@ -86,6 +88,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/lab/{id}/take-back", post(lab_walk::take_back))
         .route("/people", get(people::get).post(people::post))
         .route("/audit", get(audit::get))
+        .route("/access-log", get(access_log::get))
         .route("/system", get(system::get))
         .route("/system/backup", post(system::make_backup))
         .route("/glossary", get(glossary::get))

@@ -6,6 +6,7 @@ use crate::access::tokens::{self as making, NewToken};
 use crate::access::{Administer, Caller, Right, Role};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
+use crate::http::client_address::Secure;
 use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::http::problem::Problem;
@@ -177,11 +178,12 @@ async fn show(app: &AppState, outcome: Outcome, refused: Option<Refused>, typed:
 pub(super) async fn post(
     may: May<Administer>,
     State(app): State<AppState>,
+    secure: Secure,
     headers: HeaderMap,
     Form(asked): Form<Asked>,
 ) -> Result<Response, PageError> {
     let mut writer = app.write().await?;
-    let origin = origin(&app, &headers);
+    let origin = origin(secure, &headers);
     match act(&mut writer, &may.caller, &origin, &asked).await {
         Ok(outcome) => {
             commit(writer).await?;
@@ -198,9 +200,9 @@ pub(super) async fn post(
 }
 
 /// Where the asking browser reaches this service: `https://gait.clinic.example`. Other names are refused before.
-pub(super) fn origin(app: &AppState, headers: &HeaderMap) -> String {
+pub(super) fn origin(secure: Secure, headers: &HeaderMap) -> String {
     let host = headers.get(header::HOST).and_then(|value| value.to_str().ok()).unwrap_or_default();
-    let scheme = if app.access.secure { "https" } else { "http" };
+    let scheme = secure.scheme();
     if host.is_empty() { String::new() } else { format!("{scheme}://{host}") }
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format::{variant, words};
-use crate::access::{Caller, Permission, Reach, Read, Run};
+use crate::access::{Administer, Caller, Permission, Reach, Read, Run};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::extract::{Form, Params};
@@ -11,12 +11,12 @@ use crate::http::problem::Problem;
 use crate::http::reached::Id;
 use crate::store::consents::{self, Consent, ConsentKind};
 use crate::store::studies::Study;
-use crate::store::subjects::{self, Subject};
+use crate::store::subjects::{self, Correction, Subject};
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, SubjectId, commit, lab_sessions, studies, trials};
 use crate::studies::consent::{self, NewConsent, Withdrawal};
 use crate::studies::lab::SessionView;
-use crate::studies::person::{self, NewSubject};
+use crate::studies::person::{self, NewCorrection, NewSubject};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -54,18 +54,16 @@ pub(super) struct Described {
 
 impl Described {
     fn read(&self) -> Result<NewSubject, Error> {
-        let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
-        Ok(NewSubject {
-            pseudonym: self.pseudonym.clone(),
-            height_m: number("height_m", &self.height_m, "a number of metres with a decimal point, as in 1.75")?,
-            body_mass_kg: number(
-                "body_mass_kg",
-                &self.body_mass_kg,
-                "a number of kilograms with a decimal point, as in 65.7",
-            )?,
-            notes: self.notes.clone(),
-        })
+        let (height_m, body_mass_kg) = body_of(&self.height_m, &self.body_mass_kg)?;
+        Ok(NewSubject { pseudonym: self.pseudonym.clone(), height_m, body_mass_kg, notes: self.notes.clone() })
     }
+}
+
+/// Height and mass as typed.
+fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
+    let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
+    let height = number("height_m", height, "a number of metres with a decimal point, as in 1.75")?;
+    Ok((height, number("body_mass_kg", mass, "a number of kilograms with a decimal point, as in 65.7")?))
 }
 
 struct Row {
@@ -86,6 +84,10 @@ struct SubjectPage {
     sessions: Vec<SessionRow>,
     /// The newest row that the form knows of: sent twice, it is written once.
     after: i64,
+    corrections: Vec<Correction>,
+    /// The newest correction that the form knows of: sent twice, it is made once.
+    corrected: i64,
+    may_administer: bool,
     refused: Option<String>,
 }
 
@@ -174,10 +176,11 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): 
 }
 
 async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>) -> Page {
-    let may_run = caller.may(Run::NEEDED);
+    let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let consents = consents::of_subject(&mut reader, id).await?;
+    let corrections = subjects::corrections(&mut reader, id).await?;
     let studies = studies_of(&mut reader, caller.reach(), id).await?;
     let mut sessions = Vec::new();
     let last = consents.last();
@@ -187,7 +190,20 @@ async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<St
     }
     drop(reader);
     let after = last.map_or(0, |last| last.seq);
-    page(&SubjectPage { subject, consents, withdrawn, may_run, studies, sessions, after, refused })
+    let corrected = corrections.last().map_or(0, |last| last.seq);
+    page(&SubjectPage {
+        subject,
+        consents,
+        withdrawn,
+        may_run,
+        studies,
+        sessions,
+        after,
+        corrections,
+        corrected,
+        may_administer,
+        refused,
+    })
 }
 
 /// The studies of a subject that a caller reaches, the newest first.
@@ -258,6 +274,38 @@ async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) ->
     }
     app.director.changed();
     Ok(())
+}
+
+/// Corrected height and mass, as typed.
+#[derive(Debug, Deserialize)]
+pub(super) struct Corrected {
+    height_m: String,
+    body_mass_kg: String,
+    reason: String,
+    before: i64,
+}
+
+/// `POST /subjects/{id}/correct`.
+pub(super) async fn correct(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    Form(form): Form<Corrected>,
+) -> Result<Response, PageError> {
+    let done = set_right(&app, &may, id, form).await;
+    answer(&app, id, &may.caller, done).await
+}
+
+async fn set_right(app: &AppState, may: &May<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
+    let (height_m, body_mass_kg) = body_of(&form.height_m, &form.body_mass_kg)?;
+    let new = NewCorrection { height_m, body_mass_kg, reason: form.reason };
+    let mut writer = app.write().await?;
+    let newest = subjects::corrections(&mut writer, id).await?.last().map_or(0, |last| last.seq);
+    if newest != form.before {
+        return Err(Error::conflict("height and mass were corrected since this form was shown; look at them first"));
+    }
+    person::correct(&mut writer, &may.caller.actor, id, &new).await?;
+    Ok(commit(writer).await?)
 }
 
 /// Shows the subject anew; what was refused, with the reason.

@@ -1,0 +1,346 @@
+//! Connections: how many are held, in total and for one address, so that descriptors are left for the record and for
+//! whoever else calls. Above a limit the connection that has been quiet longest gives way to the new one.
+
+use super::client_address::ClientAddress;
+use super::forwarded::Proxies;
+use axum::extract::connect_info::Connected;
+use axum_server::{AddrListener, Address};
+use std::collections::HashMap;
+use std::io;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
+
+/// A connection gives way only after so long without a byte.
+const QUIET: Duration = Duration::from_millis(250);
+/// So often a full service looks for a connection that has become quiet.
+const LOOK: Duration = Duration::from_millis(50);
+/// The log says at most this often that a limit bites.
+const SAY_EVERY: Duration = Duration::from_secs(10);
+/// Descriptors that are left for the record, its log, copies and files.
+const RESERVED: u64 = 128;
+/// As many descriptors as the process asks for, if it may have them.
+const WANTED: u64 = 65_536;
+
+/// How many connections are held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// In total.
+    pub total: usize,
+    /// Of one address, or of one /64 network of IPv6; trusted proxies have no such limit.
+    pub per_address: usize,
+}
+
+impl Limits {
+    /// These limits, as far as the descriptors of the process allow; it takes as many of them as it may have.
+    pub fn within_descriptors(self) -> Self {
+        let descriptors = descriptors();
+        let most = if descriptors > 2 * RESERVED { descriptors - RESERVED } else { descriptors / 2 };
+        Self { total: self.total.min(usize::try_from(most).unwrap_or(usize::MAX)).max(1), ..self }
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn descriptors() -> u64 {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let present = getrlimit(Resource::Nofile);
+    let wanted = present.maximum.unwrap_or(WANTED).min(WANTED).max(present.current.unwrap_or(WANTED));
+    // Whoever may not raise the limit lives with it.
+    let _ = setrlimit(Resource::Nofile, Rlimit { current: Some(wanted), maximum: present.maximum });
+    getrlimit(Resource::Nofile).current.unwrap_or(WANTED)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn descriptors() -> u64 {
+    2 * RESERVED
+}
+
+/// Whoever is at the other end of a connection.
+#[derive(Debug, Clone)]
+pub struct Peer(SocketAddr);
+
+impl Address for Peer {
+    type Stream = Held;
+    type Listener = LimitedListener;
+}
+
+impl Connected<Peer> for SocketAddr {
+    fn connect_info(peer: Peer) -> Self {
+        peer.0
+    }
+}
+
+/// A listener that holds no more connections than its limits say.
+#[derive(Debug)]
+pub struct LimitedListener {
+    listener: TcpListener,
+    connections: Arc<Connections>,
+    proxies: Proxies,
+}
+
+impl LimitedListener {
+    /// Over a listener that does not block.
+    ///
+    /// # Errors
+    /// When the runtime cannot listen.
+    pub fn new(listener: std::net::TcpListener, limits: Limits, proxies: Proxies) -> io::Result<Self> {
+        let connections = Arc::new(Connections::new(limits));
+        Ok(Self { listener: TcpListener::from_std(listener)?, connections, proxies })
+    }
+}
+
+impl AddrListener<Held, Peer> for LimitedListener {
+    async fn bind_to(address: Peer) -> io::Result<Self> {
+        let listener = std::net::TcpListener::bind(address.0)?;
+        listener.set_nonblocking(true)?;
+        let limits = Limits { total: usize::MAX, per_address: usize::MAX };
+        Self::new(listener, limits.within_descriptors(), Proxies::default())
+    }
+
+    async fn accept_stream(&self) -> io::Result<(Held, Peer)> {
+        loop {
+            let (stream, peer) = self.listener.accept().await?;
+            let network = (!self.proxies.trust(peer.ip())).then(|| ClientAddress::new(peer.ip()).network());
+            if let Some(held) = self.connections.hold(stream, network).await {
+                return Ok((held, Peer(peer)));
+            }
+        }
+    }
+
+    fn get_local_addr(&self) -> io::Result<Peer> {
+        self.listener.local_addr().map(Peer)
+    }
+}
+
+/// The connections that are held.
+#[derive(Debug)]
+struct Connections {
+    limits: Limits,
+    /// A permit goes with a descriptor: it comes back when the connection is really closed.
+    room: Arc<Semaphore>,
+    begun: Instant,
+    held: Mutex<Table>,
+}
+
+#[derive(Debug, Default)]
+struct Table {
+    next: u64,
+    by_number: HashMap<u64, Arc<Connection>>,
+    by_network: HashMap<String, usize>,
+    /// What the log was not told yet: connections closed, connections refused.
+    untold: (u64, u64),
+    told_at: Option<Instant>,
+}
+
+/// What is known of one connection.
+#[derive(Debug)]
+struct Connection {
+    /// Of whom; `None`: of a trusted proxy.
+    network: Option<String>,
+    /// Milliseconds after the service began, of the last byte in either direction.
+    active_at: AtomicU64,
+    /// It has said something.
+    heard: AtomicBool,
+    /// It has to go.
+    closing: CancellationToken,
+}
+
+impl Connections {
+    fn new(limits: Limits) -> Self {
+        let room = Arc::new(Semaphore::new(limits.total.min(Semaphore::MAX_PERMITS)));
+        Self { limits, room, begun: Instant::now(), held: Mutex::default() }
+    }
+
+    fn table(&self) -> MutexGuard<'_, Table> {
+        // The table is whole between any two statements that hold the lock.
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn milliseconds(&self) -> u64 {
+        u64::try_from(self.begun.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Holds a connection; `None`: its address has as many as it may, and all of them are busy.
+    async fn hold(self: &Arc<Self>, stream: TcpStream, network: Option<String>) -> Option<Held> {
+        if !self.make_room_for(network.as_deref()) {
+            return None;
+        }
+        let permit = self.permit().await?;
+        let connection = Arc::new(Connection {
+            network,
+            active_at: self.milliseconds().into(),
+            heard: false.into(),
+            closing: CancellationToken::new(),
+        });
+        let number = self.table().enter(&connection);
+        let closed = Box::pin(connection.closing.clone().cancelled_owned());
+        Some(Held { stream, closed, number, connection, connections: Arc::clone(self), _permit: permit })
+    }
+
+    /// Whether one more connection of a network may be held, be it in place of its quietest one.
+    fn make_room_for(&self, network: Option<&str>) -> bool {
+        let Some(network) = network else { return true };
+        let mut table = self.table();
+        if table.by_network.get(network).copied().unwrap_or(0) < self.limits.per_address {
+            return true;
+        }
+        let made = self.close_quietest(&mut table, |connection| connection.network.as_deref() == Some(network));
+        table.untold.1 += u64::from(!made);
+        self.tell(&mut table);
+        made
+    }
+
+    /// Room for one descriptor more.
+    async fn permit(&self) -> Option<OwnedSemaphorePermit> {
+        loop {
+            if let Ok(permit) = Arc::clone(&self.room).try_acquire_owned() {
+                return Some(permit);
+            }
+            self.close_any();
+            if let Ok(permit) = tokio::time::timeout(LOOK, Arc::clone(&self.room).acquire_owned()).await {
+                return permit.ok();
+            }
+        }
+    }
+
+    fn close_any(&self) {
+        let mut table = self.table();
+        self.close_quietest(&mut table, |_| true);
+        self.tell(&mut table);
+    }
+
+    /// Closes the connection that has been quiet longest among some; those that never said anything come first.
+    fn close_quietest(&self, table: &mut Table, among: impl Fn(&Connection) -> bool) -> bool {
+        let now = self.milliseconds();
+        let quiet_since = |connection: &Connection| connection.active_at.load(Ordering::Relaxed);
+        let quietest = table
+            .by_number
+            .values()
+            .filter(|connection| !connection.closing.is_cancelled() && among(connection))
+            .filter(|connection| u128::from(now.saturating_sub(quiet_since(connection))) >= QUIET.as_millis())
+            .min_by_key(|connection| (connection.heard.load(Ordering::Relaxed), quiet_since(connection)))
+            .cloned();
+        let Some(quietest) = quietest else { return false };
+        quietest.closing.cancel();
+        table.leave(quietest.network.as_deref());
+        table.untold.0 += 1;
+        true
+    }
+
+    fn tell(&self, table: &mut Table) {
+        let (closed, refused) = table.untold;
+        if (closed, refused) == (0, 0) || table.told_at.is_some_and(|at| at.elapsed() < SAY_EVERY) {
+            return;
+        }
+        let Limits { total, per_address } = self.limits;
+        let held = table.by_number.len();
+        tracing::warn!(held, closed, refused, total, per_address, "too many connections: quiet ones are closed");
+        (table.untold, table.told_at) = ((0, 0), Some(Instant::now()));
+    }
+}
+
+impl Table {
+    fn enter(&mut self, connection: &Arc<Connection>) -> u64 {
+        let number = self.next;
+        self.next += 1;
+        self.by_number.insert(number, Arc::clone(connection));
+        if let Some(network) = &connection.network {
+            *self.by_network.entry(network.clone()).or_default() += 1;
+        }
+        number
+    }
+
+    fn leave(&mut self, network: Option<&str>) {
+        let Some(count) = network.and_then(|network| self.by_network.get_mut(network)) else { return };
+        *count = count.saturating_sub(1);
+        if *count == 0
+            && let Some(network) = network
+        {
+            self.by_network.remove(network);
+        }
+    }
+}
+
+/// A connection that is counted for as long as it is open.
+#[derive(Debug)]
+pub struct Held {
+    stream: TcpStream,
+    closed: Pin<Box<WaitForCancellationFutureOwned>>,
+    number: u64,
+    connection: Arc<Connection>,
+    connections: Arc<Connections>,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl Held {
+    fn active(&self) {
+        self.connection.active_at.store(self.connections.milliseconds(), Ordering::Relaxed);
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        let mut table = self.connections.table();
+        table.by_number.remove(&self.number);
+        // Whatever was told to close left the count of its network then.
+        if !self.connection.closing.is_cancelled() {
+            table.leave(self.connection.network.as_deref());
+        }
+    }
+}
+
+impl AsyncRead for Held {
+    fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        if self.closed.as_mut().poll(cx).is_ready() {
+            return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
+        }
+        let before = buffer.filled().len();
+        let read = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        if buffer.filled().len() > before {
+            self.connection.heard.store(true, Ordering::Relaxed);
+            self.active();
+        }
+        read
+    }
+}
+
+impl AsyncWrite for Held {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        if written.is_ready() {
+            self.active();
+        }
+        written
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        parts: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        let written = Pin::new(&mut self.stream).poll_write_vectored(cx, parts);
+        if written.is_ready() {
+            self.active();
+        }
+        written
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}

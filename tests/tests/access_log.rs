@@ -1,0 +1,280 @@
+//! The access log: every view and export of subject data and every refusal leaves a row; nothing else takes one away.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode, header};
+use axum::middleware::map_request;
+use axum::routing::get;
+use gaitwright::access::{Right, Role};
+use gaitwright::http::access_log::NO_SUBJECT_DATA;
+use gaitwright::http::{openapi, with_layers};
+use gaitwright::store::access_log::{self, Access, AccessRow, Kind, Tally};
+use gaitwright::store::audit::Actor;
+use gaitwright::store::seals::{self, Verdict};
+use gaitwright::store::studies::StudyState;
+use gaitwright::store::{StudyId, commit, now};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::{self, As, FORM, send, signed_in, token};
+use gaitwright_tests::cli;
+use gaitwright_tests::service::{Service, for_localhost};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use tempfile::TempDir;
+use tower::ServiceExt;
+
+const ANY_ID: &str = "01890000-0000-7000-8000-000000000000";
+
+/// Every route that is read: pages as the router lists them, operations as the description does.
+fn read_routes() -> BTreeSet<String> {
+    let pages = include_str!("../../server/src/http/pages/mod.rs");
+    let pages = pages.lines().filter(|line| line.contains(".route(\"") && line.contains("get("));
+    let mut routes: BTreeSet<String> = pages.map(|line| line.split('"').nth(1).unwrap().to_owned()).collect();
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let operations = document["paths"].as_object().unwrap().iter();
+    routes.extend(operations.filter(|(_, item)| item["get"].is_object()).map(|(path, _)| path.clone()));
+    routes
+}
+
+async fn rows(service: &Service) -> Vec<AccessRow> {
+    service.access.log.write(&service.store, true).await.unwrap();
+    stored(service).await
+}
+
+async fn stored(service: &Service) -> Vec<AccessRow> {
+    access_log::page(&mut service.store.read().await.unwrap(), "", None, None, 1000).await.unwrap()
+}
+
+async fn with_study() -> (TempDir, Service, StudyId) {
+    let (folder, service) = callers::service().await;
+    let study = service.study(|new| new.trial_budget = 2).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    (folder, service, study)
+}
+
+#[tokio::test]
+async fn every_route_that_shows_subject_data_leaves_a_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let routes = read_routes();
+    assert!(routes.len() > 70, "{routes:?}");
+    for known in NO_SUBJECT_DATA {
+        assert!(
+            !["subject", "stud", "trial", "lab", "rate", "blind"].iter().any(|word| known.contains(word)),
+            "{known}"
+        );
+    }
+    // Whatever its handler does, an answer of the route is noted.
+    let mut all = Router::new();
+    for route in &routes {
+        all = all.route(route, get(async || "shown"));
+    }
+    let router = with_layers(all, service.state()).layer(map_request(for_localhost));
+    for route in &routes {
+        let path = route.replace("{id}", ANY_ID).replace("{token}", "secret").replace("{link}", "secret");
+        let path = path.replace("{file}", "a.svg").replace("{name}", "conflict");
+        let answer = router.clone().oneshot(Request::get(&path).body(Body::empty()).unwrap()).await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{path}");
+    }
+    let noted: BTreeSet<String> = rows(&service).await.into_iter().map(|row| row.route).collect();
+    for route in routes {
+        let expected = !NO_SUBJECT_DATA.contains(&route.as_str());
+        assert_eq!(noted.contains(&route), expected, "{route}");
+    }
+    assert!(rows(&service).await.iter().all(|row| !row.object.contains("secret")), "a secret is in the log");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn views_exports_and_refusals_name_who_what_and_whose() {
+    let (_folder, service, study) = with_study().await;
+    let (clinician, admin) = (signed_in(&service, Role::Clinician).await, signed_in(&service, Role::Admin).await);
+    let script = token(&service, &[Right::Rate]).await;
+    let subject = service.subject().await;
+    let trial = service.trials(study).await[0].id;
+    let fetch = async |who: &As, path: &str| send(&service, who, &Method::GET, path, FORM, "").await;
+    for _ in 0..3 {
+        assert_eq!(fetch(&clinician, &format!("/subjects/{subject}")).await.status, StatusCode::OK);
+    }
+    for path in [format!("/trials/{trial}"), format!("/studies/{study}"), format!("/api/v1/trials/{trial}/gait")] {
+        assert_eq!(fetch(&clinician, &path).await.status, StatusCode::OK, "{path}");
+    }
+    // An export is on the disk before its answer is.
+    let csv = format!("/api/v1/studies/{study}/trials.csv");
+    for (who, method, path) in [
+        (&clinician, Method::GET, csv.clone()),
+        (&admin, Method::GET, format!("/api/v1/studies/{study}/archive")),
+        (&admin, Method::POST, "/api/v1/backups".to_owned()),
+    ] {
+        let answer = send(&service, who, &method, &path, "application/json", "").await;
+        assert!(answer_is_success(answer.status), "{path}: {}", answer.status);
+        let newest = stored(&service).await.into_iter().find(|row| row.kind == Kind::Export).unwrap();
+        assert_eq!(newest.object, path);
+    }
+    assert_eq!(fetch(&As::Token("gait_nothing".to_owned()), &csv).await.status, StatusCode::UNAUTHORIZED);
+    assert_eq!(fetch(&script, &csv).await.status, StatusCode::FORBIDDEN);
+    service.post_text("/sign-in", FORM, "name=nobody&password=wrong").await;
+    fetch(&As::Nobody, "/health").await;
+
+    let rows = rows(&service).await;
+    let of = |kind: Kind, start: &str| {
+        rows.iter().filter(|row| row.kind == kind && row.object.starts_with(start)).collect::<Vec<_>>()
+    };
+    let subject_views = of(Kind::View, "/subjects/");
+    assert!(subject_views.len() == 1 && subject_views[0].times == 3, "{subject_views:?}");
+    assert_eq!(
+        (subject_views[0].subject_id, subject_views[0].actor.as_str()),
+        (Some(subject), "clinician a clinician")
+    );
+    for start in ["/trials/", "/studies/", "/api/v1/trials/"] {
+        let views = of(Kind::View, start);
+        assert!(
+            views.len() == 1 && views[0].subject_id == Some(subject) && views[0].study_id == Some(study),
+            "{start}"
+        );
+    }
+    let refused = of(Kind::Refused, &csv);
+    let who: BTreeSet<(&str, u16)> = refused.iter().map(|row| (row.actor.as_str(), row.status)).collect();
+    assert_eq!(who, BTreeSet::from([("not signed in", 401), ("token [Rate]", 403)]), "{refused:?}");
+    assert_eq!(of(Kind::Refused, "/sign-in").len(), 1);
+    assert!(rows.iter().all(|row| row.route != "/health"));
+
+    // Administrators search it, by page and by program.
+    let found = fetch(&admin, &format!("/api/v1/access-log?subject={subject}&contains=EXPORT")).await.json();
+    assert_eq!(found.as_array().unwrap().len(), 2, "{found}");
+    let page = fetch(&admin, &format!("/access-log?subject={subject}&contains=trials.csv")).await;
+    assert!(page.status == StatusCode::OK && page.text.contains("trials.csv") && page.text.contains("paper-1"));
+    assert_eq!(fetch(&clinician, "/api/v1/access-log").await.status, StatusCode::FORBIDDEN);
+    service.stop().await;
+}
+
+fn answer_is_success(status: StatusCode) -> bool {
+    status.is_success()
+}
+
+#[tokio::test]
+async fn views_are_written_within_seconds_without_being_asked_for() {
+    let (_folder, service, study) = with_study().await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    send(&service, &clinician, &Method::GET, &format!("/studies/{study}"), FORM, "").await;
+    for _ in 0..100 {
+        if stored(&service).await.iter().any(|row| row.object == format!("/studies/{study}")) {
+            service.stop().await;
+            return;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    }
+    panic!("the view was not written");
+}
+
+#[tokio::test]
+async fn access_log_is_append_only_and_pruned_by_age_alone() {
+    let (_folder, service, study) = with_study().await;
+    let mut writer = service.store.write().await.unwrap();
+    for days in [400, 399, 10] {
+        let at = now().plus_seconds(-86_400 * days);
+        let tally = Tally { first_at: at, last_at: at, times: 1 };
+        access_log::append(&mut writer, &view(study, &format!("{days} days")), tally).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+    for sql in ["delete from access_log", "update access_log set actor = 'nobody'"] {
+        let mut writer = service.store.write().await.unwrap();
+        assert!(sqlx::query(sql).execute(&mut **writer).await.is_err(), "{sql}");
+    }
+    let mut writer = service.store.write().await.unwrap();
+    assert_eq!(access_log::prune(&mut writer, &Actor::program(), 365, 100).await.unwrap(), 2);
+    assert_eq!(access_log::prune(&mut writer, &Actor::program(), 365, 100).await.unwrap(), 0);
+    commit(writer).await.unwrap();
+    let left: Vec<String> = stored(&service).await.into_iter().map(|row| row.object).collect();
+    assert_eq!(left, ["10 days"]);
+    let verdict = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(verdict, Verdict::Whole { .. }), "{verdict:?}");
+    service.stop().await;
+}
+
+fn view(study: StudyId, object: &str) -> Access {
+    Access {
+        kind: Kind::View,
+        actor: "clinician K".to_owned(),
+        address: "192.0.2.7".to_owned(),
+        method: "GET".to_owned(),
+        route: "/studies/{id}".to_owned(),
+        object: object.to_owned(),
+        status: 200,
+        named: vec![study.to_string()],
+    }
+}
+
+#[tokio::test]
+async fn command_line_export_and_backup_leave_rows_also_while_the_service_runs() {
+    let (folder, service, study) = with_study().await;
+    let run = |arguments: Vec<String>| {
+        let folder = folder.path().to_owned();
+        tokio::task::spawn_blocking(move || {
+            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), &folder, &arguments);
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        })
+    };
+    let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    run(words(&format!("export {study} s.gait --database a.db"))).await.unwrap();
+    run(words("backup copy.db --database a.db")).await.unwrap();
+    let rows = rows(&service).await;
+    let of = |command: &str| rows.iter().find(|row| row.route == command).unwrap();
+    let export = of("gaitwright export");
+    assert_eq!((export.kind, export.study_id, export.actor.as_str()), (Kind::Export, Some(study), "command line"));
+    assert_eq!(of("gaitwright backup").object, "the whole record");
+    let again = stored(&service).await.len();
+    service.access.log.write(&service.store, true).await.unwrap();
+    assert_eq!(stored(&service).await.len(), again, "each is taken once");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn corrected_height_and_mass_reach_new_studies_only() {
+    let (_folder, service, study) = with_study().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    let subject = service.subject().await;
+    let trial = service.trials(study).await[0].id;
+    let fetch = async |path: String| send(&service, &admin, &Method::GET, &path, FORM, "").await;
+    let problem =
+        async |trial| fetch(format!("/api/v1/trials/{trial}/problem.json")).await.json()["problem"]["subject"].clone();
+    let before = problem(trial).await;
+    let correct = async |body: &str| {
+        let path = format!("/api/v1/subjects/{subject}/corrections");
+        send(&service, &admin, &Method::POST, &path, "application/json", body).await
+    };
+    let unknown = r#"{"height_m": 17, "body_mass_kg": 70, "reason": "r"}"#;
+    assert_eq!(correct(unknown).await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let blank = r#"{"height_m": 1.7, "body_mass_kg": 70, "reason": " "}"#;
+    assert_eq!(correct(blank).await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let right = r#"{"height_m": 1.75, "body_mass_kg": 71.5, "reason": "misread the scale"}"#;
+    assert_eq!(correct(right).await.status, StatusCode::CREATED);
+    assert_eq!(correct(right).await.status, StatusCode::CONFLICT, "nothing would change");
+
+    let shown = fetch(format!("/api/v1/subjects/{subject}")).await.json();
+    assert_eq!((&shown["height_m"], &shown["body_mass_kg"]), (&1.75.into(), &71.5.into()));
+    assert_eq!(problem(trial).await, before, "a study keeps the numbers that it was made with");
+    // Also for trials to come.
+    let extend = format!("/api/v1/studies/{study}/extend");
+    send(&service, &admin, &Method::POST, &extend, "application/json", r#"{"trial_budget": 3}"#).await;
+    service.wait_for_trials(study, 3).await;
+    assert_eq!(problem(service.trials(study).await[2].id).await, before);
+    let new = service.study(|new| new.trial_budget = 1).await;
+    service.wait_for_trials(new, 1).await;
+    let after = problem(service.trials(new).await[0].id).await;
+    assert_eq!((&after["height_m"], &after["body_mass_kg"]), (&1.75.into(), &71.5.into()));
+
+    let form = format!("height_m=1.76&body_mass_kg=71.5&reason=measured+again&before=1");
+    let page = format!("/subjects/{subject}/correct");
+    assert_eq!(send(&service, &admin, &Method::POST, &page, FORM, &form).await.status, StatusCode::SEE_OTHER);
+    let twice = send(&service, &admin, &Method::POST, &page, FORM, &form).await;
+    assert!(twice.status == StatusCode::CONFLICT && twice.text.contains("corrected since"), "{}", twice.text);
+    let page = fetch(format!("/subjects/{subject}")).await.text;
+    assert!(page.contains("misread the scale") && page.contains("1.76 m"), "{page}");
+    let trail = fetch("/api/v1/audit?limit=1".to_owned()).await;
+    let audit = fetch("/audit?contains=subject.correct".to_owned()).await.text;
+    assert!(audit.contains("misread the scale") && trail.headers[header::CONTENT_TYPE] == "application/json");
+    service.stop().await;
+}
