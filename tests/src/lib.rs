@@ -16,3 +16,4 @@ pub mod large;
 pub mod measured;
 pub mod service;
 pub mod skipped;
+pub mod well_formed;

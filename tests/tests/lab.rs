@@ -13,7 +13,9 @@ use gaitwright::studies::lab;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
+use gaitwright_tests::well_formed::WellFormed;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use tempfile::TempDir;
 
 const FORM: &str = "application/x-www-form-urlencoded";
@@ -140,22 +142,51 @@ async fn nothing_in_the_lab_or_before_the_act_says_which_gait_it_is() {
     }
     assert!(seen.iter().any(|(order, _)| *order) && seen.iter().any(|(order, _)| !*order), "balanced");
     assert!(seen.iter().all(|(_, page)| *page == seen[0].1), "{seen:?}");
-    // What a device gets for a walk is what it gets for the gait of that walk. (An analytic gait is none to walk with,
-    // and refused in the same words.)
-    let mut reader = service.store.read().await.unwrap();
-    let row = lab_sessions::get(&mut reader, id(&session).parse().unwrap()).await.unwrap();
-    drop(reader);
-    let drawn = if row.gait_one_first { row.gait_one } else { row.gait_two };
-    let controller = format!("/api/v1/lab-sessions/{}/controller.json", id(&session));
-    let file = service.fetch(&format!("{controller}?walk=2")).await;
-    let of_gait = service.fetch(&format!("/api/v1/trials/{drawn}/controller.json")).await;
-    assert_eq!((file.status, file.text), (of_gait.status, of_gait.text));
-    let none = service.fetch(&format!("{controller}?walk=1")).await;
-    assert!(
-        none.status == StatusCode::UNPROCESSABLE_ENTITY && none.text.contains("without the device"),
-        "{}",
-        none.text
-    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn each_walk_gets_the_controller_file_of_its_own_gait() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), WellFormed::default(), 1).await;
+    let study = service.study(|new| new.trial_budget = 24).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let gaits = converged(&trials);
+    // What moves the device; the rest of a file may say whose walk it is of.
+    let moves = async |path: String| {
+        let file = service.fetch(&path).await;
+        assert_eq!(file.status, StatusCode::OK, "{path}: {}", file.text);
+        let file = file.json();
+        assert!(file["domains"].is_array() && file["trajectory"].is_object(), "{file}");
+        (file["domains"].clone(), file["trajectory"].clone())
+    };
+    let one = moves(format!("/api/v1/trials/{}/controller.json", gaits[0].id)).await;
+    let two = moves(format!("/api/v1/trials/{}/controller.json", gaits[1].id)).await;
+    assert!(one.0 != two.0 && one.1 != two.1, "the gaits cannot be told apart");
+    let mut orders = BTreeSet::new();
+    for _ in 0..64 {
+        let session = planned(&service, study, &trials).await;
+        let api = format!("/api/v1/lab-sessions/{}", id(&session));
+        let walks = [2, 3].map(|walk| format!("{api}/controller.json?walk={walk}"));
+        let [second, third] = walks;
+        let sent = [moves(second).await, moves(third).await];
+        let none = service.fetch(&format!("{api}/controller.json?walk=1")).await;
+        assert_eq!(none.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", none.text);
+        assert!(none.text.contains("without the device"), "{}", none.text);
+        let told = service.post(&format!("{api}/unblind"), &json!({"reason": "a test"})).await.json();
+        let expected = [1, 2].map(|place| match told["walks"][place]["condition"].as_str() {
+            Some("gait_one") => one.clone(),
+            Some("gait_two") => two.clone(),
+            other => panic!("{other:?}"),
+        });
+        assert!(sent == expected, "the order is {}", told["walks"]);
+        orders.insert(sent[0] == one);
+        if orders.len() == 2 {
+            break;
+        }
+    }
+    assert_eq!(orders.len(), 2, "one order alone was tried");
     service.stop().await;
 }
 

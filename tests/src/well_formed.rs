@@ -1,0 +1,41 @@
+//! An analytic solver whose gaits have every part of a gait: a controller file can be made of them.
+
+use crate::analytic::Analytic;
+use gait_optimizer::gait::ContactRowName;
+use gait_optimizer::walking::{BEZIER_COEFFICIENTS, CYCLE};
+use gait_optimizer::{CancelToken, Gait, IterationRecord, SolveOutcome};
+use gaitwright::workers::{Assignment, Evaluate};
+
+/// The analytic solver with well-formed gaits, each with curves of its own.
+#[derive(Debug, Default)]
+pub struct WellFormed(pub Analytic);
+
+impl Evaluate for WellFormed {
+    fn evaluate(
+        &self,
+        assignment: &Assignment,
+        observer: &mut dyn FnMut(&IterationRecord),
+        cancel: &CancelToken,
+    ) -> Result<SolveOutcome, String> {
+        let mut outcome = self.0.evaluate(assignment, observer, cancel)?;
+        complete(&mut outcome.gait, assignment.number);
+        outcome.gait.validate().map_err(|e| e.to_string())?;
+        Ok(outcome)
+    }
+}
+
+/// Gives each domain the contacts, curves and times that it must have; the number is in every curve.
+fn complete(gait: &mut Gait, number: u32) {
+    for (trajectory, domain) in gait.domains.iter_mut().zip(CYCLE) {
+        let points = trajectory.q.len();
+        let rows = domain.contact_rows();
+        trajectory.contact_rows =
+            rows.iter().map(|row| ContactRowName { point: row.point, side: row.side, axis: row.axis }).collect();
+        trajectory.contact_forces = vec![vec![100.0; rows.len()]; points];
+        trajectory.outputs = domain.outputs();
+        trajectory.bezier = vec![vec![f64::from(number) * 1e-3; BEZIER_COEFFICIENTS]; trajectory.outputs.len()];
+        trajectory.impulse = domain.opens_with_impact().then(|| vec![0.0; rows.len()]);
+    }
+    gait.stride_time_s = gait.domains.iter().map(|domain| domain.duration_s).sum();
+    gait.speed_m_s = gait.stride_length_m / gait.stride_time_s;
+}
