@@ -153,6 +153,20 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
         let path = format!("{api}/users/{}/{act}", text(&user["id"]));
         scene.one(done, &format!("post /users/{{id}}/{act}"), &path, json!({})).await;
     }
+    let of_finished = format!("{api}/studies/{finished}");
+    let ada = json!({"kind": "user", "name": "Ada"});
+    let member = scene.one(done, "post /studies/{id}/members", &format!("{of_finished}/members"), ada).await;
+    let remove = format!("{api}/study-members/{}/remove", text(&member["id"]));
+    scene.one(done, "post /study-members/{id}/remove", &remove, json!({})).await;
+    let restricted = json!({"restricted": true});
+    scene.one(done, "post /studies/{id}/access", &format!("{of_finished}/access"), restricted).await;
+    // An invitation does three things, and each has its row.
+    let invited = service.post(&format!("{of_finished}/invitations"), &json!({"name": "R7"})).await;
+    assert!(invited.status.is_success(), "{}", invited.text);
+    let newest = audit::page(&mut service.store.read().await.unwrap(), "", None, 3).await.unwrap();
+    let acts: Vec<_> = newest.iter().map(|row| row.action.as_str()).collect();
+    assert_eq!(acts, ["study.member_add", "user.link", "user.add"]);
+    done.insert("post /studies/{id}/invitations".to_owned());
     let token =
         scene.one(done, "post /tokens", &format!("{api}/tokens"), json!({"name": "t", "scopes": ["read"]})).await;
     let revoke = format!("{api}/tokens/{}/revoke", text(&token["id"]));

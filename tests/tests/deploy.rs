@@ -7,7 +7,7 @@ use gaitwright_tests::{cli, client};
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 const CONTAINER: &str = include_str!("../../server/deploy/Containerfile");
@@ -157,8 +157,14 @@ fn systemd_finds_no_fault_in_the_unit() {
         skipped("there is no systemd-analyze on this machine");
         return;
     };
-    let text = String::from_utf8_lossy(&output.stderr);
     // Of other units of the machine it may complain.
-    let ours: Vec<_> = text.lines().filter(|line| line.contains("gaitwright.service")).collect();
-    assert!(ours.is_empty(), "{ours:?}");
+    let ours = |output: &Output| {
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        text.lines().filter(|line| line.contains("gaitwright.service")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(ours(&output).is_empty(), "{:?}", ours(&output));
+    // It finds faults here: one that cannot start at all would say nothing of our unit either.
+    std::fs::write(&unit, UNIT.replace("/usr/local/bin/gaitwright", "bin/gaitwright")).unwrap();
+    let faulty = Command::new("systemd-analyze").args(["verify", "--man=no"]).arg(&unit).output().unwrap();
+    assert!(!ours(&faulty).is_empty(), "{}", String::from_utf8_lossy(&faulty.stderr));
 }

@@ -14,6 +14,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::explained::{Clearance, with_few_gaits, without_gaits};
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -243,7 +244,7 @@ async fn what_cannot_be_explained_is_said_and_not_tried_again() {
 #[tokio::test]
 async fn the_real_explanation_is_that_of_the_command_line() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        println!("skipped: set GAITWRIGHT_LONG_TESTS=1");
+        skipped("set GAITWRIGHT_LONG_TESTS=1");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

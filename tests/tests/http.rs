@@ -333,6 +333,14 @@ async fn a_trial_is_cancelled_and_run_again() {
     let again = service.post(&format!("/api/v1/trials/{trial}/cancel"), &json!({})).await;
     is_problem(&again, StatusCode::CONFLICT, "/problems/conflict", "cancelled");
     assert!(service.feedback(study).await.is_empty(), "the learner does not hear of it");
+
+    let more = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"trial_budget": 2})).await;
+    assert_eq!(more.status, StatusCode::OK, "{}", more.text);
+    let retried = service.post(&format!("/api/v1/trials/{trial}/retry"), &json!({})).await;
+    assert_eq!(retried.status, StatusCode::OK, "{}", retried.text);
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let states: Vec<_> = service.trials(study).await.iter().map(|trial| (trial.id, trial.state.is_result())).collect();
+    assert!(states.contains(&(trial, true)), "it was not run again: {states:?}");
     service.stop().await;
 }
 

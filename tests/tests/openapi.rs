@@ -109,14 +109,14 @@ impl Description {
             return self.fits(&named, value, &format!("{place}: {name}"));
         }
         if let Some(parts) = schema["oneOf"].as_array() {
-            // Either nothing or the rest: which of the rest, the present descriptions leave no doubt about.
+            // Either nothing or one other shape: of several it would not be known which one is meant.
             let null = |part: &&Value| part["type"] == "null";
             if value.is_null() {
                 assert!(parts.iter().any(|part| null(&part)), "{place} is null");
                 return;
             }
             let rest: Vec<&Value> = parts.iter().filter(|part| !null(part)).collect();
-            let [one] = rest[..] else { return };
+            let [one] = rest[..] else { panic!("{place} can have several shapes: {rest:?}") };
             return self.fits(one, value, place);
         }
         let kinds: Vec<&str> = match &schema["type"] {

@@ -46,6 +46,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
+    assert_eq!(trials.len(), 2);
     assert!(trials.iter().all(|trial| trial.state == TrialState::NotConverged));
     assert_eq!(ranked(&service, study).await, []);
     let api = format!("/api/v1/studies/{study}");
@@ -57,6 +58,7 @@ async fn a_study_without_a_gait_has_no_best_trial() {
     assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
     let table = service.fetch(&format!("{api}/trials.csv")).await.text;
     let column = table.lines().next().unwrap().split(',').position(|name| name == "gait_rmse_rad").unwrap();
+    assert_eq!(table.lines().count(), 1 + trials.len(), "{table}");
     assert!(table.lines().skip(1).all(|line| line.split(',').nth(column) == Some("")), "{table}");
     let rmse = format!("{:.4}", trials[0].report.as_ref().unwrap().gait_rmse_rad);
     for page in [format!("/studies/{study}?sort=gait_rmse_rad"), format!("/trials/{}", trials[0].id), "/".to_owned()] {

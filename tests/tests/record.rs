@@ -146,20 +146,28 @@ async fn evidence_is_append_only_even_for_other_programs() {
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
     let pool = intruder(&folder.path().join("a.db")).await;
-    for sql in [
-        "update feedback set author = 'x'",
-        "delete from feedback",
-        "update audit set actor = 'x'",
-        "delete from audit",
-        "update events set kind = 'x'",
-        "delete from events",
-        "update gaits set speed_m_s = 0",
-        "delete from trials",
-        "update trials set gait_rmse_rad = 0.001",
-        "update trials set action_index = 0",
+    // One without a result: the result of any other trial is fixed before its proposal is looked at.
+    let cancelled = "insert into trials (id, study_id, number, action_index, action, reason, state, created_at, \
+                     finished_at) select 'X', study_id, 99, 1, action, reason, 'cancelled', created_at, created_at \
+                     from trials limit 1";
+    sqlx::query(cancelled).execute(&pool).await.unwrap();
+    // The reason matters: a statement that is wrong by itself would be refused, too.
+    for (sql, reason) in [
+        ("update feedback set author = 'x'", "feedback is append-only"),
+        ("delete from feedback", "feedback is append-only"),
+        ("update audit set actor = 'x'", "the audit trail is append-only"),
+        ("delete from audit", "the audit trail is append-only"),
+        ("update events set kind = 'x'", "events are append-only"),
+        ("delete from events", "events are append-only"),
+        ("update gaits set speed_m_s = 0", "gaits are append-only"),
+        ("delete from trials", "trials are never deleted"),
+        ("update trials set gait_rmse_rad = 0.001", "the result of a trial is fixed"),
+        ("update trials set action_index = 0 where id = 'X'", "the proposal of a trial is fixed"),
     ] {
-        let refused = sqlx::query(sql).execute(&pool).await;
-        assert!(refused.is_err(), "{sql} was allowed");
+        match sqlx::query(sql).execute(&pool).await {
+            Err(sqlx::Error::Database(refused)) => assert_eq!(refused.message(), reason, "{sql}"),
+            other => panic!("{sql}: {other:?}"),
+        }
     }
 }
 

@@ -73,6 +73,7 @@ async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
     let labels = feedback.iter().filter(|row| matches!(row.said, Said::Label { .. })).count();
     assert_eq!(labels, 15);
     let mut last: Option<&Trial> = None;
+    let mut compared = 0;
     for trial in &trials {
         let answers: Vec<_> = feedback
             .iter()
@@ -88,6 +89,7 @@ async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
         match (trial.state, last) {
             (TrialState::Converged, Some(before)) => {
                 assert_eq!(answers.len(), 1, "trial {}", trial.number);
+                compared += 1;
                 let better = if trial.gait_rmse_rad < before.gait_rmse_rad { trial.id } else { before.id };
                 assert!(matches!(answers[0].said, Said::Preference { winner, .. } if winner == better));
             }
@@ -97,7 +99,9 @@ async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
             last = Some(trial);
         }
     }
+    assert!(compared > 5, "{compared}");
     // Whoever starts warm starts from a converged gait.
+    assert!(trials.iter().filter(|trial| trial.warm_started_from.is_some()).count() > 5, "{trials:?}");
     for trial in &trials {
         if let Some(from) = trial.warm_started_from {
             assert!(trials.iter().any(|t| t.id == from && t.state == TrialState::Converged));
