@@ -149,9 +149,9 @@ pub(super) async fn get(
     }
     if choice.a.is_some() && choice.a == choice.b {
         let refused = "Gait A and gait B were the same: choose two different ones.".to_owned();
-        return show(&mut app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused)).await;
+        return Box::pin(show(&mut app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused))).await;
     }
-    show(&mut app, id, choice, typed, None).await
+    Box::pin(show(&mut app, id, choice, typed, None)).await
 }
 
 async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
@@ -380,7 +380,7 @@ pub(super) async fn post(
         Err(other) => return Err(other.into()),
     };
     let choice = Choice { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
-    Ok((status, show(&mut app, id, choice, form, Some(why)).await?).into_response())
+    Ok((status, Box::pin(show(&mut app, id, choice, form, Some(why))).await?).into_response())
 }
 
 async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
