@@ -4,9 +4,10 @@
 //! And [`Store::compute`](crate::store::Store::compute) borrows the store exclusively, while every connection borrows it
 //! shared: the compiler refuses to compute while a connection is held.
 
+use crate::workers::stand_back::{COMPUTING, STACK_BYTES, stand_back};
 use std::sync::Arc;
 use thiserror::Error;
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, oneshot};
 
 /// Proof that the caller runs on a thread of a [`Pool`]: nothing else makes one.
 #[derive(Debug)]
@@ -16,8 +17,11 @@ pub struct OnPool(());
 #[derive(Debug, Error)]
 pub enum ComputeError {
     /// It panicked.
-    #[error("a computation failed: {0}")]
-    Failed(String),
+    #[error("a computation panicked")]
+    Panicked,
+    /// There is no thread to be had.
+    #[error("no thread for a computation: {0}")]
+    NoThread(#[from] std::io::Error),
     /// The service is shutting down.
     #[error("a computation was not begun: the service is shutting down")]
     Closed,
@@ -25,19 +29,23 @@ pub enum ComputeError {
 
 /// Runs at most so many long computations at a time; others wait without holding a thread.
 #[derive(Debug, Clone)]
-pub struct Pool(Arc<Semaphore>);
+pub struct Pool {
+    places: Arc<Semaphore>,
+    stands_back: bool,
+}
 
 impl Default for Pool {
-    /// One computation for each core, and two at least.
+    /// One computation for each core, and two at least; they give way to the threads that answer.
     fn default() -> Self {
-        Self::new(std::thread::available_parallelism().map_or(2, |cores| cores.get().max(2)))
+        let size = std::thread::available_parallelism().map_or(2, |cores| cores.get().max(2));
+        Self { stands_back: true, ..Self::new(size) }
     }
 }
 
 impl Pool {
     /// A pool of so many threads; at least one.
     pub fn new(size: usize) -> Self {
-        Self(Arc::new(Semaphore::new(size.max(1))))
+        Self { places: Arc::new(Semaphore::new(size.max(1))), stands_back: false }
     }
 
     /// Computes when a thread is free. Work that began goes on when the caller goes away, and keeps its place until it ends.
@@ -48,15 +56,19 @@ impl Pool {
         &self,
         work: impl FnOnce(&OnPool) -> T + Send + 'static,
     ) -> Result<T, ComputeError> {
-        let place = Arc::clone(&self.0).acquire_owned().await.map_err(|_| ComputeError::Closed)?;
+        let place = Arc::clone(&self.places).acquire_owned().await.map_err(|_| ComputeError::Closed)?;
+        let (tell, told) = oneshot::channel();
+        let stands_back = self.stands_back;
         let work = move || {
             let _place = place;
-            work(&OnPool(()))
+            if stands_back {
+                stand_back(COMPUTING);
+            }
+            // Nobody listens any more where the caller went away.
+            let _ = tell.send(work(&OnPool(())));
         };
-        // The one way to the threads that may block.
-        #[allow(clippy::disallowed_methods)]
-        let done = tokio::task::spawn_blocking(work);
-        done.await.map_err(|error| ComputeError::Failed(error.to_string()))
+        std::thread::Builder::new().name("compute".to_owned()).stack_size(STACK_BYTES).spawn(work)?;
+        told.await.map_err(|_| ComputeError::Panicked)
     }
 }
 
@@ -90,7 +102,7 @@ mod tests {
     #[tokio::test]
     async fn a_panic_is_an_error_and_gives_its_thread_back() {
         let pool = Pool::new(1);
-        assert!(matches!(pool.run(|_| panic!("as asked")).await, Err::<(), _>(ComputeError::Failed(_))));
+        assert!(matches!(pool.run(|_| panic!("as asked")).await, Err::<(), _>(ComputeError::Panicked)));
         assert_eq!(pool.run(|_| 1).await.unwrap(), 1);
     }
 }

@@ -107,6 +107,12 @@ pub enum Error {
     /// What a command has to say cannot be written.
     #[error("cannot write to stdout: {0}")]
     Output(std::io::Error),
+    /// The disk has no room for it.
+    #[error("{0}")]
+    StorageFull(String),
+    /// The service cannot do its work now.
+    #[error("{0}")]
+    NotReady(String),
     /// A fault of the program.
     #[error("internal: {0}")]
     Internal(String),
@@ -123,9 +129,22 @@ impl Error {
         Self::Invalid(Box::new(FieldError::new(field, value, allowed)))
     }
 
+    /// Whether record, disk or broker are at fault: what was tried may be tried again.
+    pub fn is_of_machine(&self) -> bool {
+        matches!(self, Self::Store(_) | Self::Dispatch(_) | Self::StorageFull(_) | Self::NotReady(_))
+    }
+
     /// Whether the request is at fault, and not the program or the machine.
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Store(_) | Self::Dispatch(_) | Self::Output(_) | Self::Internal(_))
+        !matches!(
+            self,
+            Self::Store(_)
+                | Self::Dispatch(_)
+                | Self::Output(_)
+                | Self::Internal(_)
+                | Self::StorageFull(_)
+                | Self::NotReady(_)
+        )
     }
 }
 
@@ -134,6 +153,13 @@ impl From<StoreError> for Error {
         match error {
             StoreError::Missing { what, id } => Self::NotFound { what: what.to_owned(), id },
             withdrawn if withdrawn.is_withdrawal() => Self::Conflict(StoreError::Withdrawn.to_string()),
+            full if full.is_full() => Self::StorageFull(match full {
+                StoreError::NearlyFull { .. } => full.to_string(),
+                _ => "the disk of the record is full: the change did not happen; make room and try again".to_owned(),
+            }),
+            closed if closed.is_unwritable() => {
+                Self::NotReady(format!("the record takes no changes, and this one did not happen: {closed}"))
+            }
             other => Self::Store(other),
         }
     }

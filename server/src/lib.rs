@@ -19,4 +19,5 @@ pub mod plots;
 mod printable;
 pub mod store;
 pub mod studies;
+pub mod supervise;
 pub mod workers;

@@ -77,6 +77,24 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     pool.close().await;
 }
 
+/// Adds so many answers of a person to a study with two trials.
+pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
+    let options = SqliteConnectOptions::new().filename(database).foreign_keys(true);
+    let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
+    sqlx::query(
+        "with recursive n(i) as (select 1 union all select i + 1 from n where i < ?1)
+         insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
+         select printf('01890003-0000-7000-8000-%012d', i), a.study_id, 'preference', a.id, b.id, 'clinician', 'x', a.created_at
+         from n join trials a on a.study_id = ?2 and a.number = 1 join trials b on b.study_id = ?2 and b.number = 2",
+    )
+    .bind(answers)
+    .bind(study.to_string())
+    .execute(&pool)
+    .await
+    .unwrap();
+    pool.close().await;
+}
+
 /// Each page and list, with the fastest of three answers.
 pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(String, Duration)> {
     let api = format!("/api/v1/studies/{study}");

@@ -52,7 +52,7 @@ impl Closed {
         let gaits: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let (a, b) = (gaits[0].id, gaits[1].id);
         let api = format!("/api/v1/studies/{study}");
-        let remark = json!({"first": a, "second": b, "answer": "cannot_tell"});
+        let remark = json!({"first": a, "second": gaits[2].id, "answer": "cannot_tell"});
         let remark = post(&service, &admin, &format!("{api}/remarks"), &remark).await;
         let pair = json!({"trial_a": a, "trial_b": b, "answer": "a"});
         let preference = post(&service, &admin, &format!("{api}/preferences"), &pair).await;
@@ -226,7 +226,8 @@ async fn lists_show_a_restricted_study_to_its_members_alone() {
     }
     member(service, closed.study, MemberKind::User, "a clinician").await;
     let mut to_member = shown(&outsiders[0].0).await;
-    to_member.push("/api/v1/audit".to_owned());
+    // For administrators alone.
+    to_member.extend(["/api/v1/audit", "/api/v1/access-log"].map(str::to_owned));
     to_member.sort();
     let mut everywhere = everywhere;
     everywhere.sort();

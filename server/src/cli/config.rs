@@ -44,6 +44,7 @@ const KNOWN: &[(&str, &str, &str)] = &[
     ("connections", "1000", "most connections at the same time, as far as there are descriptors"),
     ("connections_per_address", "100", "most connections of one address; trusted proxies have no such limit"),
     ("access_log_days", "0", "rows of the access log that are older are dropped; 0: all are kept"),
+    ("reserve_mb", "500", "free space in MB below which no study or solve is begun, so that answers still fit"),
     ("log", "warn,gaitwright=info", "what is logged, as RUST_LOG"),
     ("log_format", "text", "text or json"),
 ];
@@ -232,6 +233,15 @@ impl Settings {
             if (1..=60_000).contains(&number) { Ok(number) } else { Err(self.refused(name, allowed)) }
         };
         Ok(Limits { total: number("connections")?, per_address: number("connections_per_address")? })
+    }
+
+    /// Free space that is kept in reserve.
+    pub(super) fn reserve_bytes(&self) -> Result<u64, Error> {
+        const ALLOWED: &str = "0 to 1000000";
+        match self.parsed::<u64>("reserve_mb", ALLOWED)? {
+            mb @ 0..=1_000_000 => Ok(mb << 20),
+            _ => Err(self.refused("reserve_mb", ALLOWED)),
+        }
     }
 
     /// Certificate and key, both or neither.

@@ -54,6 +54,7 @@ impl Serve {
         let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
         let access_log_days = settings.access_log_days()?;
         // What can be refused is refused before a file is made.
+        let reserve = settings.reserve_bytes()?;
         let tls = match tls {
             Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
             None => None,
@@ -63,6 +64,7 @@ impl Serve {
         listener.set_nonblocking(true).map_err(cannot_listen)?;
         let address = listener.local_addr().map_err(cannot_listen)?;
         let store = Store::open(&database).await?;
+        store.set_reserve(reserve);
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         commit(writer).await?;

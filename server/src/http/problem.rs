@@ -81,6 +81,8 @@ impl From<&Error> for Problem {
             Error::Forbidden(_) => Self::new(Kind::Forbidden, detail),
             Error::Conflict(_) => Self::new(Kind::Conflict, detail),
             Error::Learner(_) => Self::new(Kind::Learner, detail),
+            Error::StorageFull(_) => Self::new(Kind::StorageFull, detail),
+            Error::NotReady(_) => Self::new(Kind::NotReady, detail),
             Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => {
                 Self::new(Kind::Internal, "the failure was logged; nothing was changed".to_owned())
             }

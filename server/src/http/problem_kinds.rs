@@ -33,6 +33,10 @@ pub(super) enum Kind {
     Internal,
     /// 503, too slow.
     TimedOut,
+    /// 503, not now.
+    NotReady,
+    /// 507.
+    StorageFull,
 }
 
 /// What is known of a kind.
@@ -62,7 +66,7 @@ const fn entry(
 
 impl Kind {
     /// Every kind, by status.
-    pub(super) const ALL: [Self; 14] = [
+    pub(super) const ALL: [Self; 16] = [
         Self::Malformed,
         Self::NotSignedIn,
         Self::Forbidden,
@@ -77,6 +81,8 @@ impl Kind {
         Self::TooManyAttempts,
         Self::Internal,
         Self::TimedOut,
+        Self::NotReady,
+        Self::StorageFull,
     ];
 
     /// What is known of it.
@@ -182,6 +188,22 @@ impl Kind {
                 "The answer took too long",
                 "The service gave the request up. A change that it asked for may have happened.",
                 "Look at the present state, then try again; with the same Idempotency-Key a change happens once.",
+            ),
+            Self::NotReady => entry(
+                "/problems/not-ready",
+                StatusCode::SERVICE_UNAVAILABLE,
+                "The service is not ready",
+                "The record takes no changes, a task of the service is down, or the service is stopping. Nothing was \
+                 changed.",
+                "The detail has the reason. Tell whoever runs the service, and try again later.",
+            ),
+            Self::StorageFull => entry(
+                "/problems/storage-full",
+                StatusCode::INSUFFICIENT_STORAGE,
+                "The disk is full",
+                "The disk of the record has no room for the change, or too little for what it would begin. Nothing was \
+                 changed.",
+                "Make room on the disk and send the request again. The service goes on by itself.",
             ),
         }
     }

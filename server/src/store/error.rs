@@ -82,6 +82,16 @@ pub enum StoreError {
     /// A change could not be written to the disk; it did not happen.
     #[error("database: the change could not be made durable: {0}")]
     NotDurable(String),
+    /// So little space is left that nothing large is begun.
+    #[error(
+        "the disk is nearly full: {free_mb} MB are free, {reserve_mb} MB are kept in reserve; make room and try again"
+    )]
+    NearlyFull {
+        /// What is free.
+        free_mb: u64,
+        /// What is kept.
+        reserve_mb: u64,
+    },
     /// Anything else the database reports.
     #[error("database: {0}")]
     Database(#[from] sqlx::Error),
@@ -93,6 +103,27 @@ impl StoreError {
         match self {
             Self::Withdrawn => true,
             Self::Database(sqlx::Error::Database(found)) => found.message() == "the subject withdrew consent",
+            _ => false,
+        }
+    }
+
+    /// Whether the disk has no room for a change.
+    pub fn is_full(&self) -> bool {
+        let says_so = |text: &str| text.contains("database or disk is full");
+        match self {
+            Self::NearlyFull { .. } => true,
+            Self::NotDurable(reason) => says_so(reason),
+            Self::Database(sqlx::Error::Database(found)) => says_so(found.message()),
+            _ => false,
+        }
+    }
+
+    /// Whether the record takes no changes now, for a reason of the machine.
+    pub fn is_unwritable(&self) -> bool {
+        let says_so = |text: &str| ["disk I/O error", "readonly database"].iter().any(|words| text.contains(words));
+        match self {
+            Self::NotDurable(_) | Self::Closed => true,
+            Self::Database(sqlx::Error::Database(found)) => says_so(found.message()),
             _ => false,
         }
     }

@@ -335,6 +335,15 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<LogVers
     Ok(LogVersion { last: row.try_get("last")?, retracted: row.try_get("retracted")? })
 }
 
+/// How many rows of feedback a study has.
+///
+/// # Errors
+/// What the database reports.
+pub async fn count(db: &mut Connection, study: StudyId) -> StoreResult<u32> {
+    let row = sqlx::query("select count(*) from feedback where study_id = ?").bind(study).fetch_one(db).await?;
+    Ok(row.try_get(0)?)
+}
+
 /// The converged trial of a study that was recorded last, before the trial `except`.
 ///
 /// # Errors

@@ -38,6 +38,7 @@ pub mod safety_reviews;
 pub mod schema;
 pub mod seals;
 pub mod sessions;
+mod space;
 pub mod studies;
 pub mod subjects;
 mod time;
@@ -54,6 +55,7 @@ pub use id::{
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use migrations::FORM;
+pub use space::DEFAULT_RESERVE_BYTES;
 pub use time::{Instant, now};
 pub use writing::Writer;
 
@@ -66,6 +68,11 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::Mutex;
 use writing::Writing;
+
+/// Whether the record takes changes is tried at most so often.
+const PROBED_AGAIN: Duration = Duration::from_secs(1);
+/// A change that takes longer is as good as none.
+const SLOWEST_PROBE: Duration = Duration::from_secs(5);
 
 /// The open record. It lends connections and computing, never both at once.
 ///
@@ -98,6 +105,8 @@ pub struct Store {
     copying: Arc<Mutex<()>>,
     /// What is computed from what was read.
     pool: Pool,
+    /// When it was last tried whether the record takes changes, and what was found.
+    probed: Arc<Mutex<Option<(std::time::Instant, Result<(), String>)>>>,
     /// Held as long as any clone lives: a second process that opens the file for writing is refused.
     _owner: Arc<File>,
 }
@@ -133,7 +142,7 @@ impl Store {
         migrations::apply(&only, path).await?;
         let mut connection = only.acquire().await?.detach();
         seals::watch(&mut connection).await?;
-        let writing = Arc::new(Writing::new(connection));
+        let writing = Arc::new(Writing::new(connection, space::Space::of(path)));
         let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
         let store = Self {
             readers,
@@ -141,6 +150,7 @@ impl Store {
             path: path.to_owned(),
             copying: Arc::default(),
             pool: Pool::default(),
+            probed: Arc::default(),
             _owner: Arc::new(owner),
         };
         commit(store.write().await?).await?;
@@ -179,6 +189,48 @@ impl Store {
     /// When no transaction can be begun.
     pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
         Ok(Lent::new(self.writing.begin().await?))
+    }
+
+    /// Keeps so many free bytes in reserve: below, nothing large is begun.
+    pub fn set_reserve(&self, bytes: u64) {
+        self.writing.space().set_reserve(bytes);
+    }
+
+    /// Refuses where less is free than is kept in reserve.
+    ///
+    /// # Errors
+    /// [`StoreError::NearlyFull`].
+    pub fn room(&self) -> StoreResult<()> {
+        self.writing.space().room()
+    }
+
+    /// Writes durably, and changes nothing: whether the record takes changes. Asked often, it answers what it found within
+    /// the last second.
+    ///
+    /// # Errors
+    /// Why it takes none.
+    pub async fn probe(&self) -> Result<(), String> {
+        let mut last = self.probed.lock().await;
+        if let Some((at, found)) = &*last
+            && at.elapsed() < PROBED_AGAIN
+        {
+            return found.clone();
+        }
+        let found = match tokio::time::timeout(SLOWEST_PROBE, self.write_nothing()).await {
+            Ok(written) => written.map_err(|error| error.to_string()),
+            Err(_) => Err(format!("no change was possible within {} s", SLOWEST_PROBE.as_secs())),
+        };
+        *last = Some((std::time::Instant::now(), found.clone()));
+        found
+    }
+
+    /// Writes a header field of the file as it is.
+    async fn write_nothing(&self) -> StoreResult<()> {
+        let mut writer = self.write().await?;
+        let row = sqlx::query("pragma user_version").fetch_one(&mut **writer).await?;
+        let version: i64 = sqlx::Row::try_get(&row, 0)?;
+        sqlx::query(sqlx::AssertSqlSafe(format!("pragma user_version = {version}"))).execute(&mut **writer).await?;
+        commit(writer).await
     }
 
     /// The file.

@@ -4,15 +4,21 @@
 //! are ready while the disk is busy are therefore made durable together: each is a savepoint of its own within one
 //! transaction, and each is acknowledged only when that transaction is on the disk.
 
+use super::space::Space;
 use super::{StoreError, StoreResult};
 use sqlx::{Connection as _, SqliteConnection};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 use tokio::sync::{Notify, OwnedMappedMutexGuard, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
+use tokio_util::task::AbortOnDropHandle;
 
 /// The connection; `None`: closed. Whoever waits for it gets it in the order of asking.
 type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
+
+/// Pause before the making durable is begun again.
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// How the disk answered for a group of changes; `None`: not yet.
 type Outcome = Option<Result<(), String>>;
@@ -32,11 +38,12 @@ pub struct Writer {
     shared: Arc<Shared>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Shared {
     state: Mutex<State>,
     /// A change ended: what is there is to be made durable.
     ended: Notify,
+    space: Space,
 }
 
 /// Changes only while the connection is held.
@@ -50,11 +57,16 @@ struct State {
 
 impl Writing {
     /// Over a connection that nobody else writes with.
-    pub(super) fn new(connection: SqliteConnection) -> Self {
+    pub(super) fn new(connection: SqliteConnection, space: Space) -> Self {
         let line = Line::new(Some(connection).into());
-        let shared = Arc::<Shared>::default();
-        let flusher = tokio::spawn(keep_flushing(Arc::clone(&line), Arc::clone(&shared)));
+        let shared = Arc::new(Shared { state: Mutex::default(), ended: Notify::new(), space });
+        let flusher = tokio::spawn(supervise_flushing(Arc::clone(&line), Arc::clone(&shared)));
         Self { line, shared, flusher }
+    }
+
+    /// The disk of the record.
+    pub(super) fn space(&self) -> &Space {
+        &self.shared.space
     }
 
     /// Begins a change when those before it have ended.
@@ -83,6 +95,14 @@ impl Drop for Writing {
 }
 
 impl Writer {
+    /// Refuses where less space is free than is kept in reserve: whoever begins something large asks.
+    ///
+    /// # Errors
+    /// [`StoreError::NearlyFull`].
+    pub fn room(&self) -> StoreResult<()> {
+        self.shared.space.room()
+    }
+
     /// Ends the change and waits until the disk has it.
     pub(super) async fn commit(self) -> StoreResult<()> {
         let ended = tokio::spawn(async move {
@@ -184,6 +204,19 @@ async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
     Ok(Writer { connection, shared })
 }
 
+/// Begins [`keep_flushing`] again where it panicked: every change waits for it.
+async fn supervise_flushing(line: Line, shared: Arc<Shared>) {
+    loop {
+        let flushing = keep_flushing(Arc::clone(&line), Arc::clone(&shared));
+        match AbortOnDropHandle::new(tokio::spawn(flushing)).await {
+            Ok(()) => return,
+            Err(error) => tracing::error!(%error, "making changes durable failed; it is begun again"),
+        }
+        shared.ended.notify_one();
+        tokio::time::sleep(PAUSE).await;
+    }
+}
+
 /// Makes changes durable as they end: those that stand in line by then come first, and into the same transaction.
 async fn keep_flushing(line: Line, shared: Arc<Shared>) {
     loop {
@@ -214,7 +247,7 @@ mod tests {
     async fn table(file: &std::path::Path) -> Writing {
         let mut connection = open(file).await;
         run(&mut connection, "create table t (x integer primary key) strict").await.unwrap();
-        Writing::new(connection)
+        Writing::new(connection, Space::of(file))
     }
 
     async fn insert(writer: &mut Writer, x: i64) -> Result<(), sqlx::Error> {

@@ -19,14 +19,16 @@ use crate::store::jobs::Lease;
 use crate::store::studies::{FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
 use crate::store::{Store, StoreError, StudyId, TrialId, commit, events, gaits, jobs, now, studies, trials};
+use crate::supervise::{Task, Tasks};
 use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
+use futures_util::future::BoxFuture;
 use gait_optimizer::SolveStatus;
 use serde_json::json;
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tokio::sync::{Mutex, Notify, watch};
+use tokio::sync::{Mutex, Notify, OnceCell, watch};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
@@ -64,6 +66,9 @@ struct Inner {
     pulse: watch::Sender<u64>,
     shutdown: CancellationToken,
     tasks: TaskTracker,
+    /// How the tasks of this director are.
+    health: Tasks,
+    leases_taken_back: OnceCell<()>,
 }
 
 impl fmt::Debug for Inner {
@@ -104,6 +109,8 @@ impl Director {
             pulse: watch::channel(0).0,
             shutdown: CancellationToken::new(),
             tasks: TaskTracker::new(),
+            health: Tasks::default(),
+            leases_taken_back: OnceCell::new(),
         }))
     }
 
@@ -178,37 +185,60 @@ impl Director {
     /// Works until told to stop. Solves that run in this process then are given back to the queue.
     ///
     /// # Errors
-    /// What the database reports at start and end; errors between them are logged and tried again.
+    /// What the database reports at the end; a task that fails before is begun again, and [`Self::trouble`] says so.
     pub async fn run(&self) -> Result<(), Error> {
-        self.take_back_leases().await?;
-        let stopped = self.0.shutdown.cancelled();
-        tokio::select! {
-            () = stopped => {}
-            () = self.keep_planning() => {}
-            () = self.keep_listening() => {}
-            () = self.keep_rehearsing() => {}
-            () = self.keep_looking_back() => {}
-        }
+        let keep = |name, begin: fn(Self, Task) -> BoxFuture<'static, Result<(), Error>>| {
+            let director = self.clone();
+            async move {
+                let begin = |task| begin(director.clone(), task);
+                director.0.health.keep(name, &director.0.shutdown, begin).await;
+            }
+        };
+        tokio::join!(
+            keep("planning", |director, task| Box::pin(async move { director.keep_planning(&task).await })),
+            keep("listening to workers", |director, task| Box::pin(
+                async move { director.keep_listening(&task).await }
+            )),
+            keep("preparing what comes next", |director, task| {
+                Box::pin(async move { director.keep_rehearsing(&task).await })
+            }),
+            keep("examining gaits", |director, task| Box::pin(async move { director.keep_examining(&task).await })),
+            keep("explaining trials", |director, task| Box::pin(async move { director.keep_explaining(&task).await })),
+        );
         self.0.tasks.close();
         self.0.tasks.wait().await;
         self.withdraw(self.0.rehearsals.forget_running()).await;
         self.take_back_leases().await
     }
 
-    /// Looks into what solves gave, for ever.
-    async fn keep_looking_back(&self) {
-        let Some((examiner, explainer)) = &self.0.after_solves else { return std::future::pending().await };
-        let changed = || self.changed();
-        let examining = examiner.run(self.pulse(), changed, |study| explainer.take_up(study));
-        tokio::join!(examining, explainer.run(self.pulse(), changed));
+    /// Why studies do not go on as they should, in words; none: they do.
+    pub fn trouble(&self) -> Option<String> {
+        self.0.health.trouble().or_else(|| self.0.engine.trouble())
     }
 
-    async fn keep_planning(&self) {
+    /// Examines what solves gave, for ever.
+    async fn keep_examining(&self, task: &Task) -> Result<(), Error> {
+        let Some((examiner, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        examiner.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
+        Ok(())
+    }
+
+    /// Explains what solves did not give, for ever.
+    async fn keep_explaining(&self, task: &Task) -> Result<(), Error> {
+        let Some((_, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        explainer.run(self.pulse(), || self.changed()).await;
+        Ok(())
+    }
+
+    async fn keep_planning(&self, task: &Task) -> Result<(), Error> {
+        // Once: what is leased after that runs.
+        self.0.leases_taken_back.get_or_try_init(|| self.take_back_leases()).await?;
         let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
         loop {
-            if let Err(error) = self.plan_and_dispatch().await {
-                tracing::error!(%error, "planning failed; trying again");
-            }
+            self.plan_and_dispatch().await?;
+            task.works();
             // Nothing new for so long, or something new; what comes close together is planned with once.
             let _ = tokio::time::timeout(pause, self.0.wake.notified()).await;
             tokio::time::sleep(TOGETHER).await;
@@ -244,7 +274,9 @@ impl Director {
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
             match self.plan(study.clone()).await {
                 Ok(standing) => waiting.extend(standing),
-                Err(error) => tracing::error!(study = %study.id, %error, "cannot plan a study"),
+                Err(error) if error.is_of_machine() => return Err(error),
+                // It would fail again: somebody has to see it.
+                Err(error) => self.hold(&study, &error).await?,
             }
         }
         self.dispatch().await?;
@@ -310,6 +342,12 @@ impl Director {
         }
     }
 
+    /// Pauses a study that cannot be planned, with the reason.
+    async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
+        tracing::error!(study = %study.id, %error, "cannot plan a study; it is paused");
+        self.act(study, Act::Pause, &format!("it cannot be planned: {error}")).await.map(drop)
+    }
+
     async fn act(&self, study: &Study, act: Act, reason: &str) -> Result<Option<Study>, Error> {
         let state = lifecycle::after(study.state, act)?;
         let mut writer = self.0.store.write().await?;
@@ -328,6 +366,10 @@ impl Director {
     async fn propose(&self, standing: &Standing, new: &NewTrial) -> Result<bool, Error> {
         let study = standing.study.id;
         let mut writer = self.0.store.write().await?;
+        if let Err(shortage) = writer.room() {
+            tracing::warn!(%study, %shortage, "no trial is planned");
+            return Ok(false);
+        }
         let current = studies::get(&mut writer, study).await?;
         if current.state != StudyState::Running || !standing.is_current(&mut writer).await? {
             self.0.wake.notify_one();
@@ -399,7 +441,8 @@ impl Director {
     }
 
     /// Runs what studies will need next, whatever the answers that they wait for, where no worker is needed for others.
-    async fn keep_rehearsing(&self) {
+    async fn keep_rehearsing(&self, task: &Task) -> Result<(), Error> {
+        task.works();
         let mut waiting = self.0.waiting.subscribe();
         let mut likely = LikelyNext::default();
         // The sender lives as long as this director.
@@ -412,6 +455,7 @@ impl Director {
                 }
             }
         }
+        Ok(())
     }
 
     async fn rehearse(&self, likely: &mut LikelyNext, standing: &Standing) -> Result<(), Error> {
@@ -449,7 +493,8 @@ impl Director {
     }
 
     /// Hears what comes of the jobs.
-    async fn keep_listening(&self) {
+    async fn keep_listening(&self, task: &Task) -> Result<(), Error> {
+        task.works();
         let mut written: HashMap<TrialId, Instant> = HashMap::new();
         loop {
             let news = match self.0.rehearsals.hear(self.0.engine.next().await) {
@@ -488,9 +533,7 @@ impl Director {
                     Ok(())
                 }
             };
-            if let Err(error) = heard {
-                tracing::error!(%error, "cannot write down that a worker lives");
-            }
+            heard?;
         }
     }
 

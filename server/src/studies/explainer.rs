@@ -92,7 +92,7 @@ impl Explainer {
         self.state().running = None;
         match explained {
             Ok(()) => {}
-            Err(error @ (Error::Store(_) | Error::Dispatch(_))) => return Err(error),
+            Err(error) if error.is_of_machine() => return Err(error),
             Err(error) => self.refuse(trial, &error).await?,
         }
         Ok(true)

@@ -175,6 +175,7 @@ pub(super) async fn create_from(
     new: NewStudy,
     forked_from: Option<StudyId>,
 ) -> Result<Study, Error> {
+    writer.room()?;
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
     // A fork has the very set-up of its parent.
     let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };

@@ -3,15 +3,17 @@
 use std::io;
 use tokio::sync::oneshot;
 
+/// Of threads that compute what somebody waits for: they give way to those that answer.
+pub(crate) const COMPUTING: i32 = 5;
 /// Of threads that solve: they give way to whoever waits for an answer.
 pub(super) const SOLVER: i32 = 10;
 /// Of threads that look into what was solved: they give way to every solve, too.
 const AFTERWARDS: i32 = 19;
 /// Stack of threads that solve: block factorisations recurse deeper than the default leaves room for.
-pub(super) const STACK_BYTES: usize = 16 << 20;
+pub(crate) const STACK_BYTES: usize = 16 << 20;
 
 /// Lowers the priority of this thread alone; where that is not possible it stays as it is.
-pub(super) fn stand_back(niceness: i32) {
+pub(crate) fn stand_back(niceness: i32) {
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::setpriority_process(None, niceness) {
         tracing::debug!(%error, niceness, "a thread keeps its priority");

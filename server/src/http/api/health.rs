@@ -5,8 +5,6 @@ use crate::http::AppState;
 use crate::store::jobs;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
-use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -41,15 +39,19 @@ pub async fn get(State(app): State<AppState>) -> Result<Json<Health>, Error> {
     Ok(Json(Health { status: "ready", version, workers: app.director.workers(), jobs_queued, jobs_running }))
 }
 
-/// `GET /ready`: 200 when the service takes writes, 503 when it is shutting down or the record cannot be written.
+/// `GET /ready`: 200 when the service does its work and takes changes, otherwise 503 with the reason.
 ///
 /// # Errors
-/// When the record cannot be written.
-pub async fn ready(State(app): State<AppState>) -> Result<Response, Error> {
+/// [`Error::NotReady`] with the reason, [`Error::StorageFull`] when the disk is full.
+pub async fn ready(State(app): State<AppState>) -> Result<String, Error> {
     if app.director.stopping().is_cancelled() {
-        return Ok((StatusCode::SERVICE_UNAVAILABLE, "stopping").into_response());
+        return Err(Error::NotReady("the service is stopping".to_owned()));
     }
-    // Begun and dropped: proves that the one connection that writes is there, and leaves no trace.
-    drop(app.write().await?);
-    Ok("ready".into_response())
+    let not_writable = |reason: String| Error::NotReady(format!("the record takes no changes: {reason}"));
+    app.store().probe().await.map_err(not_writable)?;
+    if let Some(trouble) = app.director.trouble() {
+        return Err(Error::NotReady(trouble));
+    }
+    // Answers still fit: what is large is refused, with the same words.
+    Ok(app.store().room().map_or_else(|shortage| format!("ready; {shortage}"), |()| "ready".to_owned()))
 }

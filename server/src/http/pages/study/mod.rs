@@ -19,7 +19,7 @@ use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, Tree};
 use crate::store::devices::{self, Device};
-use crate::store::feedback::{FeedbackRow, Retraction, Said, Source};
+use crate::store::feedback::{self, FeedbackRow, Retraction, Said, Source};
 use crate::store::remarks::{self, Remark};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
@@ -28,7 +28,7 @@ use crate::store::{
     Instant, StudyId, TrialId, commit, consents, events, explanations, gaits, jobs, presentations, reference_gaits,
     studies, trials,
 };
-use crate::studies::belief::Beliefs;
+use crate::studies::belief::{Beliefs, MOST_ANSWERS};
 use crate::studies::change::{self, Extend};
 use crate::studies::choice::{MANY, last_believed, ranking_to_show};
 use crate::studies::comparison::open_question;
@@ -107,6 +107,11 @@ struct Live {
 impl Live {
     fn is_best(&self, row: &TrialRow) -> bool {
         self.best.as_ref().is_some_and(|best| best.id == row.id)
+    }
+
+    /// Not all answers are listed.
+    fn has_more_answers(&self) -> bool {
+        self.answers.len() >= SHOWN as usize
     }
 
     fn is_unsafe(&self, row: &TrialRow) -> bool {
@@ -319,7 +324,9 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
-    let large = counts.total as usize >= MANY;
+    // The learner's time grows with the answers, too.
+    let heard = feedback::count(&mut reader, id).await? as usize;
+    let large = counts.total as usize >= MANY || heard > MOST_ANSWERS;
     let standing = if large {
         Standing::newest(&mut reader, study, SHOWN).await?
     } else {
@@ -351,7 +358,8 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
         .filter(|trial| trial.state == TrialState::Running)
         .map(|trial| running_row(trial, app.director.board().track(trial.id).as_ref()))
         .collect();
-    let answers = answers(&standing, &remarks);
+    let mut answers = answers(&standing, &remarks);
+    answers.truncate(SHOWN as usize);
     let is_queued = standing.trials.iter().any(|trial| trial.state == TrialState::Queued);
     let mut live = view(standing, counts, &figures, running, table, answers, caller.may(Run::NEEDED));
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {

@@ -1,0 +1,50 @@
+//! Free space on the disk of the record. Where it runs short, nothing large is begun, so that answers of people still fit.
+
+use super::{StoreError, StoreResult};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Below so many free bytes nothing large is begun, unless a setting says otherwise.
+pub const DEFAULT_RESERVE_BYTES: u64 = 500 << 20;
+
+/// The disk of the record.
+#[derive(Debug)]
+pub(super) struct Space {
+    folder: PathBuf,
+    reserve: AtomicU64,
+}
+
+impl Space {
+    pub(super) fn of(file: &Path) -> Self {
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Self { folder: folder.to_owned(), reserve: AtomicU64::new(DEFAULT_RESERVE_BYTES) }
+    }
+
+    pub(super) fn set_reserve(&self, bytes: u64) {
+        self.reserve.store(bytes, Ordering::Relaxed);
+    }
+
+    /// Refuses where less is free than is kept in reserve.
+    pub(super) fn room(&self) -> StoreResult<()> {
+        let reserve = self.reserve.load(Ordering::Relaxed);
+        match free_bytes(&self.folder) {
+            Some(free) if free < reserve => {
+                Err(StoreError::NearlyFull { free_mb: free >> 20, reserve_mb: reserve >> 20 })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Free bytes for this process; none: the system does not say.
+#[cfg(target_os = "linux")]
+fn free_bytes(folder: &Path) -> Option<u64> {
+    let found = rustix::fs::statvfs(folder).ok()?;
+    Some(found.f_bavail.saturating_mul(found.f_frsize))
+}
+
+/// Free bytes for this process; none: the system does not say.
+#[cfg(not(target_os = "linux"))]
+fn free_bytes(_: &Path) -> Option<u64> {
+    None
+}
