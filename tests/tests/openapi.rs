@@ -4,7 +4,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use gait_optimizer::Violation;
 use gaitwright::http::openapi;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
@@ -47,8 +48,7 @@ fn every_operation_says_what_it_needs_takes_and_answers() {
                 path.split('/').filter_map(|part| part.strip_prefix('{')?.strip_suffix('}')).collect();
             assert_eq!(named, expected, "{what}");
             if method != "get" {
-                let key = |p: &Value| p["name"] == "Idempotency-Key";
-                assert!(operation["parameters"].as_array().unwrap().iter().any(key), "{what}");
+                assert_ne!(takes_key(operation), operation["x-shown-once"] == true, "{what}");
             }
         }
     }
@@ -59,6 +59,106 @@ fn every_operation_says_what_it_needs_takes_and_answers() {
         let name = reference.split('"').next().unwrap();
         assert!(document["components"]["schemas"][name].is_object(), "{name}");
     }
+}
+
+fn takes_key(operation: &Value) -> bool {
+    operation["parameters"].as_array().into_iter().flatten().any(|p| p["name"] == "Idempotency-Key")
+}
+
+#[tokio::test]
+async fn every_change_sent_twice_with_a_key_happens_once_or_refuses_the_key_as_described() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let draft = service.study(|new| new.start = false).await.to_string();
+    let subject = service.subject().await.to_string();
+    let trials = service.trials(study).await;
+    let (study, trial, other) = (study.to_string(), trials[0].id.to_string(), trials[1].id.to_string());
+    let rater = service.post("/api/v1/users", &json!({"name": "R", "role": "rater"})).await.json();
+    let rater = rater["id"].as_str().unwrap().to_owned();
+    let id_of = |path: &str| match path {
+        path if path.ends_with("/start") => draft.clone(),
+        path if path.contains("/subjects/") => subject.clone(),
+        path if path.contains("/studies/") => study.clone(),
+        path if path.contains("/trials/") => trial.clone(),
+        path if path.contains("/users/") => rater.clone(),
+        _ => "01890000-0000-7000-8000-000000000000".to_owned(),
+    };
+    let body_of = |path: &str| match path.rsplit('/').next().unwrap() {
+        "subjects" => json!({"pseudonym": "S9", "height_m": 1.8, "body_mass_kg": 70}),
+        "consents" => json!({"form": "form 3"}),
+        "corrections" => json!({"height_m": 1.8, "body_mass_kg": 70, "reason": "r"}),
+        "studies" => json!({"subject_id": subject, "start": false}),
+        "extend" => json!({"trial_budget": 7}),
+        "preferences" => json!({"trial_a": trial, "trial_b": other, "answer": "a"}),
+        "remarks" => json!({"first": trial, "second": other, "answer": "cannot_tell"}),
+        "users" => json!({"name": "K", "role": "clinician"}),
+        "tokens" => json!({"name": "t", "scopes": ["read"]}),
+        "invitations" => json!({"name": "guest"}),
+        "restriction" => json!({"restricted": true}),
+        _ => json!({}),
+    };
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let (mut repeated, mut refused) = (0, 0);
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap().iter().filter(|(method, _)| *method != "get") {
+            let address = path.replace("{id}", &id_of(path)).replace("{token}", &"0".repeat(64));
+            let send = async || {
+                let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
+                let request =
+                    request.header("content-type", "application/json").header("idempotency-key", path.as_str());
+                service.send(request.body(Body::from(body_of(path).to_string())).unwrap()).await
+            };
+            let (first, what) = (send().await, format!("{method} {path}"));
+            if !takes_key(operation) {
+                assert_eq!(first.status, StatusCode::BAD_REQUEST, "{what}: {}", first.text);
+                assert!(first.text.contains("Idempotency-Key"), "{what}: {}", first.text);
+                refused += 1;
+                continue;
+            }
+            assert!(!first.text.contains("Idempotency-Key"), "{what}: {}", first.text);
+            if !first.status.is_success() {
+                continue;
+            }
+            let second = send().await;
+            assert_eq!((second.status, &second.text), (first.status, &first.text), "{what}");
+            assert_eq!(second.headers["idempotency-replayed"], "true", "{what}");
+            repeated += 1;
+        }
+    }
+    assert!(repeated >= 14 && refused >= 2, "{repeated} repeated, {refused} refused");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn settings_at_the_ends_of_their_described_ranges_are_accepted() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let subject = service.subject().await;
+    let mut tried = 0;
+    for group in ["gait_settings", "solve_options", "learner"] {
+        let schema = &document["components"]["schemas"]["NewStudy"]["properties"][group];
+        assert_eq!(schema["additionalProperties"], false, "{group}");
+        for (name, field) in schema["properties"].as_object().unwrap() {
+            let ends = [&field["minimum"], &field["maximum"]].into_iter().filter(|end| end.is_number());
+            for end in ends.cloned().chain(field["enum"].as_array().cloned().into_iter().flatten()) {
+                let integer = field["type"] == "integer";
+                let end = if integer { json!(end.as_f64().unwrap() as i64) } else { end };
+                let body = json!({"subject_id": subject, "start": false, group: {name: end}});
+                let answer = service.post("/api/v1/studies", &body).await;
+                // Where settings depend on each other, the refusal names another one.
+                let alone = answer.status.is_success() || !answer.text.contains(&format!("{name} is {end}"));
+                assert!(alone, "{group}.{name} = {end}: {}", answer.text);
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 10, "{tried}");
+    let invented = json!({"subject_id": subject, "learner": {"nothing": 1}});
+    assert_eq!(service.post("/api/v1/studies", &invented).await.status, StatusCode::BAD_REQUEST);
+    service.stop().await;
 }
 
 #[tokio::test]

@@ -64,6 +64,7 @@ fn speaks_for_itself(answer: &Response) -> bool {
 }
 
 /// The answer to a request whose handler panicked.
+#[allow(clippy::needless_pass_by_value)] // as the layer calls it
 pub(super) fn after_panic(panic: Box<dyn Any + Send>) -> Response {
     let reason = panic
         .downcast_ref::<String>()

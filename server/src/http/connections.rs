@@ -40,6 +40,7 @@ pub struct Limits {
 
 impl Limits {
     /// These limits, as far as the descriptors of the process allow; it takes as many of them as it may have.
+    #[must_use]
     pub fn within_descriptors(self) -> Self {
         let descriptors = descriptors();
         let most = if descriptors > 2 * RESERVED { descriptors - RESERVED } else { descriptors / 2 };

@@ -15,6 +15,7 @@ pub mod metrics;
 mod negotiate;
 mod once;
 pub mod openapi;
+mod openapi_rules;
 pub mod pages;
 mod pages_of;
 mod problem;

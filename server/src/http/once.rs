@@ -6,8 +6,8 @@ use super::may::permitted;
 use crate::access::{Caller, Permission};
 use crate::error::Error;
 use crate::store::audit::Actor;
-use crate::store::idempotency::{self, Kept, fingerprint};
-use crate::store::{LentWriter, commit};
+use crate::store::idempotency::{self, KEY_UNIQUE, Kept, fingerprint};
+use crate::store::{LentWriter, OnConstraint, commit};
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
@@ -80,7 +80,10 @@ impl<P: Permission> Once<P> {
         let body = serde_json::to_string(body).map_err(|e| Error::Internal(e.to_string()))?;
         let kept = Kept { request: self.request.clone(), status: status.as_u16(), location, body };
         if let Some(key) = &self.key {
-            idempotency::keep(&mut writer, &self.actor, key, &kept).await?;
+            // Two requests with one key at the same time, of a handler that looks for its answer before it begins.
+            idempotency::keep(&mut writer, &self.actor, key, &kept).await.on_constraint(KEY_UNIQUE, || {
+                Error::conflict("a request with this Idempotency-Key has just been answered; send it again")
+            })?;
         }
         commit(writer).await?;
         app.director.changed();

@@ -1,10 +1,11 @@
 //! The description of the REST interface (OpenAPI 3.1), made from the handlers.
 //!
 //! What holds for every operation is added here, so that no handler can forget it: the problem documents, the
-//! Idempotency-Key of every POST, the ways to say who calls.
+//! Idempotency-Key of every change whose answer holds no secret, the rules of values, the ways to say who calls.
 
-use super::api;
 use super::problem::{PROBLEM_JSON, Problem};
+use super::{api, openapi_rules};
+use serde_json::Value;
 use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{ObjectBuilder, Type};
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityScheme};
@@ -24,6 +25,9 @@ use utoipa_axum::router::OpenApiRouter;
     servers((url = "/"))
 )]
 struct Described;
+
+/// Marks an operation whose answer holds a secret, which is not kept: it takes no Idempotency-Key.
+const SHOWN_ONCE: &str = "x-shown-once";
 
 /// The description of every route below `/api/v1`.
 pub fn document() -> OpenApi {
@@ -47,12 +51,22 @@ pub fn document() -> OpenApi {
     document
 }
 
+/// The document with the rules of values.
+///
+/// # Errors
+/// When it cannot be written as JSON.
+pub(super) fn value() -> Result<Value, serde_json::Error> {
+    let mut value = serde_json::to_value(document())?;
+    openapi_rules::state(&mut value);
+    Ok(value)
+}
+
 /// The document as it is served and committed.
 ///
 /// # Errors
 /// When it cannot be written as JSON.
 pub fn text() -> Result<String, serde_json::Error> {
-    let mut text = serde_json::to_string_pretty(&document())?;
+    let mut text = serde_json::to_string_pretty(&value()?)?;
     text.push('\n');
     Ok(text)
 }
@@ -87,7 +101,8 @@ fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
         let response = ResponseBuilder::new().description(description).content(PROBLEM_JSON, content).build();
         operation.responses.responses.entry(status.to_owned()).or_insert_with(|| response.into());
     }
-    if changes {
+    let shown_once = operation.extensions.as_ref().is_some_and(|extensions| extensions.contains_key(SHOWN_ONCE));
+    if changes && !shown_once {
         let text = ObjectBuilder::new().schema_type(Type::String).min_length(Some(1)).max_length(Some(200)).build();
         let key = ParameterBuilder::new()
             .name("Idempotency-Key")

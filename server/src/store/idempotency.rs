@@ -43,6 +43,9 @@ pub async fn find(db: &mut Connection, actor: &Actor, key: &str) -> StoreResult<
     }))
 }
 
+/// The key of a caller, as SQLite names it in a violation.
+pub const KEY_UNIQUE: &str = "idempotency_keys.key";
+
 /// Keeps an answer.
 ///
 /// # Errors

@@ -140,6 +140,7 @@ pub(super) struct Invited {
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Invitation,
     responses((status = 201, description = "Shown once", body = Invited)),
+    extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn invite(

@@ -45,6 +45,7 @@ pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Res
     tag = "access",
     request_body = NewToken,
     responses((status = 201, description = "Made; the secret is shown once", body = MadeToken)),
+    extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn create(

@@ -88,6 +88,7 @@ pub(super) struct Link {
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
     responses((status = 201, description = "Shown once", body = Link)),
+    extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn link(

@@ -43,7 +43,7 @@ struct Parameter {
 
 /// `GET /api`.
 pub(super) async fn get() -> Page {
-    let document = serde_json::to_value(openapi::document()).map_err(|e| Error::Internal(e.to_string()))?;
+    let document = openapi::value().map_err(|e| Error::Internal(e.to_string()))?;
     page(&ReferencePage { groups: groups(&document) })
 }
 
