@@ -31,7 +31,7 @@ async fn study() -> (TempDir, Service, StudyId, Vec<u8>) {
     for (path, body) in [
         ("preferences", json!({"trial_a": good[0], "trial_b": good[1], "answer": "b", "author": "K"})),
         ("preferences", json!({"trial_a": good[2], "trial_b": good[0], "answer": "no_difference", "author": "K"})),
-        ("preferences", json!({"trial_a": good[1], "trial_b": good[2], "answer": "unsafe_a", "author": "K"})),
+        ("remarks", json!({"first": good[1], "second": good[2], "answer": "unsafe_first", "author": "K"})),
     ] {
         let done = service.post(&format!("/api/v1/studies/{study}/{path}"), &body).await;
         assert!(done.status.is_success(), "{path}: {}", done.text);
@@ -357,7 +357,7 @@ const MORE: [Forgery; 8] =
                 let study = r.0.remove(place);
                 r.0.push(study);
             },
-            "comes earlier",
+            "FOREIGN KEY",
         ),
         ("no study", |r| r.0.clear(), "0 studies"),
         (
@@ -719,11 +719,11 @@ async fn bombs_are_refused_within_bounded_memory() {
         ("a deep report", with(&|rows| rows.first("trials")["report"] = "[".repeat(900).into())),
         ("a study within ten frames", (0..10).fold(framed("x\n"), |inner, _| framed(&hex::encode(inner)))),
     ];
-    // More rows than any study has; each is right by itself.
+    // Many rows, each right by itself.
     let mut rows = whole.clone();
     let trial = rows.first("remarks").clone();
     bombs.push((
-        "a million remarks",
+        "forty thousand remarks, cut off",
         streamed(|out| {
             for (table, row) in whole.0.iter().take_while(|(table, _)| table != "remark_retractions") {
                 let known: Row = serde_json::from_value(row.clone()).unwrap();

@@ -2,6 +2,7 @@
 //! every figure that follows from another one computed anew.
 
 use super::file::refuse;
+use crate::access::Reach;
 use crate::error::Error;
 use crate::printable;
 use crate::store::archive::Definition;
@@ -96,7 +97,7 @@ pub(super) async fn study(quarantine: &mut Quarantine) -> Result<Checked, Error>
         at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is no identifier")))?;
     }
     let db = quarantine.db();
-    let found = at("studies", studies::page(db, None, 2).await)?;
+    let found = at("studies", studies::page(db, Reach::Every, None, 2).await)?;
     let [study] = &found[..] else { return Err(refuse(format!("it holds {} studies, expected one", found.len()))) };
     let study = study.clone();
     at(format!("study {}", study.id), plan::check_plan(&study.plan))?;

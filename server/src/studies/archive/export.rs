@@ -43,13 +43,15 @@ pub async fn export<W: Write + Send + 'static>(
     });
     let read = async {
         let mut reader = pool.acquire().await.map_err(StoreError::from)?;
-        let (forward, mut read) = mpsc::channel(1);
+        let (forward, read) = mpsc::channel(1);
         let reading = async {
             let done = archive::read(&mut reader, study, &forward).await;
             drop(forward);
             done
         };
         let handing = async {
+            // Moved in here, so that reading ends when nobody writes any more.
+            let mut read = read;
             while let Some(row) = read.recv().await {
                 if sender.send(Some(row)).await.is_err() {
                     return;

@@ -23,6 +23,8 @@ const LARGEST_LINE_BYTES: usize = 2 * LARGEST_BLOB_BYTES + LARGEST_TEXT_BYTES;
 const LARGEST_BYTES: u64 = 16 << 30;
 /// A study has at most so many trials.
 const MOST_TRIALS: u64 = 10_000;
+/// A refusal says at most so much, characters.
+const LONGEST_REASON: usize = 500;
 /// And so many rows of any other table.
 const MOST_ROWS: u64 = 200_000;
 
@@ -147,6 +149,8 @@ pub(super) struct Unpacker<R: Read> {
 
 /// What is wrong with an archive.
 pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
+    // What a row holds may be repeated in the reason, at any length.
+    let reason: String = reason.to_string().chars().take(LONGEST_REASON).collect();
     Error::Malformed(format!("the archive is refused, nothing was changed: {reason}"))
 }
 
