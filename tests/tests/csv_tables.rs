@@ -63,7 +63,7 @@ async fn no_csv_endpoint_gives_a_formula() {
     let mut writer = service.store.write().await.unwrap();
     sqlx::query("update trials set message = ? where state not in ('converged', 'not_converged')")
         .bind(FORMULA)
-        .execute(&mut *writer)
+        .execute(&mut **writer)
         .await
         .unwrap();
     gaitwright::store::commit(writer).await.unwrap();

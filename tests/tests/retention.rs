@@ -15,11 +15,11 @@ const TABLES: &str = "select name from sqlite_master where type = 'table' and na
 
 async fn counts(service: &Service) -> Vec<(String, i64)> {
     let mut reader = service.store.read().await.unwrap();
-    let tables: Vec<String> = sqlx::query_scalar(TABLES).fetch_all(&mut *reader).await.unwrap();
+    let tables: Vec<String> = sqlx::query_scalar(TABLES).fetch_all(&mut **reader).await.unwrap();
     let mut counts = Vec::new();
     for table in tables {
         let sql = sqlx::AssertSqlSafe(format!("select count(*) from {table}"));
-        counts.push((table, sqlx::query_scalar(sql).fetch_one(&mut *reader).await.unwrap()));
+        counts.push((table, sqlx::query_scalar(sql).fetch_one(&mut **reader).await.unwrap()));
     }
     counts
 }
@@ -42,10 +42,10 @@ async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
     let mut writer = service.store.write().await.unwrap();
     let (old, new) = ("2020-01-01T00:00:00.000Z", "2999-01-01T00:00:00.000Z");
     let user = "insert into users (id, name, role, created_at) values ('u', 'U', 'rater', ?)";
-    sqlx::query(user).bind(old).execute(&mut *writer).await.unwrap();
+    sqlx::query(user).bind(old).execute(&mut **writer).await.unwrap();
     sqlx::query("update idempotency_keys set created_at = ? where key = 'old'")
         .bind(old)
-        .execute(&mut *writer)
+        .execute(&mut **writer)
         .await
         .unwrap();
     for (hash, seen, ended) in [("a", old, None), ("b", new, Some(old)), ("c", new, None)] {
@@ -54,7 +54,7 @@ async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
             .bind(old)
             .bind(seen)
             .bind(ended)
-            .execute(&mut *writer)
+            .execute(&mut **writer)
             .await
             .unwrap();
     }
@@ -66,7 +66,7 @@ async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
         .bind(old)
         .bind(expires)
         .bind(used)
-        .execute(&mut *writer)
+        .execute(&mut **writer)
         .await
         .unwrap();
     }
