@@ -9,6 +9,7 @@
 pub mod access;
 pub mod cli;
 pub mod compute;
+mod csv_table;
 mod document;
 pub mod error;
 mod gait_charts;

@@ -4,11 +4,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::missing_panics_doc)]
 
 pub mod analytic;
+pub mod archives;
 pub mod away;
 pub mod broker;
 pub mod callers;
 pub mod cli;
 pub mod client;
+pub mod consistent;
 pub mod every_table;
 pub mod examined;
 pub mod explained;

@@ -238,6 +238,13 @@ impl Service {
         self.send(Request::get(path).body(Body::empty()).unwrap()).await
     }
 
+    /// `GET` of bytes.
+    pub async fn fetch_bytes(&self, path: &str) -> (StatusCode, Vec<u8>) {
+        let response = self.router().oneshot(Request::get(path).body(Body::empty()).unwrap()).await.unwrap();
+        let status = response.status();
+        (status, response.into_body().collect().await.unwrap().to_bytes().to_vec())
+    }
+
     /// `GET` with an Accept header.
     pub async fn fetch_as(&self, path: &str, accept: &str) -> Answer {
         self.send(Request::get(path).header(header::ACCEPT, accept).body(Body::empty()).unwrap()).await

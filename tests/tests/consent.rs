@@ -3,12 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::cli::study::import;
 use gaitwright::http::openapi;
+use gaitwright::store::audit;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
-use gaitwright::store::{archive, audit};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
+use gaitwright_tests::consistent::Consistent;
 use gaitwright_tests::measured::motion;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
@@ -215,14 +216,14 @@ async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
 #[tokio::test]
 async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
     let person = service.subject().await;
     let mut archives = Vec::new();
     let mut last = None;
     for seed in [1, 2] {
         let study = service.study(|new| (new.seed, new.trial_budget) = (seed, 2)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
-        archives.push(archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap());
+        archives.push(exported(&service.store, study).await);
         last = Some(study);
     }
     let withdraw = json!({"reason": "moved away"});
@@ -238,12 +239,12 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
 
     // Elsewhere, where the subject withdraws after a first study came in.
     let other = gaitwright::store::Store::open(&folder.path().join("b.db")).await.unwrap();
-    import(&other, &archive::open(&archives[0]).unwrap()).await.unwrap();
+    import(&other, &archives[0]).await.unwrap();
     other.close().await;
     drop(other);
-    let other = Service::start_as_is(&folder.path().join("b.db"), Analytic::default(), 1).await;
+    let other = Service::start_as_is(&folder.path().join("b.db"), Consistent::default(), 1).await;
     assert_eq!(other.post(&path, &withdraw).await.status, StatusCode::OK);
-    let refused = import(&other.store, &archive::open(&archives[1]).unwrap()).await.unwrap_err().to_string();
+    let refused = import(&other.store, &archives[1]).await.unwrap_err().to_string();
     assert!(refused.contains("withdrew consent") && refused.contains("nothing was changed"), "{refused}");
     other.stop().await;
 }

@@ -4,13 +4,15 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::emg::EmgSettings;
-use gaitwright::cli::study::import;
 use gaitwright::store::feedback::{FeedbackRow, Said, Source};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::{Trial, TrialState};
-use gaitwright::store::{LabSessionId, Store, StudyId, archive, audit, lab_sessions};
+use gaitwright::store::{LabSessionId, Store, StudyId, audit, lab_sessions};
 use gaitwright::studies::lab;
+use gaitwright::workers::Evaluate;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::archives::{exported, import};
+use gaitwright_tests::consistent::Consistent;
 use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
@@ -21,8 +23,12 @@ use tempfile::TempDir;
 const FORM: &str = "application/x-www-form-urlencoded";
 
 async fn finished() -> (TempDir, Service, StudyId, Vec<Trial>) {
+    finished_by(Analytic::default()).await
+}
+
+async fn finished_by(solver: impl Evaluate) -> (TempDir, Service, StudyId, Vec<Trial>) {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
     let study = service.study(|new| new.trial_budget = 24).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
@@ -328,7 +334,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
 
 #[tokio::test]
 async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
-    let (folder, service, study, trials) = finished().await;
+    let (folder, service, study, trials) = finished_by(Consistent::default()).await;
     let session = planned(&service, study, &trials).await;
     service.post(&format!("/api/v1/lab/{}/walks", id(&session)), &json!({"walk": 1})).await;
     for walk in 2..=3 {
@@ -342,11 +348,11 @@ async fn a_session_goes_with_its_study_into_an_archive_and_stays_as_it_was() {
     let api = format!("/api/v1/lab-sessions/{}", id(&session));
     service.post(&format!("{api}/electromyograms"), &with_heel(1, &electromyogram(1.0))).await;
     let emg = service.post(&format!("{api}/emg-results"), &json!({})).await.json();
-    let file = archive::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    let file = exported(&service.store, study).await;
     let before = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap();
     service.stop().await;
     let other = Store::open(&folder.path().join("b.db")).await.unwrap();
-    import(&other, &archive::open(&file).unwrap()).await.unwrap();
+    import(&other, &file).await.unwrap();
     assert_eq!(lab_sessions::of_study(&mut other.read().await.unwrap(), study).await.unwrap(), before);
     assert_eq!(before[0].answers.iter().map(|answer| answer.taken_back).collect::<Vec<_>>(), [true, false]);
     // From the files in the archive the same curves are made again.

@@ -6,9 +6,10 @@
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Request, StatusCode};
 use gaitwright::http::{Access, openapi};
-use gaitwright::store::archive;
 use gaitwright::store::studies::StudyState;
+use gaitwright::studies::archive::file::read_through;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::archives::exported;
 use gaitwright_tests::service::Service;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -258,16 +259,16 @@ async fn cursors_and_identifiers() {
 async fn archives() {
     let target = Target::set().await;
     let study = target.study.parse().unwrap();
-    let whole = archive::of_study(&mut target.service.store.read().await.unwrap(), study).await.unwrap();
+    let whole = exported(&target.service.store, study).await;
     for (at, flip, bytes) in drawn(&(any::<prop::sample::Index>(), 1_u8.., prop::collection::vec(any::<u8>(), 0..200)))
     {
-        assert!(archive::open(&bytes).is_err());
+        assert!(read_through(&bytes[..]).is_err());
         let mut changed = whole.clone();
         let place = at.index(changed.len());
         changed[place] ^= flip;
-        assert!(archive::open(&changed).is_err(), "byte {place}");
-        assert!(archive::open(&whole[..place]).is_err());
+        assert!(read_through(&changed[..]).is_err(), "byte {place}");
+        assert!(read_through(&whole[..place]).is_err());
     }
-    assert!(archive::open(&whole).is_ok());
+    assert!(read_through(&whole[..]).is_ok());
     target.service.stop().await;
 }

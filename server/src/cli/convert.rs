@@ -56,7 +56,7 @@ impl Convert {
         }
         let out = self.out.as_deref().map(|out| OutFile::open(out, &[&self.gait])).transpose()?;
         let text = match self.to {
-            Form::Csv => String::from_utf8(gait_csv(&gait)?).map_err(|e| Error::Internal(e.to_string()))?,
+            Form::Csv => gait_csv(&gait),
             Form::Mot => motion_file(&gait, self.rate_hz)?,
             Form::Controller => controller_file(&gait, self.rate_hz)?,
             Form::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),

@@ -3,6 +3,7 @@
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem::read;
+use crate::csv_table::{Cell, CsvTable};
 use crate::error::Error;
 use crate::studies::lab::{EmgReading, FileForm};
 use clap::Args;
@@ -184,12 +185,9 @@ fn envelopes_csv(recording: &EmgRecording, envelopes: Vec<Envelope>) -> String {
 
 /// Columns of the same length, by name.
 fn csv(columns: &[(String, Vec<f64>)]) -> String {
-    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-    let mut text = names.join(",") + "\n";
+    let mut table = CsvTable::new(columns.iter().map(|(name, _)| name));
     for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
-        let cells: Vec<String> = columns.iter().map(|(_, values)| values[row].to_string()).collect();
-        text.push_str(&cells.join(","));
-        text.push('\n');
+        table.row(columns.iter().map(|(_, values)| Cell::from(values.get(row))));
     }
-    text
+    table.into_text()
 }

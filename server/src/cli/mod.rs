@@ -93,6 +93,8 @@ enum Command {
     Export(study::Export),
     /// Add the study of such a file to a database.
     Import(study::Import),
+    /// Make a key to sign such files with; prints its public half.
+    SigningKey(study::NewKey),
     /// Drop old trajectories; what was learned from them stays.
     Prune(study::Prune),
 }
@@ -138,6 +140,7 @@ pub fn run() -> ExitCode {
         Command::Backup(backup) => runtime.block_on(backup.run()).map(|()| Ended::Done),
         Command::Restore(restore) => runtime.block_on(restore.run()).map(|()| Ended::Done),
         Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),
+        Command::SigningKey(key) => key.run().map(|()| Ended::Done),
         Command::Import(import) => runtime.block_on(import.run()).map(|()| Ended::Done),
         Command::Prune(prune) => runtime.block_on(prune.run()).map(|()| Ended::Done),
     };

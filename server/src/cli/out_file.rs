@@ -48,6 +48,23 @@ impl OutFile {
         Ok(Self { path, part: Some(part), file: Some(file) })
     }
 
+    /// The same for a file that is not there yet, and that its owner alone can read.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] with the reason when it is there, or cannot be written.
+    pub(super) fn open_new(path: &Path) -> Result<Self, Error> {
+        if path.exists() {
+            return Err(failed(path, "it exists"));
+        }
+        let out = Self::open(path, &[])?;
+        #[cfg(unix)]
+        if let Some(file) = &out.file {
+            let owner_alone = std::os::unix::fs::PermissionsExt::from_mode(0o600);
+            file.set_permissions(owner_alone).map_err(|e| failed(path, e))?;
+        }
+        Ok(out)
+    }
+
     /// The file.
     pub(super) fn path(&self) -> &Path {
         &self.path
@@ -96,6 +113,19 @@ impl OutFile {
         {
             tell(&format!("gaitwright: {} is left over: {e}", part.display()));
         }
+    }
+}
+
+impl Write for OutFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match &mut self.file {
+            Some(file) => file.write(bytes),
+            None => Ok(bytes.len()),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), Write::flush)
     }
 }
 

@@ -11,6 +11,7 @@ use crate::store::audit::Actor;
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
 use crate::studies::director::Director;
+use crate::studies::retention;
 use crate::workers::nats::JetStream;
 use crate::workers::{AfterSolves, Dispatch, GaitSolver, InProcess, LEASE};
 use axum_server::tls_rustls::{RustlsAcceptor, RustlsConfig};
@@ -93,6 +94,7 @@ impl Serve {
             let director = director.clone();
             async move { Box::pin(director.run()).await }
         });
+        let dropping = tokio::spawn(retention::keep_dropping(store.clone()));
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");
@@ -126,6 +128,7 @@ impl Serve {
             None => server.http1_only().serve(service).await,
         };
         director.stop();
+        dropping.abort();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
         if let Some(pruning) = pruning {
             pruning.abort();

@@ -1,15 +1,18 @@
 //! `gaitwright export` and `gaitwright import`: a whole study as one file. `gaitwright prune`: retention.
 
-use super::output::data;
+use super::out_file::OutFile;
+use super::output::{data, tell};
+use super::problem::read;
 use super::record::{exists, note_export};
 use crate::compute::OnPool;
 use crate::error::Error;
-use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
-use crate::store::{Store, StoreError, StudyId, archive, backup, commit, events, gaits, studies};
+use crate::store::{Store, StudyId, commit, gaits, studies};
+use crate::studies::archive::{self, PublicKey, SigningKey};
 use crate::studies::belief::Beliefs;
 use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended;
+use crate::studies::retention::{self, Dropped};
 use crate::studies::standing::Standing;
 use clap::Args;
 use serde_json::json;
@@ -24,22 +27,19 @@ pub(super) struct Export {
     /// The SQLite file; the service may be running.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
+    /// Sign the archive with the key of this file, made by `gaitwright signing-key`.
+    #[arg(long, value_name = "FILE")]
+    sign: Option<PathBuf>,
 }
 
 impl Export {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.database)?;
-        let pool = backup::open_read_only(&self.database).await?;
-        let packed = match pool.acquire().await {
-            Ok(mut reader) => archive::of_study(&mut reader, self.study).await,
-            Err(error) => Err(StoreError::from(error)),
-        };
-        pool.close().await;
-        let bytes = packed?;
+        let key = self.sign.as_deref().map(|file| SigningKey::read(&read(file)?)).transpose()?;
+        let out = OutFile::open_new(&self.to)?;
+        let out = archive::export(&self.database, self.study, out, key).await?;
         note_export(&self.database, "export", &format!("study {}", self.study), vec![self.study.to_string()]);
-        let cannot = |e: std::io::Error| Error::Malformed(format!("cannot write {}: {e}", self.to.display()));
-        let mut file = std::fs::File::create_new(&self.to).map_err(cannot)?;
-        std::io::Write::write_all(&mut file, &bytes).and_then(|()| file.sync_all()).map_err(cannot)?;
+        out.finish()?;
         data(&self.to.display().to_string())
     }
 }
@@ -51,43 +51,39 @@ pub(super) struct Import {
     /// The SQLite file; no service may be running on it.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
+    /// Accept only archives that are signed by this key, as `gaitwright signing-key` printed it; can be repeated.
+    #[arg(long, value_name = "KEY")]
+    trust: Vec<PublicKey>,
 }
 
 impl Import {
     pub(super) async fn run(self) -> Result<(), Error> {
-        let file = std::fs::read(&self.from)
-            .map_err(|e| Error::Malformed(format!("cannot read {}: {e}", self.from.display())))?;
+        let cannot = |e: std::io::Error| Error::Malformed(format!("cannot read {}: {e}", self.from.display()));
+        let file = std::fs::File::open(&self.from).map_err(cannot)?;
         // Before a record is made for it.
-        let archive = archive::open(&file).map_err(|e| Error::Malformed(e.to_string()))?;
+        let archive = archive::open(file, &self.trust).await?;
         let store = Store::open(&self.database).await?;
-        let done = import(&store, &archive).await;
+        let done = archive::import(&store, &Actor::terminal(), archive).await;
         store.close().await;
         data(&done?.to_string())
     }
 }
 
-/// Writes the study of an archive into a record.
-///
-/// # Errors
-/// [`Error::Conflict`] when the study is there or does not fit.
-pub async fn import(store: &Store, archive: &Archive) -> Result<StudyId, Error> {
-    let study = archive.study()?;
-    let mut writer = store.write().await?;
-    match studies::get(&mut writer, study).await {
-        Ok(_) => return Err(Error::conflict(format!("study {study} is in this record already"))),
-        Err(StoreError::Missing { .. }) => {}
-        Err(other) => return Err(other.into()),
+#[derive(Debug, Args)]
+pub(super) struct NewKey {
+    /// Where the secret key goes: a new file, which its owner alone can read.
+    to: PathBuf,
+}
+
+impl NewKey {
+    pub(super) fn run(self) -> Result<(), Error> {
+        let text = SigningKey::generate()?;
+        let public = SigningKey::read(&text)?.public();
+        let mut out = OutFile::open_new(&self.to)?;
+        std::io::Write::write_all(&mut out, text.as_bytes()).map_err(Error::Output)?;
+        out.finish()?;
+        data(public.as_str())
     }
-    archive::unpack(&mut writer, archive)
-        .await
-        .map_err(|e| Error::conflict(format!("the archive does not fit this record, nothing was changed: {e}")))?;
-    let present = studies::get(&mut writer, study).await?;
-    let payload = json!({ "state": present.state, "reason": "imported" });
-    events::append(&mut writer, study, "study_changed", &payload).await?;
-    let detail = json!({ "name": present.plan.name });
-    audit::append(&mut writer, &Actor::terminal(), "study.import", &format!("study {study}"), &detail).await?;
-    commit(writer).await?;
-    Ok(study)
 }
 
 #[derive(Debug, Args)]
@@ -106,8 +102,11 @@ impl Prune {
         exists(&self.database)?;
         let mut store = Store::open(&self.database).await?;
         let done = prune(&mut store, self.older_than_days).await;
+        let expired = retention::drop_expired(&store).await;
         store.close().await;
-        data(&format!("{} trajectories dropped", done?))
+        let (Dropped { answers, sessions, links }, trajectories) = (expired?, done?);
+        tell(&format!("{answers} answers to repeated requests, {sessions} sessions and {links} sign-in links dropped"));
+        data(&format!("{trajectories} trajectories dropped"))
     }
 }
 

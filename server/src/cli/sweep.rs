@@ -8,6 +8,7 @@ use super::problem::{ProblemFlags, cancelled_by_signal, read};
 use super::serve::cores_or;
 use super::solve::status_word;
 use crate::compute::Pool;
+use crate::csv_table::{Cell, CsvTable, cells};
 use crate::error::Error;
 use clap::Args;
 use gait_optimizer::{
@@ -60,12 +61,11 @@ impl Sweep {
         let stopped = cancel.clone();
         let pool = Pool::new(1);
         let table = pool.run(move |_| {
-            let mut table = Table::begin(out)?;
-            solve_all(&problem, &actions, warm.as_ref(), &options, workers, &cancel, &mut table)?;
-            Ok::<_, Error>(table)
+            let mut table = Table::begin(out);
+            solve_all(&problem, &actions, warm.as_ref(), &options, workers, &cancel, &mut table);
+            table
         });
-        let table = table.await;
-        table??.end(stopped.is_cancelled())
+        table.await?.end(stopped.is_cancelled())
     }
 }
 
@@ -82,48 +82,45 @@ struct Table {
 }
 
 impl Table {
-    fn begin(out: OutFile) -> Result<Self, Error> {
+    fn begin(out: OutFile) -> Self {
         let mut table = Self { out, unwritten: None, text: String::new(), rows: 0, converged: 0, refused: None };
-        let header: Vec<String> = TunedBounds::NAMES.iter().chain(&COLUMNS).map(|name| (*name).to_owned()).collect();
-        table.line(&header)?;
-        Ok(table)
+        table.line(TunedBounds::NAMES.iter().chain(&COLUMNS).map(|name| Cell::from(*name)).collect());
+        table
     }
 
-    fn add(&mut self, action: &TunedBounds, answer: Answer) -> Result<(), Error> {
-        let mut row: Vec<String> = action.to_array().iter().map(f64::to_string).collect();
+    fn add(&mut self, action: &TunedBounds, answer: Answer) {
+        let mut row: Vec<Cell> = action.to_array().iter().map(Cell::from).collect();
         match answer {
             Ok(outcome) => {
                 let r = &outcome.report;
                 self.converged += usize::from(r.status == SolveStatus::Converged);
-                row.extend([
-                    status_word(r.status).to_owned(),
-                    r.iterations.to_string(),
+                row.extend(cells![
+                    status_word(r.status),
+                    r.iterations,
                     format!("{:.3}", r.seconds_total),
-                    number(r.cost_of_transport),
-                    number(r.gait_rmse_rad),
-                    number(r.max_violation),
+                    finite(r.cost_of_transport),
+                    finite(r.gait_rmse_rad),
+                    finite(r.max_violation),
                 ]);
                 self.rows += 1;
             }
             Err(error) => {
-                tell(&format!("{}: {error}", row.join(",")));
-                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(str::to_owned));
+                tell(&format!("{}: {error}", action.to_array().map(|value| value.to_string()).join(",")));
+                row.extend([status_word(SolveStatus::Stalled), "", "", "", "", ""].map(Cell::from));
                 self.refused = Some(error);
             }
         }
-        self.line(&row)
+        self.line(row);
     }
 
-    fn line(&mut self, cells: &[String]) -> Result<(), Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(cells).map_err(|e| Error::Internal(e.to_string()))?;
-        let bytes = writer.into_inner().map_err(|e| Error::Internal(e.to_string()))?;
-        let line = String::from_utf8(bytes).map_err(|e| Error::Internal(e.to_string()))?;
+    fn line(&mut self, cells: Vec<Cell>) {
+        let mut table = CsvTable::default();
+        table.row(cells);
+        let line = table.into_text();
         if self.unwritten.is_none() {
             self.unwritten = self.out.append(&line).err();
         }
         self.text.push_str(&line);
-        Ok(())
     }
 
     fn end(self, stopped: bool) -> Result<Ended, Error> {
@@ -180,12 +177,12 @@ fn solve_all(
     workers: usize,
     cancel: &CancelToken,
     table: &mut Table,
-) -> Result<(), Error> {
+) {
     let bar = ProgressBar::new(actions.len() as u64);
     bar.tick();
     let next = AtomicUsize::new(0);
     let (sender, receiver) = mpsc::channel();
-    let written = std::thread::scope(|scope| {
+    std::thread::scope(|scope| {
         for _ in 0..workers.min(actions.len()) {
             let (sender, next) = (sender.clone(), &next);
             scope.spawn(move || {
@@ -206,17 +203,15 @@ fn solve_all(
             bar.inc(1);
             early.insert(row, answer);
             while let Some(answer) = early.remove(&due) {
-                table.add(&actions[due], answer)?;
+                table.add(&actions[due], answer);
                 due += 1;
             }
         }
-        Ok(())
     });
     bar.finish_and_clear();
-    written
 }
 
-/// A number as text; empty when it is not finite.
-fn number(value: f64) -> String {
-    if value.is_finite() { value.to_string() } else { String::new() }
+/// A number; nothing when it is not finite.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
 }

@@ -1,7 +1,6 @@
 //! JSON or CSV, as the Accept header asks; a `.csv` address is CSV always.
 
-use crate::error::Error;
-use crate::gait_table::csv_bytes;
+use crate::csv_table::CsvTable;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 
@@ -17,17 +16,17 @@ pub(crate) fn wants_csv(headers: &HeaderMap) -> bool {
     }
 }
 
-/// Rows as a CSV answer that a browser saves under `name`.
-pub(crate) fn csv_answer(name: &str, header: &[&str], rows: Vec<Vec<String>>) -> Result<Response, Error> {
-    Ok(csv_file(name, csv_bytes(header, rows)?))
+/// A table as a CSV answer that a browser saves under `name`.
+pub(crate) fn csv_answer(name: &str, table: CsvTable) -> Response {
+    csv_file(name, table.into_text())
 }
 
 /// A CSV file that a browser saves under `name`.
-pub(crate) fn csv_file(name: &str, bytes: Vec<u8>) -> Response {
+pub(crate) fn csv_file(name: &str, text: String) -> Response {
     let headers = [
         (header::CONTENT_TYPE, "text/csv; charset=utf-8".to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
         (header::VARY, "Accept".to_owned()),
     ];
-    (headers, bytes).into_response()
+    (headers, text).into_response()
 }

@@ -5,9 +5,9 @@ use super::gait_tiles;
 use super::heat_map::HeatMap;
 use super::standalone::{self, Inside};
 use super::tree::Tree;
+use crate::csv_table::{CsvTable, cells};
 use gait_optimizer::walking::stick_figure::StickFigure;
 use resvg::usvg::fontdb::Source;
-use std::fmt::Write;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -122,37 +122,34 @@ impl Figure {
 
     /// The numbers behind it: a row for each point of each line.
     pub fn csv(&self) -> String {
-        let mut text = String::new();
-        // Writing to a String cannot fail.
-        let _ = match &self.drawing {
-            Drawing::Chart(chart) => chart_csv(&mut text, chart),
-            Drawing::Tiles(_, figures) => tiles_csv(&mut text, figures),
-            Drawing::Map(map) => map_csv(&mut text, map),
-            Drawing::Tree(tree) => tree_csv(&mut text, tree),
+        let table = match &self.drawing {
+            Drawing::Chart(chart) => chart_csv(chart),
+            Drawing::Tiles(_, figures) => tiles_csv(figures),
+            Drawing::Map(map) => map_csv(map),
+            Drawing::Tree(tree) => tree_csv(tree),
         };
-        text
+        table.into_text()
     }
 }
 
-fn chart_csv(text: &mut String, chart: &Chart) -> std::fmt::Result {
-    writeln!(text, "line,{},{}", cell(&chart.x_label), cell(&chart.y_label))?;
+fn chart_csv(chart: &Chart) -> CsvTable {
+    let mut table = CsvTable::new(["line", &chart.x_label, &chart.y_label]);
     for series in &chart.series {
-        let points = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
-        for (x, y) in points {
-            writeln!(text, "{},{x},{y}", cell(&series.label))?;
+        for (x, y) in series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+            table.row(cells![&series.label, x, y]);
         }
     }
     for band in &chart.bands {
-        let label = cell(&band.label);
         for (x, low, high) in &band.points {
-            writeln!(text, "{label},{x},{low}\n{label},{x},{high}")?;
+            table.row(cells![&band.label, x, low]);
+            table.row(cells![&band.label, x, high]);
         }
     }
-    Ok(())
+    table
 }
 
-fn tiles_csv(text: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
-    writeln!(text, "time_s,point,forward_m,up_m")?;
+fn tiles_csv(figures: &[StickFigure]) -> CsvTable {
+    let mut table = CsvTable::new(["time_s", "point", "forward_m", "up_m"]);
     for figure in figures {
         let mut points = vec![("hip", figure.hip), ("shoulder", figure.shoulder)];
         for (leg, names) in [
@@ -162,35 +159,30 @@ fn tiles_csv(text: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
             points.extend(names.into_iter().zip([leg.knee, leg.ankle, leg.heel, leg.toe]));
         }
         for (name, [x, z]) in points {
-            writeln!(text, "{},{name},{x},{z}", figure.time_s)?;
+            table.row(cells![figure.time_s, name, x, z]);
         }
     }
-    Ok(())
+    table
 }
 
-fn map_csv(text: &mut String, map: &HeatMap) -> std::fmt::Result {
+fn map_csv(map: &HeatMap) -> CsvTable {
     let (columns, rows) = (&map.columns, &map.rows);
-    writeln!(text, "{},{},{},beside it", cell(&rows.0), cell(&columns.0), cell(&map.title))?;
+    let mut table = CsvTable::new([rows.0.as_str(), &columns.0, &map.title, "beside it"]);
     for (row, cells) in rows.1.iter().zip(&map.cells) {
         for (column, value) in columns.1.iter().zip(cells) {
-            writeln!(text, "{row},{column},{},{}", value.value, cell(&value.below))?;
+            table.row(cells![row, column, value.value, &value.below]);
         }
     }
-    Ok(())
+    table
 }
 
-fn tree_csv(text: &mut String, tree: &Tree) -> std::fmt::Result {
-    writeln!(text, "what,grew_out_of,state")?;
+fn tree_csv(tree: &Tree) -> CsvTable {
+    let mut table = CsvTable::new(["what", "grew_out_of", "state"]);
     for node in &tree.nodes {
         let parent = node.parent.and_then(|parent| tree.nodes.get(parent)).map_or("", |parent| &parent.label);
-        writeln!(text, "{},{},{}", cell(&node.label), cell(parent), node.class)?;
+        table.row(cells![&node.label, parent, node.class]);
     }
-    Ok(())
-}
-
-/// A cell of a table: in quotes where it has a comma or a quote.
-fn cell(text: &str) -> String {
-    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+    table
 }
 
 /// `angles`, `Right hip (prosthesis side)` as `angles-right-hip-prosthesis-side`.

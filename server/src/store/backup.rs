@@ -81,6 +81,8 @@ pub async fn check(file: &Path) -> StoreResult<()> {
 pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
     file_kind::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
+    // A row may hold a whole recording.
+    let options = options.row_buffer_size(super::quarantine::ROWS_AHEAD);
     let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
     let refusal = match migrations::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error)) {
         Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it holds no record yet".to_owned() },

@@ -91,6 +91,25 @@ pub async fn json_of(db: &mut Connection, trial: TrialId) -> StoreResult<String>
     String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
 }
 
+/// Whether the columns beside a gait say what is in it.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_described(db: &mut Connection, trial: TrialId, gait: &Gait) -> StoreResult<bool> {
+    let row = sqlx::query(
+        "select format_version = ? and speed_m_s is ? and stride_length_m is ? and stride_time_s is ? \
+         from gaits where trial_id = ?",
+    )
+    .bind(gait.format_version)
+    .bind(gait.speed_m_s)
+    .bind(gait.stride_length_m)
+    .bind(gait.stride_time_s)
+    .bind(trial)
+    .fetch_one(db)
+    .await?;
+    Ok(row.try_get(0)?)
+}
+
 /// Whether the gait of a trial, or the last iterate of a solve without one, is here: a script may have told figures alone, and trajectories are pruned.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Answers to requests with an Idempotency-Key, kept in the transaction of their effect.
 
 use super::audit::Actor;
-use super::{Connection, StoreResult, json, now};
+use super::{Connection, Instant, StoreResult, json, now};
 use sqlx::Row;
 
 /// What was answered.
@@ -65,4 +65,13 @@ pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &Kept) ->
     .execute(db)
     .await?;
     Ok(())
+}
+
+/// Drops answers that were kept before an instant: how many.
+///
+/// # Errors
+/// What the database reports.
+pub async fn drop_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
+    let done = sqlx::query("delete from idempotency_keys where created_at < ?").bind(at).execute(db).await?;
+    Ok(done.rows_affected())
 }

@@ -207,6 +207,15 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
     row.as_ref().map(|row| json::column(row, "document")).transpose()
 }
 
+/// Everything that was made of a session's electromyograms, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
+    let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
+    rows.fetch_all(db).await?.iter().map(|row| json::column(row, "document")).collect()
+}
+
 fn from_row(row: &SqliteRow) -> StoreResult<LabRecording> {
     Ok(LabRecording {
         id: row.try_get("id")?,

@@ -1,6 +1,6 @@
 //! The schema: numbered SQL files, embedded, applied at start in one go.
 
-use super::{StoreError, StoreResult, backup, beside};
+use super::{Connection, StoreError, StoreResult, backup, beside};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::{Row, SqlSafeStr, SqlitePool};
 use std::borrow::Cow;
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
 const FILES: &[(i64, &str, &str)] = &[
     (1, "baseline", include_str!("../../../migrations/0001_baseline.sql")),
+    (3, "imports", include_str!("../../../migrations/0003_imports.sql")),
     (5, "access_log", include_str!("../../../migrations/0005_access_log.sql")),
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
 ];
@@ -22,6 +23,16 @@ const SQLITE_HEADER_BYTES: usize = 100;
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
     back_up_before(pool, path, found).await?;
+    migrator().run(pool).await?;
+    Ok(())
+}
+
+/// Makes the tables of a record in an empty database.
+pub(super) async fn fresh(db: &mut Connection) -> StoreResult<()> {
+    Ok(migrator().run(db).await?)
+}
+
+fn migrator() -> Migrator {
     let migrations = FILES
         .iter()
         .map(|&(version, description, sql)| {
@@ -29,8 +40,7 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
             Migration::new(version, description, MigrationType::Simple, sql.into_sql_str(), false)
         })
         .collect();
-    Migrator::with_migrations(migrations).run(pool).await?;
-    Ok(())
+    Migrator::with_migrations(migrations)
 }
 
 /// Refuses a file of another program and one that a newer version of this one wrote; otherwise its version.

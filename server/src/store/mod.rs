@@ -20,6 +20,7 @@ mod file_kind;
 pub mod gaits;
 mod id;
 pub mod idempotency;
+pub mod imports;
 pub mod jobs;
 mod json;
 pub mod lab_answers;
@@ -30,10 +31,12 @@ pub mod listing;
 pub mod members;
 mod migrations;
 pub mod presentations;
+pub mod quarantine;
 pub mod reference_gaits;
 pub mod remarks;
 pub mod restore;
 pub mod results;
+pub mod row;
 pub mod safety_reviews;
 pub mod schema;
 pub mod seals;
@@ -252,6 +255,11 @@ impl Store {
 pub async fn commit(mut writer: LentWriter<'_>) -> StoreResult<()> {
     seals::seal(&mut writer).await?;
     writer.into_writer().commit().await
+}
+
+/// SHA-256, hexadecimal.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    json::sha256(bytes)
 }
 
 /// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].

@@ -29,7 +29,7 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 35] = [
+pub const TABLES: [Sealed; 36] = [
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
@@ -65,6 +65,7 @@ pub const TABLES: [Sealed; 35] = [
     sealed("study_restrictions", &["seq"]),
     sealed("access_log", &["seq"]),
     sealed("access_prunings", &["seq"]),
+    sealed("imports", &["seq"]),
 ];
 
 /// Tables whose rows come and go with the work, or only repeat what others say.
@@ -96,6 +97,16 @@ impl Sealed {
             .fold(sqlx::query(AssertSqlSafe(sql)), |query, part| query.bind(part.to_owned()));
         query.fetch_optional(db).await?.map_or(Ok(String::new()), |row| hash_of_row(&row))
     }
+}
+
+/// The hash of a row in its newest seal, in SQL; `None` where rows of the table are not sealed.
+pub(super) fn newest_of(table: &str) -> Option<String> {
+    let sealed = TABLES.iter().find(|sealed| sealed.table == table)?;
+    let key = sealed.key_of(&format!("{table}."));
+    Some(format!(
+        "(select s.sha256 from seals s where s.evidence = '{table}' and s.key = cast({key} as text) \
+         order by s.seq desc limit 1)"
+    ))
 }
 
 /// Makes a connection note what it writes. What was written before there were seals is noted at once.

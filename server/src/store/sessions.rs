@@ -132,3 +132,21 @@ pub async fn use_link(db: &mut Connection, hash: &str) -> StoreResult<()> {
     sqlx::query("update sign_in_links set used_at = ? where hash = ?").bind(now()).bind(hash).execute(db).await?;
     Ok(())
 }
+
+/// Drops sessions that ended before an instant, or in which nothing was done since: how many.
+///
+/// # Errors
+/// What the database reports.
+pub async fn drop_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
+    let done = sqlx::query("delete from sessions where coalesce(ended_at, seen_at) < ?").bind(at).execute(db).await?;
+    Ok(done.rows_affected())
+}
+
+/// Drops links that were used or expired before an instant: how many.
+///
+/// # Errors
+/// What the database reports.
+pub async fn drop_links_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
+    let sql = "delete from sign_in_links where min(coalesce(used_at, expires_at), expires_at) < ?";
+    Ok(sqlx::query(sql).bind(at).execute(db).await?.rows_affected())
+}

@@ -5,6 +5,7 @@
 //! record does not have, so that a process that ends at any instant is continued by the next one.
 
 pub mod answer;
+pub mod archive;
 mod balance;
 pub mod belief;
 pub mod blind;
@@ -34,6 +35,7 @@ pub mod record;
 pub mod recording;
 mod rehearsal;
 pub mod remark;
+pub mod retention;
 pub mod safety_review;
 pub mod script;
 pub mod search;

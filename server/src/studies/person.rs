@@ -30,15 +30,24 @@ pub struct NewSubject {
     pub notes: String,
 }
 
+/// Checks what is said of a subject.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &str) -> Result<Body, Error> {
+    check_pseudonym(pseudonym)?;
+    let body = Body::new(height_m, body_mass_kg)?;
+    printable::note("notes", notes, 4000)?;
+    Ok(body)
+}
+
 /// Checks a subject and writes it.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the pseudonym is taken.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<Subject, Error> {
     let pseudonym = new.pseudonym.trim();
-    check_pseudonym(pseudonym)?;
-    let body = Body::new(new.height_m, new.body_mass_kg)?;
-    printable::note("notes", &new.notes, 4000)?;
+    let body = check(pseudonym, new.height_m, new.body_mass_kg, &new.notes)?;
     let subject = subjects::insert(writer, pseudonym, body, &new.notes)
         .await
         .on_constraint(PSEUDONYM_UNIQUE, || Error::conflict(format!("there is a subject {pseudonym:?} already")))?;

@@ -228,32 +228,11 @@ async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
         None | Some("") => format!("{}, {variant}, seed {}", subject.pseudonym, new.seed),
         Some(name) => printable::name("name", name, 120)?.to_owned(),
     };
-    check_range("trial_budget", i64::from(new.trial_budget), 1, 10_000)?;
-    check_range("parallel_trials", i64::from(new.parallel_trials), 1, 64)?;
-    check_range("priority", i64::from(new.priority), -10, 10)?;
-    if new.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {
-        return Err(Error::invalid("solve_seconds_budget", json!(new.solve_seconds_budget), "1 to 1e8, or absent"));
-    }
-    if let Some(limit) = new.unchanged_limit {
-        check_range("unchanged_limit", i64::from(limit), 1, 10_000)?;
-    }
-    if new.seed > LARGEST_SEED {
-        return Err(Error::invalid("seed", new.seed, &format!("0 to {LARGEST_SEED}")));
-    }
-    new.gait_settings.validate()?;
-    new.solve_options.validate()?;
-    new.base_bounds.validate()?;
     let search_space = match new.search_space {
         Some(space) => space,
         None => search::table_i().map_err(Error::Learner)?,
     };
-    search::validate(&search_space, new.base_bounds)?;
-    new.learner.validate().map_err(Error::Learner)?;
-    if new.learner.categories() != 2 {
-        let allowed = "one threshold: a trial is converged or not converged";
-        return Err(Error::invalid("learner.ordinal_thresholds", json!(new.learner.ordinal_thresholds), allowed));
-    }
-    Ok(StudyPlan {
+    let plan = StudyPlan {
         name,
         subject_id: subject.id,
         body: Some(subject.body()),
@@ -273,7 +252,39 @@ async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
         parallel_trials: new.parallel_trials,
         priority: new.priority,
         seed: new.seed,
-    })
+    };
+    check_plan(&plan)?;
+    Ok(plan)
+}
+
+/// Checks every number of a study that is made, or that comes from elsewhere.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
+    printable::name("name", &plan.name, 120)?;
+    check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
+    check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
+    check_range("priority", i64::from(plan.priority), -10, 10)?;
+    if plan.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {
+        return Err(Error::invalid("solve_seconds_budget", json!(plan.solve_seconds_budget), "1 to 1e8, or absent"));
+    }
+    if let Some(limit) = plan.unchanged_limit {
+        check_range("unchanged_limit", i64::from(limit), 1, 10_000)?;
+    }
+    if plan.seed > LARGEST_SEED {
+        return Err(Error::invalid("seed", plan.seed, &format!("0 to {LARGEST_SEED}")));
+    }
+    plan.gait_settings.validate()?;
+    plan.solve_options.validate()?;
+    plan.base_bounds.validate()?;
+    search::validate(&plan.search_space, plan.base_bounds)?;
+    plan.learner.validate().map_err(Error::Learner)?;
+    if plan.learner.categories() != 2 {
+        let allowed = "one threshold: a trial is converged or not converged";
+        return Err(Error::invalid("learner.ordinal_thresholds", json!(plan.learner.ordinal_thresholds), allowed));
+    }
+    Ok(())
 }
 
 pub(super) fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {

@@ -157,12 +157,25 @@ impl NewReferenceGait {
     }
 }
 
+/// Checks a reference gait.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check(definition: &Definition) -> Result<(), Error> {
+    printable::name("name", &definition.name, LONGEST_NAME)?;
+    if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
+        let allowed = format!("at most {LONGEST_PROVENANCE_BYTES} bytes");
+        return Err(Error::invalid("provenance", definition.provenance.len(), &allowed));
+    }
+    Ok(definition.validate()?)
+}
+
 /// Writes a reference gait; the one that is there already where it is the very same.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a name that does not print, or what the database reports.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<ReferenceGait, Error> {
-    printable::name("name", &definition.name, LONGEST_NAME)?;
+    check(definition)?;
     let (reference, added) = reference_gaits::ensure(writer, definition).await?;
     if added {
         let detail =

@@ -1,9 +1,9 @@
 //! With muscles against without, per subject and seed; as tables and in words.
 
+use crate::csv_table::{Cell, CsvTable, cells};
 use crate::studies::history::Milestone;
 use crate::studies::recommended::CertificateState;
 use gait_optimizer::{Gait, ReferenceGait};
-use std::fmt::Write;
 
 /// The five coordinates of Gait RMSE.
 pub(super) const COORDINATES: [&str; 5] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R"];
@@ -196,65 +196,72 @@ fn spread(verdicts: &[Verdict]) -> String {
     }
 }
 
-fn cell(value: Option<f64>) -> String {
-    value.map_or_else(String::new, |value| value.to_string())
-}
-
-fn variant(outcome: &Outcome) -> String {
-    format!("{},{},{}", outcome.subject, outcome.seed, if outcome.muscles { "on" } else { "off" })
+fn variant(outcome: &Outcome) -> Vec<Cell> {
+    cells![outcome.subject, outcome.seed, if outcome.muscles { "on" } else { "off" }]
 }
 
 /// Gait RMSE of the best action by iteration.
 pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
-    let mut text = "subject,seed,muscles,iteration,best_gait_rmse_rad\n".to_owned();
+    let mut table = CsvTable::new(["subject", "seed", "muscles", "iteration", "best_gait_rmse_rad"]);
     for outcome in outcomes {
         for (index, rmse) in outcome.by_iteration.iter().enumerate() {
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "{},{},{}", variant(outcome), index + 1, cell(*rmse));
+            table.row(variant(outcome).into_iter().chain(cells![index + 1, *rmse]));
         }
     }
-    text
+    table.into_text()
 }
 
 /// One row per study.
 pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
-    let mut text = "subject,seed,muscles,trials,converged,best_trial,best_gait_rmse_rad,best_cost_of_transport,\
-                    solve_seconds,wall_seconds,best_bounds,certificate,passing_trial,passing_gait_rmse_rad\n"
-        .to_owned();
+    let mut table = CsvTable::new([
+        "subject",
+        "seed",
+        "muscles",
+        "trials",
+        "converged",
+        "best_trial",
+        "best_gait_rmse_rad",
+        "best_cost_of_transport",
+        "solve_seconds",
+        "wall_seconds",
+        "best_bounds",
+        "certificate",
+        "passing_trial",
+        "passing_gait_rmse_rad",
+    ]);
     for o in outcomes {
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{},{:.1},{:.1},{},{},{},{}",
-            variant(o),
+        table.row(variant(o).into_iter().chain(cells![
             o.trials,
             o.converged,
-            o.best_trial.map_or_else(String::new, |number| number.to_string()),
-            cell(o.best_rmse_rad),
-            cell(o.best_cost_of_transport),
-            o.solve_seconds,
-            o.wall_seconds,
-            o.best_bounds.as_deref().unwrap_or(""),
+            o.best_trial,
+            o.best_rmse_rad,
+            o.best_cost_of_transport,
+            format!("{:.1}", o.solve_seconds),
+            format!("{:.1}", o.wall_seconds),
+            o.best_bounds.as_deref(),
             o.certificate.as_str(),
-            o.passing.map_or_else(String::new, |(number, _)| number.to_string()),
-            cell(o.passing.and_then(|(_, rmse)| rmse)),
-        );
+            o.passing.map(|(number, _)| number),
+            o.passing.and_then(|(_, rmse)| rmse),
+        ]));
     }
-    text
+    table.into_text()
 }
 
 /// Final joint angles, and the reference with its standard deviation where it has one.
 pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
-    let columns = COORDINATES.map(|name| format!("{name}_rad")).join(",");
-    let mut text = format!("subject,seed,muscles,percent,{columns}\n");
-    let mut rows = |who: &str, curve: &[[f64; 5]]| {
+    let columns = COORDINATES.map(|name| format!("{name}_rad"));
+    let first = ["subject", "seed", "muscles", "percent"].map(str::to_owned);
+    let mut table = CsvTable::new(first.into_iter().chain(columns));
+    let mut rows = |who: &[Cell], curve: &[[f64; 5]]| {
         for (percent, angles) in curve.iter().enumerate() {
-            let _ = writeln!(text, "{who},{percent},{}", angles.map(|a| a.to_string()).join(","));
+            let values = cells![percent].into_iter().chain(angles.iter().map(Cell::from));
+            table.row(who.iter().cloned().chain(values));
         }
     };
     if let Some(first) = outcomes.first() {
-        rows("reference,,", &first.reference.angles_rad);
+        rows(&cells!["reference", "", ""], &first.reference.angles_rad);
         if let Some(deviation) = &first.reference.standard_deviation_rad {
-            rows("reference standard deviation,,", deviation);
+            rows(&cells!["reference standard deviation", "", ""], deviation);
         }
     }
     for outcome in outcomes {
@@ -262,7 +269,7 @@ pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
             rows(&variant(outcome), &curve.0);
         }
     }
-    text
+    table.into_text()
 }
 
 #[cfg(test)]

@@ -57,5 +57,5 @@ async fn table(app: &AppState, id: TrialId) -> Result<Response, Error> {
     let number = trials::get(&mut reader, id).await?.number;
     let gait = gaits::get(&mut reader, id).await?;
     drop(reader);
-    Ok(csv_file(&format!("gait-trial-{number}.csv"), gait_csv(&gait)?))
+    Ok(csv_file(&format!("gait-trial-{number}.csv"), gait_csv(&gait)))
 }

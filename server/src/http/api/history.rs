@@ -2,6 +2,7 @@
 
 use crate::access::Read;
 use crate::compute::OnPool;
+use crate::csv_table::{CsvTable, cells};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
@@ -33,7 +34,7 @@ pub(super) async fn of_study(
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     let history = read(&mut app, id).await?;
-    if wants_csv(&headers) { table(id, &history) } else { Ok(Json(history).into_response()) }
+    if wants_csv(&headers) { Ok(table(id, &history)) } else { Ok(Json(history).into_response()) }
 }
 
 /// `GET /studies/{id}/history.csv`.
@@ -50,7 +51,7 @@ pub(super) async fn of_study_csv(
     State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Error> {
-    table(id, &read(&mut app, id).await?)
+    Ok(table(id, &read(&mut app, id).await?))
 }
 
 async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
@@ -66,12 +67,10 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Error> 
     app.compute(compute).await?.map_err(Error::Learner)
 }
 
-fn table(study: StudyId, history: &[Milestone]) -> Result<Response, Error> {
-    let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-    let rows = history
-        .iter()
-        .map(|m| vec![m.iteration.to_string(), m.number.to_string(), text(m.gait_rmse_rad), text(m.cost_of_transport)])
-        .collect();
-    let header = ["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"];
-    csv_answer(&format!("history-{}.csv", study.short()), &header, rows)
+fn table(study: StudyId, history: &[Milestone]) -> Response {
+    let mut table = CsvTable::new(["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"]);
+    for m in history {
+        table.row(cells![m.iteration, m.number, m.gait_rmse_rad, m.cost_of_transport]);
+    }
+    csv_answer(&format!("history-{}.csv", study.short()), table)
 }

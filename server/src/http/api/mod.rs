@@ -77,6 +77,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(recommendation::of_study))
         .routes(routes!(recommendation::of_study_csv))
         .routes(routes!(archive::of_study))
+        .routes(routes!(archive::imports_of_study))
         .routes(routes!(history::of_study))
         .routes(routes!(history::of_study_csv))
         .routes(routes!(preferences::of_study, preferences::create))

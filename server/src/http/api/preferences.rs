@@ -1,6 +1,7 @@
 //! Preferences: answers to comparisons.
 
 use crate::access::{self, Read};
+use crate::csv_table::{CsvTable, cells};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -40,15 +41,15 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     if wants_csv(&headers) {
-        return table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?);
+        return Ok(table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?));
     }
     let limit = page.limit(1000)?;
     let rows = feedback::comparisons(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
     Ok(linked_after(&format!("/api/v1/studies/{id}/preferences"), rows, limit, |row| row.seq.to_string()))
 }
 
-fn table(study: StudyId, rows: &[FeedbackRow]) -> Result<Response, Error> {
-    let header = [
+fn table(study: StudyId, rows: &[FeedbackRow]) -> Response {
+    let mut table = CsvTable::new([
         "seq",
         "id",
         "kind",
@@ -60,32 +61,29 @@ fn table(study: StudyId, rows: &[FeedbackRow]) -> Result<Response, Error> {
         "created_at",
         "retracted_at",
         "retraction_reason",
-    ];
-    let rows = rows
-        .iter()
-        .filter_map(|row| {
-            let (kind, a, b) = match row.said {
-                Said::Preference { winner, loser } => ("preference", winner, loser),
-                Said::Tie { a, b } => ("tie", a, b),
-                Said::Label { .. } | Said::Suggestion { .. } => return None,
-            };
-            let retraction = row.retraction.as_ref();
-            Some(vec![
-                row.seq.to_string(),
-                row.id.to_string(),
-                kind.to_owned(),
-                a.to_string(),
-                b.to_string(),
-                row.source.as_str().to_owned(),
-                row.author.clone(),
-                row.note.clone(),
-                row.created_at.to_string(),
-                retraction.map(|r| r.created_at.to_string()).unwrap_or_default(),
-                retraction.map(|r| r.reason.clone()).unwrap_or_default(),
-            ])
-        })
-        .collect();
-    csv_answer(&format!("preferences-{}.csv", study.short()), &header, rows)
+    ]);
+    for row in rows {
+        let (kind, a, b) = match row.said {
+            Said::Preference { winner, loser } => ("preference", winner, loser),
+            Said::Tie { a, b } => ("tie", a, b),
+            Said::Label { .. } | Said::Suggestion { .. } => continue,
+        };
+        let retraction = row.retraction.as_ref();
+        table.row(cells![
+            row.seq,
+            row.id.to_string(),
+            kind,
+            a.to_string(),
+            b.to_string(),
+            row.source.as_str(),
+            &row.author,
+            &row.note,
+            row.created_at.to_string(),
+            retraction.map(|r| r.created_at.to_string()),
+            retraction.map(|r| &r.reason),
+        ]);
+    }
+    csv_answer(&format!("preferences-{}.csv", study.short()), table)
 }
 
 /// `GET /preferences/{id}`.

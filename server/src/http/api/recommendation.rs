@@ -2,6 +2,7 @@
 
 use crate::access::Read;
 use crate::compute::OnPool;
+use crate::csv_table::{CsvTable, cells};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::may::May;
@@ -105,20 +106,12 @@ pub(super) async fn of_study_csv(
 ) -> Result<Response, Error> {
     let Recommendation { best, certificate, .. } = read(&mut app, id).await?;
     let bounds = TunedBounds::NAMES.iter().zip(best.bounds.to_array()).zip(TunedBounds::MEANINGS);
-    let rows = bounds
-        .map(|((name, value), meaning)| {
-            let (limited, unit) = meaning.rsplit_once(", ").unwrap_or((meaning, ""));
-            vec![
-                (*name).to_owned(),
-                value.to_string(),
-                unit.to_owned(),
-                limited.to_owned(),
-                certificate.as_str().to_owned(),
-            ]
-        })
-        .collect();
-    let columns = ["bound", "value", "unit", "limits", "certificate_of_the_gait"];
-    csv_answer(&format!("bounds-trial-{}.csv", best.number), &columns, rows)
+    let mut table = CsvTable::new(["bound", "value", "unit", "limits", "certificate_of_the_gait"]);
+    for ((name, value), meaning) in bounds {
+        let (limited, unit) = meaning.rsplit_once(", ").unwrap_or((meaning, ""));
+        table.row(cells![*name, value, unit, limited, certificate.as_str()]);
+    }
+    Ok(csv_answer(&format!("bounds-trial-{}.csv", best.number), table))
 }
 
 async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Error> {

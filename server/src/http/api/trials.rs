@@ -1,6 +1,7 @@
 //! Trials.
 
 use crate::access::{Read, Run};
+use crate::csv_table::{Cell, CsvTable, cells};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -196,26 +197,22 @@ async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Error> {
     ]);
     let all = trials::of_study(db, study).await?;
     let numbers: HashMap<TrialId, u32> = all.iter().map(|trial| (trial.id, trial.number)).collect();
-    let number_of = |id: Option<TrialId>| id.and_then(|id| numbers.get(&id)).map(u32::to_string);
-    let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-    let rows = all
-        .iter()
-        .map(|t| {
-            let mut row = vec![t.number.to_string(), t.id.to_string()];
-            row.extend(t.action.to_array().iter().map(f64::to_string));
-            row.extend([
-                t.state.as_str().to_owned(),
-                text(t.gait_rmse_rad),
-                text(t.cost_of_transport),
-                text(t.max_violation),
-                t.iterations.map(|n| n.to_string()).unwrap_or_default(),
-                text(t.seconds_total),
-                number_of(t.warm_started_from).unwrap_or_default(),
-                t.reason.clone(),
-                t.message.clone(),
-            ]);
-            row
-        })
-        .collect();
-    csv_answer(&format!("trials-{}.csv", study.short()), &header, rows)
+    let mut table = CsvTable::new(header);
+    for trial in &all {
+        let mut row = cells![trial.number, trial.id.to_string()];
+        row.extend(trial.action.to_array().iter().map(Cell::from));
+        row.extend(cells![
+            trial.state.as_str(),
+            trial.gait_rmse_rad,
+            trial.cost_of_transport,
+            trial.max_violation,
+            trial.iterations,
+            trial.seconds_total,
+            trial.warm_started_from.and_then(|id| numbers.get(&id)),
+            &trial.reason,
+            &trial.message,
+        ]);
+        table.row(row);
+    }
+    Ok(csv_answer(&format!("trials-{}.csv", study.short()), table))
 }

@@ -15,7 +15,9 @@ pub use measured::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, beside_model, compute, emg, keep_result, known_gait,
     limit_cycles,
 };
-pub use recording::{Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, keep};
+pub use recording::{
+    Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep,
+};
 pub use session::{
     Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
     gait_to_walk_with, in_the_lab, plan, record_walk, still_open, unblind, was_recorded,

@@ -222,6 +222,24 @@ impl NewMotion {
     }
 }
 
+/// Checks a recording that is kept already, as if it were brought now.
+///
+/// # Errors
+/// [`Error::Invalid`] with line and column, or the field.
+pub async fn check_kept(db: &mut Connection, kept: &LabRecording) -> Result<(), Error> {
+    let id = kept.id;
+    match kept.kind {
+        RecordingKind::Electromyogram => {
+            let (reading, text) = lab_recordings::file::<EmgReading>(db, id).await?;
+            reading.check(&text)
+        }
+        RecordingKind::Motion => {
+            let (reading, text) = lab_recordings::file::<MotionReading>(db, id).await?;
+            reading.check(&text)
+        }
+    }
+}
+
 /// A file as it was brought, byte for byte.
 #[derive(Debug)]
 pub struct Brought {

@@ -20,6 +20,7 @@ use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, Tree};
 use crate::store::devices::{self, Device};
 use crate::store::feedback::{self, FeedbackRow, Retraction, Said, Source};
+use crate::store::imports::{self, Import};
 use crate::store::remarks::{self, Remark};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::subjects::{self, Subject};
@@ -60,6 +61,8 @@ struct StudyPage {
     variant: &'static str,
     answers_by: &'static str,
     may_administer: bool,
+    /// Where it came from; empty: it was made here.
+    imports: Vec<Import>,
 }
 
 /// The page of a study whose subject withdrew: what was tried, and nothing of what came of it.
@@ -207,12 +210,24 @@ pub(super) async fn get(
     let last_event = events::last(&mut reader, id).await?;
     let device = devices::get(&mut reader, study.plan.device_id).await?;
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.name;
+    let imports = imports::of_study(&mut reader, id).await?;
     drop(reader);
     let live =
         read_live(&mut app, &may.caller, id, choice).await?.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = may.caller.may(Administer::NEEDED);
     let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
-    page(&StudyPage { study, subject, device, reference, live, last_event, variant, answers_by, may_administer })
+    page(&StudyPage {
+        study,
+        subject,
+        device,
+        reference,
+        live,
+        last_event,
+        variant,
+        answers_by,
+        may_administer,
+        imports,
+    })
 }
 
 /// `GET /studies/{id}/live`: the changing part alone, for the script.
