@@ -92,7 +92,9 @@ impl Examiner {
                 Next::Trial(trial) => {
                     if let Err(error) = self.certify(trial).await {
                         tracing::error!(%trial, %error, "cannot certify a gait that people are waiting for");
-                        self.state().refused.insert(trial);
+                        if !error.is_of_machine() {
+                            self.state().refused.insert(trial);
+                        }
                     }
                     self.state().asked.remove(&trial);
                     changed();
