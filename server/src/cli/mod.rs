@@ -21,6 +21,7 @@ pub mod study;
 mod sweep;
 mod tune;
 mod unattended;
+mod users;
 mod worker;
 
 use crate::error::Error;
@@ -93,6 +94,8 @@ enum Command {
     Export(study::Export),
     /// Add the study of such a file to a database.
     Import(study::Import),
+    /// List users and make sign-in links for them.
+    Users(users::Users),
     /// Drop old trajectories; what was learned from them stays.
     Prune(study::Prune),
 }
@@ -139,6 +142,7 @@ pub fn run() -> ExitCode {
         Command::Restore(restore) => runtime.block_on(restore.run()).map(|()| Ended::Done),
         Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),
         Command::Import(import) => runtime.block_on(import.run()).map(|()| Ended::Done),
+        Command::Users(users) => runtime.block_on(users.run()).map(|()| Ended::Done),
         Command::Prune(prune) => runtime.block_on(prune.run()).map(|()| Ended::Done),
     };
     match done {
