@@ -3,15 +3,17 @@
 use crate::analytic::Analytic;
 use crate::service::{Answer, Service};
 use axum::body::Body;
+use axum::extract::ConnectInfo;
 use axum::http::{Method, Request, header};
 use gaitwright::access::people::{self, NewUser};
 use gaitwright::access::tokens::{self, NewToken};
-use gaitwright::access::{Right, Role, sign_in};
+use gaitwright::access::{Right, Role, secret, sign_in};
 use gaitwright::http::Access;
 use gaitwright::store::audit::Actor;
 use gaitwright::store::members::{Member, MemberKind};
 use gaitwright::store::{StudyId, UserId, commit};
 use gaitwright::studies::membership::{self, NewMember};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use tempfile::TempDir;
 
@@ -98,7 +100,44 @@ pub async fn send(service: &Service, who: &As, method: &Method, path: &str, kind
 
 /// The session that an answer begins.
 pub fn session_of(answer: &Answer) -> As {
-    let cookie = answer.headers["set-cookie"].to_str().unwrap();
+    As::Session(cookie_of(answer, "gaitwright_session"))
+}
+
+/// The value of a cookie that an answer sets.
+pub fn cookie_of(answer: &Answer, name: &str) -> String {
+    let mut cookies = answer.headers.get_all("set-cookie").iter().map(|cookie| cookie.to_str().unwrap());
+    let start = format!("{name}=");
+    let cookie = cookies.find(|cookie| cookie.starts_with(&start)).unwrap();
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Lax"), "{cookie}");
-    As::Session(cookie.split(';').next().unwrap().split_once('=').unwrap().1.to_owned())
+    cookie[start.len()..].split(';').next().unwrap().to_owned()
+}
+
+/// Sends name and password from an address, in a browser that may have been there before.
+pub async fn sign_in_from(
+    service: &Service,
+    address: [u8; 4],
+    browser: Option<&str>,
+    name: &str,
+    password: &str,
+) -> Answer {
+    let mut request = Request::post("/sign-in").header(header::CONTENT_TYPE, FORM);
+    if let Some(browser) = browser {
+        request = request
+            .header(header::COOKIE, format!("gaitwright_browser={browser}"))
+            .header("sec-fetch-site", "same-origin");
+    }
+    let body = format!("name={}&password={}", name.replace(' ', "+"), password.replace(' ', "+"));
+    let mut request = request.body(Body::from(body)).unwrap();
+    request.extensions_mut().insert(ConnectInfo(SocketAddr::from((address, 40_000))));
+    service.send(request).await
+}
+
+/// A user with a password.
+pub async fn with_password(service: &Service, name: &str, role: Role, password: &str) -> UserId {
+    let (id, _) = user(service, name, role).await;
+    let hashed = secret::hash_password_of(name, password).unwrap();
+    let mut writer = service.store.write().await.unwrap();
+    people::set_password(&mut writer, &Actor::program(), id, &hashed).await.unwrap();
+    commit(writer).await.unwrap();
+    id
 }

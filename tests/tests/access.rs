@@ -68,7 +68,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 68] = [
+const PAGES: [(&str, Option<Right>); 69] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -136,6 +136,7 @@ const PAGES: [(&str, Option<Right>); 68] = [
     ("get /sign-in/{link}", None),
     ("post /sign-in/{link}", None),
     ("post /sign-out", None),
+    ("post /account/sessions", None),
     ("get /account", None),
 ];
 
@@ -335,7 +336,8 @@ async fn a_password_is_changed_by_who_knows_it_or_has_just_come_by_a_link() {
     let page = send(&service, &fresh, &Method::GET, "/account", FORM, "").await;
     assert!(!page.text.contains("name=\"present\""), "{}", page.text);
     let mut writer = service.store.write().await.unwrap();
-    let age = "update sessions set created_at = '2026-01-01T00:00:00.000000Z' where ended_at is null";
+    let age =
+        "update sessions set created_at = strftime('%Y-%m-%dT%H:%M:%fZ', 'now', '-2 hours') where ended_at is null";
     sqlx::query(age).execute(&mut **writer).await.unwrap();
     commit(writer).await.unwrap();
     let page = send(&service, &fresh, &Method::GET, "/account", FORM, "").await;
@@ -360,7 +362,9 @@ async fn wrong_passwords_wait_longer_and_longer_and_leave_their_mark() {
     let waits = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, right).await;
     assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 100).await.unwrap();
-    assert_eq!(rows.iter().filter(|row| row.action == "session.refuse").count(), 4);
+    let count = |action: &str| rows.iter().filter(|row| row.action == action).count();
+    assert_eq!((count("session.refuse"), count("session.wait")), (4, 1));
+    assert_eq!(rows[0].detail["failed_attempts_of_network"], 5);
     service.stop().await;
 }
 

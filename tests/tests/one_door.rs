@@ -306,9 +306,10 @@ fn every_route_is_classified() {
 }
 
 /// What each command has to do with people and devices.
-const COMMANDS: [(&str, &str); 21] = [
+const COMMANDS: [(&str, &str); 22] = [
     ("convert", "makes a controller file of a gait file that no record knows: certifies it and says so"),
-    ("import", "writes the rows of an archive as they are, after checking them: `archives.rs` holds its rules"),
+    ("import", "writes the rows of an archive after checking them: `archives.rs` holds its rules"),
+    ("signing-key", "makes a key to sign archives"),
     ("audit", "reads the record"),
     ("backup", "copies the record"),
     ("body", "writes a body's figures"),

@@ -2,6 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use gaitwright::access::Role;
+use gaitwright::access::people::{self, NewUser};
+use gaitwright::store::audit::Actor;
+use gaitwright::store::{Store, commit};
+use gaitwright_tests::cli::run;
 use gaitwright_tests::client::{get, send};
 use gaitwright_tests::skipped::skipped;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
@@ -191,4 +196,54 @@ fn silent_connections_above_the_descriptor_limit_leave_health_answering() {
         assert!(said.contains("too many connections"), "{said}");
         assert!(!said.contains('\u{1b}'), "colour codes in a file: {said}");
     }
+}
+
+/// A record whose administrators are all disabled, as older versions let it become.
+async fn nobody_administers(folder: &Path) {
+    let store = Store::open(&folder.join("gaitwright.db")).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    let new = NewUser { name: "admin".to_owned(), role: Role::Admin };
+    people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    sqlx::query("update users set disabled_at = created_at").execute(&mut **writer).await.unwrap();
+    commit(writer).await.unwrap();
+    store.close().await;
+}
+
+#[tokio::test]
+async fn service_starts_and_lets_an_administrator_in_when_all_are_disabled() {
+    for arguments in [&[][..], &["--sign-in-link"]] {
+        let folder = tempfile::tempdir().unwrap();
+        nobody_administers(folder.path()).await;
+        let process = Process::start(folder.path(), arguments, "sign in");
+        let path = process.said.last().unwrap().split(process.address()).nth(1).unwrap().to_owned();
+        let first = send(process.address(), "POST", &path, "").unwrap();
+        assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
+    }
+}
+
+#[tokio::test]
+async fn users_link_on_the_command_line_lets_its_owner_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), arguments);
+    let nothing = run(&["users", "link", "Ada"]);
+    assert!(!nothing.status.success() && !folder.path().join("gaitwright.db").exists());
+    nobody_administers(folder.path()).await;
+    let store = Store::open(&folder.path().join("gaitwright.db")).await.unwrap();
+    let mut writer = store.write().await.unwrap();
+    let new = NewUser { name: "Ada".to_owned(), role: Role::Admin };
+    people::add(&mut writer, &Actor::program(), &new).await.unwrap();
+    commit(writer).await.unwrap();
+    store.close().await;
+    drop(store);
+    let listed = String::from_utf8(run(&["users", "list"]).stdout).unwrap();
+    assert_eq!(listed, "admin\tadmin\tone-time link\tdisabled\nAda\tadmin\tone-time link\n");
+    assert_eq!(run(&["users", "link", "Bob"]).status.code(), Some(2));
+    assert_eq!(run(&["users", "link", "admin"]).status.code(), Some(2), "who is disabled gets none");
+    let link = String::from_utf8(run(&["users", "link", "ada"]).stdout).unwrap();
+    let process = Process::start(folder.path(), &[], "sign in");
+    let first = send(process.address(), "POST", link.trim(), "").unwrap();
+    assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
+    let busy = run(&["users", "list"]);
+    let said = String::from_utf8_lossy(&busy.stderr).into_owned();
+    assert!(busy.status.code() == Some(2) && said.contains("--sign-in-link"), "{said}");
 }

@@ -31,7 +31,7 @@ impl Caller {
                 Role::Clinician => Reach::Open(principal),
                 Role::Rater => Reach::Assigned(principal),
             },
-            actor: Actor::named(&format!("{} {name}", role.as_str())),
+            actor: Actor::user(id, &format!("{} {name}", role.as_str())),
             name: name.to_owned(),
             user: Some(id),
             role: Some(role),
@@ -66,9 +66,9 @@ impl Caller {
         }
     }
 
-    /// Whether it may.
-    pub fn may(&self, right: Right) -> bool {
-        self.rights.has(right)
+    /// Whether it may; none: what asks for no right.
+    pub fn may(&self, right: impl Into<Option<Right>>) -> bool {
+        right.into().is_none_or(|right| self.rights.has(right))
     }
 
     /// Which studies it reaches.

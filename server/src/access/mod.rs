@@ -3,8 +3,10 @@
 //! People sign in with a one-time link or a password and have a role; programs of the lab carry a token and have
 //! scopes. Either gives [`Rights`], the only thing that is ever asked for.
 
-mod back_off;
+pub mod back_off;
 mod caller;
+pub mod clock;
+pub mod password;
 pub mod people;
 mod reach;
 mod right;
@@ -12,7 +14,7 @@ pub mod secret;
 pub mod sign_in;
 pub mod tokens;
 
-pub use back_off::BackOff;
 pub use caller::Caller;
+pub use clock::Clock;
 pub use reach::{Principal, Reach};
-pub use right::{Administer, Answer, Permission, Rate, Read, Right, Rights, Role, Run};
+pub use right::{Administer, Answer, Anything, Permission, Rate, Read, Right, Rights, Role, Run};

@@ -105,8 +105,8 @@ impl FromStr for Role {
 
 /// A right as a type: what a handler asks for in its arguments.
 pub trait Permission: Send + Sync + 'static {
-    /// The right.
-    const NEEDED: Right;
+    /// The right; none: it is enough to have signed in.
+    const NEEDED: Option<Right>;
 }
 
 macro_rules! permission {
@@ -116,9 +116,17 @@ macro_rules! permission {
         pub struct $name;
 
         impl Permission for $name {
-            const NEEDED: Right = Right::$name;
+            const NEEDED: Option<Right> = Some(Right::$name);
         }
     };
+}
+
+/// Asks for no right: whoever has signed in, and every token.
+#[derive(Debug, Clone, Copy)]
+pub struct Anything;
+
+impl Permission for Anything {
+    const NEEDED: Option<Right> = None;
 }
 
 permission!(Read);

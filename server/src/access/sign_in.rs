@@ -1,11 +1,12 @@
 //! Signing in and out, and recognising who was signed in.
 
 use super::caller::Caller;
-use super::secret;
+use super::{clock, secret};
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
+use crate::store::sessions::{From, Session};
 use crate::store::users::{self, User};
-use crate::store::{Connection, Writer, now, sessions, tokens};
+use crate::store::{self, Connection, Instant, SessionId, UserId, Writer, sessions, tokens};
 use serde::Serialize;
 use serde_json::json;
 
@@ -15,20 +16,49 @@ const SEEN_EVERY_SECONDS: f64 = 60.0;
 /// For so long after coming in by a one-time link a password can be set without the present one, which may be forgotten.
 const LINK_IS_FRESH_SECONDS: f64 = 3600.0;
 
+/// When sessions end by themselves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// A session without a sign of life for so long has ended.
+    pub idle_seconds: f64,
+    /// A session has ended so long after it was begun, used or not.
+    pub lifetime_seconds: f64,
+}
+
+impl Limits {
+    fn has_ended(&self, session: &Session, now: Instant) -> bool {
+        now.seconds_since(session.seen_at) > self.idle_seconds
+            || now.seconds_since(session.created_at) > self.lifetime_seconds
+    }
+}
+
 /// Signs in with a one-time link: the user and the secret of the session.
 ///
 /// # Errors
 /// [`Error::NotSignedIn`] when the link is unknown, used, too old, or of a user who was shut out.
 pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String), Error> {
+    with_link_from(writer, link, &From::default()).await
+}
+
+/// [`with_link`], noting where it was.
+///
+/// # Errors
+/// As [`with_link`]; that it was too old is to be committed.
+pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Result<(User, String), Error> {
     let refused = || Error::NotSignedIn("this link was used or is too old; ask for another one".to_owned());
     let hash = secret::hash(link);
-    let id = sessions::link(writer, &hash).await?.ok_or_else(refused)?;
+    let (id, expires_at) = sessions::link(writer, &hash).await?.ok_or_else(refused)?;
+    let now = clock::recorded(writer).await?;
     let user = users::get(writer, id).await?;
+    if expires_at <= now {
+        sessions::use_link(writer, &hash, now).await?;
+        return Err(refused());
+    }
     if user.disabled_at.is_some() {
         return Err(refused());
     }
-    sessions::use_link(writer, &hash).await?;
-    let secret = begin(writer, &user, By::Link).await?;
+    sessions::use_link(writer, &hash, now).await?;
+    let secret = begin(writer, &user, By::Link, from).await?;
     Ok((user, secret))
 }
 
@@ -36,8 +66,8 @@ pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String)
 ///
 /// # Errors
 /// What the database reports.
-pub async fn with_password(writer: &mut Writer, user: &User) -> Result<String, Error> {
-    begin(writer, user, By::Password).await
+pub async fn with_password(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
+    begin(writer, user, By::Password, from).await
 }
 
 /// What somebody came in by.
@@ -48,11 +78,11 @@ enum By {
     Password,
 }
 
-async fn begin(writer: &mut Writer, user: &User, by: By) -> Result<String, Error> {
-    let secret = secret::fresh()?;
-    sessions::begin(writer, &secret::hash(&secret), user.id, by == By::Link).await?;
+async fn begin(writer: &mut Writer, user: &User, by: By, from: &From) -> Result<String, Error> {
+    let secret = renew(writer, user, by == By::Link, from).await?;
     let actor = Caller::person(user.id, &user.name, user.role).actor;
-    audit::append(writer, &actor, "session.begin", &format!("user {}", user.id), &json!({ "by": by })).await?;
+    let detail = json!({ "by": by, "address": from.address });
+    audit::append(writer, &actor, "session.begin", &format!("user {}", user.id), &detail).await?;
     Ok(secret)
 }
 
@@ -60,9 +90,14 @@ async fn begin(writer: &mut Writer, user: &User, by: By) -> Result<String, Error
 ///
 /// # Errors
 /// What the database reports.
-pub async fn renew(writer: &mut Writer, user: &User) -> Result<String, Error> {
+pub async fn renewed(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
+    renew(writer, user, false, from).await
+}
+
+async fn renew(writer: &mut Writer, user: &User, by_link: bool, from: &From) -> Result<String, Error> {
     let secret = secret::fresh()?;
-    sessions::begin(writer, &secret::hash(&secret), user.id, false).await?;
+    let now = clock::recorded(writer).await?;
+    sessions::begin(writer, &secret::hash(&secret), user.id, by_link, from, now).await?;
     Ok(secret)
 }
 
@@ -77,8 +112,9 @@ pub async fn must_say_password(db: &mut Connection, user: &User, session: Option
     }
     let Some(session) = session else { return Ok(true) };
     let found = sessions::find(db, &secret::hash(session)).await?;
+    let now = clock::recorded(db).await?;
     let by_fresh_link = found.filter(|session| {
-        session.by_link && session.user == user.id && now().seconds_since(session.begun_at) <= LINK_IS_FRESH_SECONDS
+        session.by_link && session.user_id == user.id && now.seconds_since(session.created_at) <= LINK_IS_FRESH_SECONDS
     });
     Ok(by_fresh_link.is_none())
 }
@@ -92,56 +128,108 @@ pub async fn has_no_password(db: &mut Connection, caller: &Caller) -> Result<boo
     Ok(!users::get(db, id).await?.has_password)
 }
 
-/// Notes a failed attempt with a password.
-///
-/// # Errors
-/// What the database reports.
-pub async fn failed(writer: &mut Writer, name: &str) -> Result<(), Error> {
-    let name: String = name.chars().filter(|c| !c.is_control()).take(80).collect();
-    audit::append(writer, &Actor::anonymous(), "session.refuse", "session", &json!({ "name": name })).await?;
-    Ok(())
-}
-
-/// Signs out.
+/// Signs out: ends the session with this secret.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn out(writer: &mut Writer, actor: &Actor, session: &str) -> Result<(), Error> {
-    sessions::end(writer, &secret::hash(session)).await?;
-    audit::append(writer, actor, "session.end", "session", &json!({})).await?;
+    if let Some(session) = sessions::find(writer, &secret::hash(session)).await? {
+        end(writer, actor, &session).await?;
+    }
     Ok(())
 }
 
-/// Whose session it is, and whether it is time to note that the person did something.
+/// Ends a session: one's own, or, by an administrator, another's.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn of_session(db: &mut Connection, session: &str, idle: f64) -> Result<Option<(Caller, bool)>, Error> {
-    let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(None) };
-    let since = now().seconds_since(found.seen_at);
-    if since > idle {
-        return Ok(None);
+pub async fn end(writer: &mut Writer, actor: &Actor, session: &Session) -> Result<(), Error> {
+    let now = clock::recorded(writer).await?;
+    if sessions::end(writer, session.id, now).await? {
+        let detail = json!({ "session": session.id });
+        audit::append(writer, actor, "session.end", &format!("user {}", session.user_id), &detail).await?;
     }
-    let user = users::get(db, found.user).await?;
-    if user.disabled_at.is_some() {
-        return Ok(None);
-    }
-    Ok(Some((Caller::person(user.id, &user.name, user.role), since > SEEN_EVERY_SECONDS.min(idle / 4.0))))
+    Ok(())
 }
 
-/// Notes that the person did something.
+/// The sessions that have not ended: of a user, or all. The newest first.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn seen(writer: &mut Writer, session: &str) -> Result<(), Error> {
-    Ok(sessions::seen(writer, &secret::hash(session)).await?)
+pub async fn live(
+    db: &mut Connection,
+    user: Option<UserId>,
+    limits: Limits,
+    now: Instant,
+) -> Result<Vec<Session>, Error> {
+    let mut found = sessions::live(db, user).await?;
+    found.retain(|session| !limits.has_ended(session, now));
+    Ok(found)
+}
+
+/// Who is found by a secret.
+#[derive(Debug)]
+pub enum Recognised {
+    /// Nobody: it is unknown, or was ended.
+    Nobody,
+    /// Nobody: its time is over, which the record does not say yet. To be noted with [`note_ended`].
+    Ended(Option<SessionId>),
+    /// Somebody.
+    Known {
+        /// Who.
+        caller: Caller,
+        /// The session, when it is time to note that the person did something.
+        seen: Option<SessionId>,
+    },
+}
+
+/// Whose session it is.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_session(db: &mut Connection, session: &str, limits: Limits, now: Instant) -> Result<Recognised, Error> {
+    let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(Recognised::Nobody) };
+    if limits.has_ended(&found, now) {
+        return Ok(Recognised::Ended(Some(found.id)));
+    }
+    let user = users::get(db, found.user_id).await?;
+    if user.disabled_at.is_some() {
+        return Ok(Recognised::Nobody);
+    }
+    let due = now.seconds_since(found.seen_at) > SEEN_EVERY_SECONDS.min(limits.idle_seconds / 4.0);
+    Ok(Recognised::Known { caller: Caller::person(user.id, &user.name, user.role), seen: due.then_some(found.id) })
 }
 
 /// Whose token it is.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn of_token(db: &mut Connection, token: &str) -> Result<Option<Caller>, Error> {
-    let found = tokens::by_hash(db, &secret::hash(token)).await?;
-    Ok(found.map(|token| Caller::token(token.id, &token.name, &token.scopes)))
+pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<Recognised, Error> {
+    let Some(found) = tokens::by_hash(db, &secret::hash(token)).await? else { return Ok(Recognised::Nobody) };
+    if let Some(expires_at) = found.expires_at.filter(|expires_at| *expires_at <= now) {
+        let noted = store::clock::latest(db).await?.is_some_and(|latest| latest >= expires_at);
+        return Ok(if noted { Recognised::Nobody } else { Recognised::Ended(None) });
+    }
+    Ok(Recognised::Known { caller: Caller::token(found.id, &found.name, &found.scopes), seen: None })
+}
+
+/// Notes that the person did something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn seen(writer: &mut Writer, session: SessionId, now: Instant) -> Result<(), Error> {
+    store::clock::reach(writer, now).await?;
+    Ok(sessions::seen(writer, session, now).await?)
+}
+
+/// Notes that the time of a session or token is over: it stays so when the machine's clock is set back.
+///
+/// # Errors
+/// What the database reports.
+pub async fn note_ended(writer: &mut Writer, session: Option<SessionId>, now: Instant) -> Result<(), Error> {
+    store::clock::reach(writer, now).await?;
+    if let Some(session) = session {
+        sessions::end(writer, session, now).await?;
+    }
+    Ok(())
 }

@@ -1,12 +1,13 @@
 //! Tokens of scripts: made, shown once, ended.
 
+use super::clock;
 use super::right::Right;
 use super::secret;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::tokens::{self, NAME_UNIQUE, Token};
-use crate::store::{OnConstraint, TokenId, Writer, now};
+use crate::store::{OnConstraint, TokenId, UserId, Writer};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -44,8 +45,9 @@ pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<
         return Err(Error::invalid("days", json!(new.days), &format!("1 to {LONGEST_DAYS}, or absent")));
     }
     let secret = format!("gait_{}", secret::fresh()?);
-    let ends = new.days.map(|days| now().plus_seconds(i64::from(days) * 86_400));
-    let token = tokens::insert(writer, name, &secret::hash(&secret), &new.scopes, actor.as_str(), ends)
+    let now = clock::recorded(writer).await?;
+    let ends = new.days.map(|days| now.plus_seconds(i64::from(days) * 86_400));
+    let token = tokens::insert(writer, name, &secret::hash(&secret), &new.scopes, actor, ends)
         .await
         .on_constraint(NAME_UNIQUE, || Error::conflict(format!("there is a token {name:?} already")))?;
     let detail = json!({ "name": name, "scopes": new.scopes });
@@ -64,4 +66,15 @@ pub async fn revoke(writer: &mut Writer, actor: &Actor, id: TokenId) -> Result<T
     }
     audit::append(writer, actor, "token.revoke", &format!("token {id}"), &json!({ "name": token.name })).await?;
     Ok(tokens::get(writer, id).await?)
+}
+
+/// Ends every token that a user made: whoever may not administer any more keeps no way in by a program.
+///
+/// # Errors
+/// What the database reports.
+pub(super) async fn revoke_all_of(writer: &mut Writer, actor: &Actor, user: UserId) -> Result<(), Error> {
+    for token in tokens::made_by(writer, user).await? {
+        revoke(writer, actor, token.id).await?;
+    }
+    Ok(())
 }

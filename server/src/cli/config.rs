@@ -2,6 +2,7 @@
 
 use super::numbers::workers;
 use super::output::data;
+use crate::access::sign_in::Limits as SessionLimits;
 use crate::error::Error;
 use crate::http::connections::Limits;
 use crate::http::{NETWORKS, Network, Proxies, ProxyHeaders};
@@ -29,6 +30,7 @@ const KNOWN: &[(&str, &str, &str)] = &[
     ("nats_queue", "gaitwright", "name of this service on the broker; its workers are told the same"),
     ("sign_in", "true", "whether people and programs say who they are; false on this machine only"),
     ("idle_minutes", "60", "a session without a sign of life for so long ends"),
+    ("session_hours", "12", "a session ends so long after signing in, used or not"),
     ("tls_certificate", "", "PEM file with the certificate chain; with tls_key, the service speaks HTTPS"),
     ("tls_key", "", "PEM file with the private key"),
     (
@@ -79,6 +81,9 @@ pub(super) struct Flags {
     /// A session without a sign of life for so long ends; default 60.
     #[arg(long, value_name = "MINUTES")]
     idle_minutes: Option<String>,
+    /// A session ends so long after signing in, used or not; default 12.
+    #[arg(long, value_name = "HOURS")]
+    session_hours: Option<String>,
     /// Address or network of a reverse proxy that is believed about client, scheme and host; may be given several times.
     #[arg(long, value_delimiter = ',', value_name = "ADDRESS[/BITS]")]
     trusted_proxy: Vec<String>,
@@ -197,13 +202,16 @@ impl Settings {
         self.parsed("sign_in", "true, false")
     }
 
-    pub(super) fn idle_seconds(&self) -> Result<f64, Error> {
-        let minutes: f64 = self.parsed("idle_minutes", "1 to 1440")?;
-        if (1.0..=1440.0).contains(&minutes) {
-            Ok(60.0 * minutes)
-        } else {
-            Err(self.refused("idle_minutes", "1 to 1440"))
-        }
+    /// When sessions end by themselves.
+    pub(super) fn session_limits(&self) -> Result<SessionLimits, Error> {
+        let idle_seconds = 60.0 * self.within("idle_minutes", 1.0, 1440.0)?;
+        Ok(SessionLimits { idle_seconds, lifetime_seconds: 3600.0 * self.within("session_hours", 1.0, 720.0)? })
+    }
+
+    fn within(&self, name: &str, least: f64, most: f64) -> Result<f64, Error> {
+        let allowed = format!("{least} to {most}");
+        let number: f64 = self.parsed(name, &allowed)?;
+        if (least..=most).contains(&number) { Ok(number) } else { Err(self.refused(name, &allowed)) }
     }
 
     /// The reverse proxies that are believed.
@@ -277,6 +285,7 @@ impl Flags {
             "nats_queue" => self.nats_queue.clone(),
             "sign_in" => self.no_sign_in.then(|| "false".to_owned()),
             "idle_minutes" => self.idle_minutes.clone(),
+            "session_hours" => self.session_hours.clone(),
             "trusted_proxies" => Some(self.trusted_proxy.join(",")).filter(|proxies| !proxies.is_empty()),
             "proxy_headers" => self.proxy_headers.clone(),
             "tls_certificate" => self.tls_certificate.clone(),
@@ -394,7 +403,10 @@ mod tests {
         assert_eq!(found.0["database"], ("env.db".to_owned(), Origin::Environment("GAITWRIGHT_DATABASE".to_owned())));
         assert_eq!(found.0["idle_minutes"], ("15".to_owned(), Origin::File(file)));
         assert_eq!(found.0["listen"].1, Origin::Default);
-        assert_eq!(found.idle_seconds().unwrap(), 900.0);
+        assert_eq!(
+            found.session_limits().unwrap(),
+            SessionLimits { idle_seconds: 900.0, lifetime_seconds: 12.0 * 3600.0 }
+        );
     }
 
     #[test]

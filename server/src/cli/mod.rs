@@ -21,6 +21,7 @@ pub mod study;
 mod sweep;
 mod tune;
 mod unattended;
+mod users;
 mod worker;
 
 use crate::error::Error;
@@ -95,6 +96,8 @@ enum Command {
     Import(study::Import),
     /// Make a key to sign such files with; prints its public half.
     SigningKey(study::NewKey),
+    /// List users and make sign-in links for them.
+    Users(users::Users),
     /// Drop old trajectories; what was learned from them stays.
     Prune(study::Prune),
 }
@@ -142,6 +145,7 @@ pub fn run() -> ExitCode {
         Command::Export(export) => runtime.block_on(export.run()).map(|()| Ended::Done),
         Command::SigningKey(key) => key.run().map(|()| Ended::Done),
         Command::Import(import) => runtime.block_on(import.run()).map(|()| Ended::Done),
+        Command::Users(users) => runtime.block_on(users.run()).map(|()| Ended::Done),
         Command::Prune(prune) => runtime.block_on(prune.run()).map(|()| Ended::Done),
     };
     match done {

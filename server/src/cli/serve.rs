@@ -33,7 +33,8 @@ const SILENCE: Duration = Duration::from_secs(15);
 pub(super) struct Serve {
     #[command(flatten)]
     flags: Flags,
-    /// Print a one-time sign-in link for the first administrator, also when there is a password.
+    /// Print a one-time sign-in link for an administrator, also when there is a password; a new administrator when all
+    /// are disabled.
     #[arg(long)]
     sign_in_link: bool,
 }
@@ -51,7 +52,7 @@ impl Serve {
             return Err(settings.refused("listen", allowed));
         }
         let local = listen.ip().is_loopback();
-        let (workers, idle_seconds, database) = (settings.workers()?, settings.idle_seconds()?, settings.database());
+        let (workers, sessions, database) = (settings.workers()?, settings.session_limits()?, settings.database());
         let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
         let access_log_days = settings.access_log_days()?;
         // What can be refused is refused before a file is made.
@@ -69,7 +70,8 @@ impl Serve {
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         commit(writer).await?;
-        let mut access = if sign_in { Access::by_sign_in(idle_seconds) } else { Access::without_sign_in() };
+        let mut access = if sign_in { Access::by_sign_in(sessions.idle_seconds) } else { Access::without_sign_in() };
+        access.limits = sessions;
         access.secure = tls.is_some();
 
         let scheme = if access.secure { "https" } else { "http" };
@@ -144,7 +146,7 @@ impl Serve {
             return Ok(None);
         }
         let mut writer = store.write().await?;
-        let admin = people::first(&mut writer).await?;
+        let admin = people::way_in(&mut writer).await?;
         let secret = people::link(&mut writer, &Actor::terminal(), admin.id).await?;
         commit(writer).await?;
         Ok(Some(secret))

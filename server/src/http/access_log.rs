@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use uuid::Uuid;
 
 /// Routes that show nothing of a subject.
-pub const NO_SUBJECT_DATA: [&str; 25] = [
+pub const NO_SUBJECT_DATA: [&str; 26] = [
     "/static/{*path}",
     "/health",
     "/ready",
@@ -41,6 +41,7 @@ pub const NO_SUBJECT_DATA: [&str; 25] = [
     "/api/openapi.json",
     "/api/v1/health",
     "/api/v1/me",
+    "/api/v1/sessions",
     "/api/v1/users",
     "/api/v1/tokens",
     "/api/v1/jobs",

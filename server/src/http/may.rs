@@ -43,10 +43,14 @@ impl IntoResponse for Refused {
 /// The caller in a request, if the right is there.
 pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller, Error> {
     let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
-    if caller.may(P::NEEDED) {
-        return Ok(caller.clone());
+    match P::NEEDED {
+        Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
+            "this needs the right {:?}, which {} does not have",
+            needed.as_str(),
+            caller.name
+        ))),
+        _ => Ok(caller.clone()),
     }
-    Err(Error::Forbidden(format!("this needs the right {:?}, which {} does not have", P::NEEDED.as_str(), caller.name)))
 }
 
 impl<P: Permission, S: Send + Sync> FromRequestParts<S> for May<P> {

@@ -6,6 +6,7 @@ pub mod api;
 mod blind_motion;
 mod client_address;
 pub mod connections;
+mod event_stream;
 mod extract;
 mod forwarded;
 mod host;

@@ -8,9 +8,9 @@ use super::may::{Refused, permitted};
 use crate::access::{Permission, Reach};
 use crate::error::Error;
 use crate::store::{
-    Connection, DeviceId, FeedbackId, LabRecordingId, LabSessionId, MemberId, ReferenceGaitId, RemarkId, StoreError,
-    StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, feedback, lab_recordings, lab_sessions, members,
-    remarks, trials,
+    Connection, DeviceId, FeedbackId, LabRecordingId, LabSessionId, MemberId, ReferenceGaitId, RemarkId, SessionId,
+    StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, feedback, lab_recordings, lab_sessions,
+    members, remarks, trials,
 };
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
@@ -73,6 +73,7 @@ shared!(DeviceId, "device");
 shared!(ReferenceGaitId, "reference gait");
 shared!(UserId, "user");
 shared!(TokenId, "token");
+shared!(SessionId, "session");
 
 /// The study of something that a caller reaches.
 async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result<Option<StudyId>, Error> {

@@ -4,13 +4,19 @@ use super::access_log::AccessLog;
 use super::forwarded::Proxies;
 use super::host::Hosts;
 use super::metrics::Requests;
-use crate::access::BackOff;
+use crate::access::Clock;
+use crate::access::secret::Turns;
+use crate::access::sign_in::Limits;
 use crate::compute::{ComputeError, OnPool};
-use crate::store::{LentWriter, Reader, Store, StoreResult};
+use crate::error::Error;
+use crate::store::{Instant, LentWriter, Reader, Store, StoreResult, clock};
 use crate::studies::belief::Beliefs;
 use crate::studies::director::Director;
 use std::sync::Arc;
 use std::time::Duration;
+
+/// A session ends after a day's work.
+const DEFAULT_LIFETIME_SECONDS: f64 = 12.0 * 3600.0;
 
 /// What every handler can reach.
 #[derive(Debug, Clone)]
@@ -41,20 +47,30 @@ const SLOWEST_ANSWER: Duration = Duration::from_mins(1);
 pub struct Access {
     /// Nobody needs to sign in, and whoever is there may do everything.
     pub open: bool,
-    /// A session without a sign of life for so long has ended.
-    pub idle_seconds: f64,
+    /// When sessions end by themselves.
+    pub limits: Limits,
     /// Who saw what, before it is written.
     pub log: AccessLog,
     /// Browsers reach the service through TLS.
     pub secure: bool,
-    /// Failed attempts.
-    pub back_off: BackOff,
+    /// Says when something has ended.
+    pub clock: Clock,
+    /// Passwords that are compared.
+    pub turns: Turns,
 }
 
 impl Access {
-    /// Everybody signs in.
+    /// Everybody signs in; a session without a sign of life for so long has ended.
     pub fn by_sign_in(idle_seconds: f64) -> Self {
-        Self { open: false, idle_seconds, secure: false, log: AccessLog::default(), back_off: BackOff::default() }
+        let limits = Limits { idle_seconds, lifetime_seconds: DEFAULT_LIFETIME_SECONDS };
+        Self {
+            open: false,
+            limits,
+            log: AccessLog::default(),
+            secure: false,
+            clock: Clock::default(),
+            turns: Turns::default(),
+        }
     }
 
     /// Nobody signs in: for one person on one machine.
@@ -107,5 +123,16 @@ impl AppState {
         work: impl FnOnce(&OnPool) -> T + Send + 'static,
     ) -> Result<T, ComputeError> {
         self.store.compute(work).await
+    }
+
+    /// A write transaction that decides about access, and the instant that it decides at, which the record keeps.
+    ///
+    /// # Errors
+    /// When none can be begun.
+    pub async fn write_access(&self) -> Result<(LentWriter<'_>, Instant), Error> {
+        let mut writer = self.write().await?;
+        let now = self.access.clock.now(&mut writer).await?;
+        clock::reach(&mut writer, now).await?;
+        Ok((writer, now))
     }
 }

@@ -1,6 +1,6 @@
 //! The audit trail: who did what, when and why, chained by hashes so that a change of the past is found.
 
-use super::{Connection, Instant, StoreResult, json, now};
+use super::{Connection, Instant, StoreResult, UserId, json, now};
 use serde::Serialize;
 use serde_json::{Value, json};
 use sqlx::Row;
@@ -14,32 +14,45 @@ const BATCH: i64 = 1000;
 
 /// Who acts.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Actor(String);
+pub struct Actor {
+    text: String,
+    user: Option<UserId>,
+}
 
 impl Actor {
     /// The program itself.
     pub fn program() -> Self {
-        Self(concat!("gaitwright ", env!("CARGO_PKG_VERSION")).to_owned())
+        Self::named(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
     }
 
     /// Whoever runs the command line.
     pub fn terminal() -> Self {
-        Self("command line".to_owned())
+        Self::named("command line")
     }
 
     /// Whoever reaches the service without signing in.
     pub fn anonymous() -> Self {
-        Self("not signed in".to_owned())
+        Self::named("not signed in")
     }
 
     /// Somebody with a name.
     pub fn named(name: &str) -> Self {
-        Self(name.chars().take(120).collect())
+        Self { text: name.chars().take(120).collect(), user: None }
+    }
+
+    /// A user.
+    pub fn user(id: UserId, name: &str) -> Self {
+        Self { user: Some(id), ..Self::named(name) }
+    }
+
+    /// Which user it is.
+    pub fn user_id(&self) -> Option<UserId> {
+        self.user
     }
 
     /// As stored.
     pub fn as_str(&self) -> &str {
-        &self.0
+        &self.text
     }
 }
 

@@ -76,6 +76,7 @@ identifier!(JobId, "job");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(MemberId, "membership in a study");
+identifier!(SessionId, "session of a person who signed in");
 identifier!(PresentationId, "presentation");
 identifier!(RemarkId, "remark");
 identifier!(SafetyReviewId, "safety review");

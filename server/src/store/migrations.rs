@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 const FILES: &[(i64, &str, &str)] = &[
     (1, "baseline", include_str!("../../../migrations/0001_baseline.sql")),
     (3, "imports", include_str!("../../../migrations/0003_imports.sql")),
+    (4, "sessions", include_str!("../../../migrations/0004_sessions.sql")),
     (5, "access_log", include_str!("../../../migrations/0005_access_log.sql")),
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
 ];

@@ -10,6 +10,7 @@ pub mod archive;
 pub mod audit;
 pub mod backup;
 pub mod certificates;
+pub mod clock;
 pub mod consents;
 pub mod devices;
 mod error;
@@ -41,6 +42,7 @@ pub mod safety_reviews;
 pub mod schema;
 pub mod seals;
 pub mod sessions;
+pub mod sign_in_failures;
 mod space;
 pub mod studies;
 pub mod subjects;
@@ -54,7 +56,7 @@ mod writing;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
     DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, MemberId, PresentationId, ReferenceGaitId,
-    RemarkId, SafetyReviewId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    RemarkId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use migrations::FORM;

@@ -1,92 +1,145 @@
 //! Sessions of people who signed in, and the one-time links they come by. Secrets are here as hashes alone.
 
-use super::{Connection, Instant, StoreResult, UserId, now};
+use super::{Connection, Instant, SessionId, StoreResult, UserId};
+use serde::Serialize;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
 
-/// A session that was found by the hash of its secret.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Session {
+    /// Identifier. It lets nobody in.
+    pub id: SessionId,
     /// Whose.
-    pub user: UserId,
+    pub user_id: UserId,
+    /// The same, by name.
+    pub user_name: String,
     /// When it was begun.
-    pub begun_at: Instant,
-    /// Whether with a one-time link.
-    pub by_link: bool,
+    pub created_at: Instant,
     /// When the person last did something.
     pub seen_at: Instant,
+    /// Whether it was begun with a one-time link, and not with a password.
+    pub by_link: bool,
+    /// Address of the client that began it.
+    pub address: Option<String>,
+    /// What the browser said of itself.
+    pub browser: Option<String>,
 }
+
+/// Where a session is begun.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct From {
+    /// Address of the client.
+    pub address: Option<String>,
+    /// What the browser says of itself.
+    pub browser: Option<String>,
+    /// Hash of the cookie that stays in it.
+    pub browser_hash: Option<String>,
+}
+
+const SELECT: &str = "select s.*, u.name from sessions s join users u on u.id = s.user_id where s.ended_at is null";
 
 /// Begins a session.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn begin(db: &mut Connection, hash: &str, user: UserId, by_link: bool) -> StoreResult<()> {
-    let at = now();
-    sqlx::query("insert into sessions (hash, user_id, by_link, created_at, seen_at) values (?, ?, ?, ?, ?)")
-        .bind(hash)
-        .bind(user)
-        .bind(by_link)
-        .bind(at)
-        .bind(at)
-        .execute(db)
-        .await?;
+pub async fn begin(
+    db: &mut Connection,
+    hash: &str,
+    user: UserId,
+    by_link: bool,
+    from: &From,
+    at: Instant,
+) -> StoreResult<()> {
+    sqlx::query(
+        "insert into sessions (hash, id, user_id, by_link, address, browser, browser_hash, created_at, seen_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(hash)
+    .bind(SessionId::fresh())
+    .bind(user)
+    .bind(by_link)
+    .bind(&from.address)
+    .bind(&from.browser)
+    .bind(&from.browser_hash)
+    .bind(at)
+    .bind(at)
+    .execute(db)
+    .await?;
     Ok(())
 }
 
-/// The session with this hash, unless it has ended.
+/// The session with this hash, unless it was ended.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn find(db: &mut Connection, hash: &str) -> StoreResult<Option<Session>> {
-    let row =
-        sqlx::query("select user_id, created_at, by_link, seen_at from sessions where hash = ? and ended_at is null")
-            .bind(hash)
-            .fetch_optional(db)
-            .await?;
-    let session = |row: &SqliteRow| {
-        Ok(Session {
-            user: row.try_get("user_id")?,
-            begun_at: row.try_get("created_at")?,
-            by_link: row.try_get("by_link")?,
-            seen_at: row.try_get("seen_at")?,
-        })
-    };
-    row.as_ref().map(session).transpose()
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} and s.hash = ?"));
+    let row = sqlx::query(sql).bind(hash).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// The session with this identifier, unless it was ended.
+///
+/// # Errors
+/// What the database reports.
+pub async fn get(db: &mut Connection, id: SessionId) -> StoreResult<Option<Session>> {
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} and s.id = ?"));
+    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// Whether a user has signed in before in the browser with this hash of its cookie.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_known_browser(db: &mut Connection, user: UserId, browser_hash: &str) -> StoreResult<bool> {
+    let sql = "select 1 from sessions where browser_hash = ? and user_id = ? limit 1";
+    Ok(sqlx::query(sql).bind(browser_hash).bind(user).fetch_optional(db).await?.is_some())
+}
+
+/// Sessions that were not ended: those of a user, or all. The newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn live(db: &mut Connection, user: Option<UserId>) -> StoreResult<Vec<Session>> {
+    let sql = format!("{SELECT} and (?1 is null or s.user_id = ?1) order by s.created_at desc, s.id");
+    let rows = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(user).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
 }
 
 /// Notes that the person did something.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn seen(db: &mut Connection, hash: &str) -> StoreResult<()> {
-    sqlx::query("update sessions set seen_at = ? where hash = ? and ended_at is null")
-        .bind(now())
-        .bind(hash)
+pub async fn seen(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult<()> {
+    sqlx::query("update sessions set seen_at = ? where id = ? and ended_at is null")
+        .bind(at)
+        .bind(id)
         .execute(db)
         .await?;
     Ok(())
 }
 
-/// Ends a session.
+/// Ends a session. `false`: it had ended already.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn end(db: &mut Connection, hash: &str) -> StoreResult<()> {
-    sqlx::query("update sessions set ended_at = ? where hash = ? and ended_at is null")
-        .bind(now())
-        .bind(hash)
+pub async fn end(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult<bool> {
+    let done = sqlx::query("update sessions set ended_at = ? where id = ? and ended_at is null")
+        .bind(at)
+        .bind(id)
         .execute(db)
         .await?;
-    Ok(())
+    Ok(done.rows_affected() == 1)
 }
 
 /// Ends every session of a user and makes the user's links useless.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn end_all(db: &mut Connection, user: UserId) -> StoreResult<()> {
-    let at = now();
+pub async fn end_all(db: &mut Connection, user: UserId, at: Instant) -> StoreResult<()> {
     for sql in [
         "update sessions set ended_at = ? where user_id = ? and ended_at is null",
         "update sign_in_links set used_at = ? where user_id = ? and used_at is null",
@@ -100,36 +153,41 @@ pub async fn end_all(db: &mut Connection, user: UserId) -> StoreResult<()> {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn add_link(db: &mut Connection, hash: &str, user: UserId, expires_at: Instant) -> StoreResult<()> {
+pub async fn add_link(
+    db: &mut Connection,
+    hash: &str,
+    user: UserId,
+    at: Instant,
+    expires_at: Instant,
+) -> StoreResult<()> {
     sqlx::query("insert into sign_in_links (hash, user_id, created_at, expires_at) values (?, ?, ?, ?)")
         .bind(hash)
         .bind(user)
-        .bind(now())
+        .bind(at)
         .bind(expires_at)
         .execute(db)
         .await?;
     Ok(())
 }
 
-/// Whose link it is, if it can still be used.
+/// Whose link it is and until when it can be used, unless it was used.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn link(db: &mut Connection, hash: &str) -> StoreResult<Option<UserId>> {
-    let row = sqlx::query("select user_id from sign_in_links where hash = ? and used_at is null and expires_at > ?")
+pub async fn link(db: &mut Connection, hash: &str) -> StoreResult<Option<(UserId, Instant)>> {
+    let row = sqlx::query("select user_id, expires_at from sign_in_links where hash = ? and used_at is null")
         .bind(hash)
-        .bind(now())
         .fetch_optional(db)
         .await?;
-    Ok(row.map(|row| row.try_get(0)).transpose()?)
+    Ok(row.map(|row| Ok::<_, sqlx::Error>((row.try_get(0)?, row.try_get(1)?))).transpose()?)
 }
 
 /// Uses a link up.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn use_link(db: &mut Connection, hash: &str) -> StoreResult<()> {
-    sqlx::query("update sign_in_links set used_at = ? where hash = ?").bind(now()).bind(hash).execute(db).await?;
+pub async fn use_link(db: &mut Connection, hash: &str, at: Instant) -> StoreResult<()> {
+    sqlx::query("update sign_in_links set used_at = ? where hash = ?").bind(at).bind(hash).execute(db).await?;
     Ok(())
 }
 
@@ -149,4 +207,17 @@ pub async fn drop_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
 pub async fn drop_links_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
     let sql = "delete from sign_in_links where min(coalesce(used_at, expires_at), expires_at) < ?";
     Ok(sqlx::query(sql).bind(at).execute(db).await?.rows_affected())
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Session> {
+    Ok(Session {
+        id: row.try_get("id")?,
+        user_id: row.try_get("user_id")?,
+        user_name: row.try_get("name")?,
+        created_at: row.try_get("created_at")?,
+        seen_at: row.try_get("seen_at")?,
+        by_link: row.try_get("by_link")?,
+        address: row.try_get("address")?,
+        browser: row.try_get("browser")?,
+    })
 }

@@ -1,6 +1,7 @@
 //! Tokens: how programs of the lab say who they are. Stored as hashes.
 
-use super::{Connection, Instant, StoreError, StoreResult, TokenId, json, now};
+use super::audit::Actor;
+use super::{Connection, Instant, StoreError, StoreResult, TokenId, UserId, json, now};
 use crate::access::Right;
 use serde::Serialize;
 use sqlx::Row;
@@ -16,7 +17,7 @@ pub struct Token {
     pub name: String,
     /// What it allows.
     pub scopes: Vec<Right>,
-    /// Who made it.
+    /// Who made it. It ends when this user is disabled or is no administrator any more.
     pub created_by: String,
     /// When it was made.
     pub created_at: Instant,
@@ -45,26 +46,28 @@ pub async fn insert(
     name: &str,
     hash: &str,
     scopes: &[Right],
-    created_by: &str,
+    created_by: &Actor,
     expires_at: Option<Instant>,
 ) -> StoreResult<Token> {
     let token = Token {
         id: TokenId::fresh(),
         name: name.to_owned(),
         scopes: scopes.to_vec(),
-        created_by: created_by.to_owned(),
+        created_by: created_by.as_str().to_owned(),
         created_at: now(),
         expires_at,
         revoked_at: None,
     };
     sqlx::query(
-        "insert into tokens (id, name, hash, scopes, created_by, created_at, expires_at) values (?, ?, ?, ?, ?, ?, ?)",
+        "insert into tokens (id, name, hash, scopes, created_by, maker, created_at, expires_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(token.id)
     .bind(name)
     .bind(hash)
     .bind(json::to_text("scopes", &scopes)?)
-    .bind(created_by)
+    .bind(created_by.as_str())
+    .bind(created_by.user_id())
     .bind(token.created_at)
     .bind(expires_at)
     .execute(db)
@@ -72,19 +75,30 @@ pub async fn insert(
     Ok(token)
 }
 
-/// The token with this hash, if it is still good.
+/// The token with this hash, unless it was revoked.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Token>> {
-    let row = sqlx::query(
-        "select * from tokens where hash = ? and revoked_at is null and (expires_at is null or expires_at > ?)",
-    )
-    .bind(hash)
-    .bind(now())
-    .fetch_optional(db)
-    .await?;
+    let row =
+        sqlx::query("select * from tokens where hash = ? and revoked_at is null").bind(hash).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
+}
+
+/// The tokens that a user made and nobody revoked. Older versions kept the maker's name alone.
+///
+/// # Errors
+/// What the database reports.
+pub async fn made_by(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
+    let rows = sqlx::query(
+        "select t.* from tokens t join users u on u.id = ? where t.revoked_at is null and (t.maker = u.id or \
+         t.maker is null and t.created_by in ('admin ' || u.name, 'clinician ' || u.name, 'rater ' || u.name)) \
+         order by t.id",
+    )
+    .bind(user)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
 }
 
 /// The token with this identifier.

@@ -90,6 +90,15 @@ pub async fn set_password(db: &mut Connection, id: UserId, password: &str) -> St
     Ok(())
 }
 
+/// Gives a user another role.
+///
+/// # Errors
+/// What the database reports.
+pub async fn set_role(db: &mut Connection, id: UserId, role: Role) -> StoreResult<()> {
+    sqlx::query("update users set role = ? where id = ?").bind(role.as_str()).bind(id).execute(db).await?;
+    Ok(())
+}
+
 /// Shuts a user out, or lets the user in again.
 ///
 /// # Errors

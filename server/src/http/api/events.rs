@@ -4,26 +4,22 @@
 //! misses one sees the next. A stream begins with where the study stands, so that who listens to one that has ended
 //! knows; it stays open, because a study that has ended can be extended.
 
-use crate::access::{Reach, Read};
+use crate::access::Read;
 use crate::error::Error;
 use crate::http::AppState;
+use crate::http::event_stream::{Gone, Listening, Sender};
 use crate::http::extract::Params;
-use crate::http::may::May;
-use crate::http::shown::Shown;
-use crate::store::{StudyId, TrialId, events, members, studies};
+use crate::store::{StudyId, TrialId, events, studies};
 use crate::workers::Progress;
 use axum::extract::State;
 use axum::http::HeaderMap;
-use axum::response::sse::{Event, KeepAlive, Sse};
-use futures_util::Stream;
+use axum::response::Response;
+use axum::response::sse::Event;
 use serde::Deserialize;
 use serde_json::json;
 use std::collections::HashMap;
-use std::convert::Infallible;
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
-use tokio::sync::mpsc;
-use tokio_stream::wrappers::ReceiverStream;
 use utoipa::ToSchema;
 
 /// Shortest time between two iterations shown of one solve.
@@ -48,30 +44,24 @@ pub(super) struct From {
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
-    may: May<Read>,
+    listening: Listening<Read>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<StudyId, Read>,
     Params(from): Params<From>,
     headers: HeaderMap,
-) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, Error> {
+) -> Result<Response, Error> {
+    let id = listening.study();
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let last = events::last(&mut reader, id).await?;
     // What was seen may be of a record in whose place an older copy was put: its numbers come again.
     let after = last_seen(&headers)?.or(from.after).map_or(last, |seen| seen.min(last));
     drop(reader);
-    let (sender, receiver) = mpsc::channel(16);
     let stands = json!({ "state": study.state, "reason": study.state_reason });
     let stands = Event::default().event("study_state").json_data(stands).map_err(|e| Error::Internal(e.to_string()))?;
-    tokio::spawn(async move {
-        if sender.send(stands).await.is_err() {
-            return;
-        }
-        // Ends when the browser goes away or the server stops; either is the normal end.
-        let _ = follow(&app, may.caller.reach(), id, after, &sender).await;
-    });
-    let stream = futures_util::StreamExt::map(ReceiverStream::new(receiver), Ok);
-    Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))))
+    Ok(listening.stream(move |mut sender| async move {
+        sender.send(stands).await?;
+        follow(&app, id, after, &mut sender).await
+    }))
 }
 
 fn last_seen(headers: &HeaderMap) -> Result<Option<i64>, Error> {
@@ -93,25 +83,14 @@ pub(super) struct ServerSentEvent {
     data: String,
 }
 
-/// The listener went away.
-struct Gone;
-
-async fn follow(
-    app: &AppState,
-    reach: Reach,
-    study: StudyId,
-    mut after: i64,
-    sender: &mpsc::Sender<Event>,
-) -> Result<(), Gone> {
+async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<(), Gone> {
     let mut pulse = app.director.pulse();
     let mut progress = app.director.board().listen();
-    let stopping = app.director.stopping();
     let mut shown: HashMap<TrialId, Instant> = HashMap::new();
     loop {
-        after = replay(app, reach, study, after, sender).await?;
+        after = replay(app, study, after, sender).await?;
         loop {
             tokio::select! {
-                () = stopping.cancelled() => return Ok(()),
                 () = sender.closed() => return Err(Gone),
                 changed = pulse.changed() => {
                     changed.map_err(|_| Gone)?;
@@ -120,7 +99,7 @@ async fn follow(
                 iteration = progress.recv() => match iteration {
                     Ok(progress) if progress.study_id == study && is_due(&mut shown, &progress) => {
                         let event = Event::default().event("progress").json_data(progress).map_err(|_| Gone)?;
-                        sender.send(event).await.map_err(|_| Gone)?;
+                        sender.send(event).await?;
                     }
                     Ok(_) | Err(RecvError::Lagged(_)) => {}
                     Err(RecvError::Closed) => return Err(Gone),
@@ -130,19 +109,9 @@ async fn follow(
     }
 }
 
-async fn replay(
-    app: &AppState,
-    reach: Reach,
-    study: StudyId,
-    mut after: i64,
-    sender: &mpsc::Sender<Event>,
-) -> Result<i64, Gone> {
+async fn replay(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<i64, Gone> {
     loop {
         let mut reader = app.read().await.map_err(|_| Gone)?;
-        if !members::reaches(&mut reader, reach, study).await.map_err(|_| Gone)? {
-            // Removed from the study while it listened.
-            return Err(Gone);
-        }
         let batch = events::after(&mut reader, study, after, BATCH).await.map_err(|_| Gone)?;
         drop(reader);
         let Some(last) = batch.last() else { return Ok(after) };
@@ -150,7 +119,7 @@ async fn replay(
         for event in batch {
             let sent = Event::default().event(&event.kind).id(event.seq.to_string());
             let sent = sent.json_data(&event).map_err(|_| Gone)?;
-            sender.send(sent).await.map_err(|_| Gone)?;
+            sender.send(sent).await?;
         }
     }
 }

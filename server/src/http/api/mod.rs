@@ -27,6 +27,7 @@ mod recommendation;
 mod reference_gaits;
 mod remarks;
 mod scripts;
+mod sessions;
 mod studies;
 mod subjects;
 mod suggestions;
@@ -148,6 +149,9 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(users::link))
         .routes(routes!(users::disable))
         .routes(routes!(users::enable))
+        .routes(routes!(users::set_role))
+        .routes(routes!(sessions::list))
+        .routes(routes!(sessions::end))
         .routes(routes!(tokens::list, tokens::create))
         .routes(routes!(tokens::revoke))
         // operation

@@ -13,7 +13,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Who calls.
@@ -101,7 +101,7 @@ pub(super) async fn link(
     once.finish(&app, writer, StatusCode::CREATED, None, &Link { path: format!("/sign-in/{secret}") }).await
 }
 
-/// `POST /users/{id}/disable`: ends the sessions of a user and lets nobody in by that name.
+/// `POST /users/{id}/disable`: ends the sessions, links and tokens of a user and lets nobody in by that name.
 #[utoipa::path(
     post,
     path = "/users/{id}/disable",
@@ -133,6 +133,38 @@ pub(super) async fn enable(
     once: Once<Administer>,
 ) -> Result<Response, Error> {
     set_disabled(&app, id, &once, false).await
+}
+
+/// A role to give.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct NewRole {
+    /// What the person is from now on.
+    role: Role,
+}
+
+/// `POST /users/{id}/role`: gives a user another role. Tokens that an administrator made end when this one is none any
+/// more.
+#[utoipa::path(
+    post,
+    path = "/users/{id}/role",
+    tag = "access",
+    params(("id" = UserId, Path, description = "The user")),
+    request_body = NewRole,
+    responses((status = 200, description = "With the role", body = User)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn set_role(
+    State(app): State<AppState>,
+    Id(id, _): Id<UserId, Administer>,
+    OnceWith(once, new): OnceWith<Administer, NewRole>,
+) -> Result<Response, Error> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let user = people::set_role(&mut writer, &once.actor, id, new.role).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &user).await
 }
 
 async fn set_disabled(app: &AppState, id: UserId, once: &Once<Administer>, disabled: bool) -> Result<Response, Error> {

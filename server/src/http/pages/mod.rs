@@ -98,6 +98,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/sign-in", get(sign_in::get).post(sign_in::post))
         .route("/sign-in/{link}", get(sign_in::link).post(sign_in::use_link))
         .route("/sign-out", post(sign_in::out))
+        .route("/account/sessions", post(sign_in::end_session))
         .route("/account", get(sign_in::account).post(sign_in::set_password))
         .route_layer(from_fn_with_state(state.clone(), unsent::keep))
 }

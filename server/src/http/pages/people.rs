@@ -3,16 +3,18 @@
 use super::error::{Page, PageError, page};
 use crate::access::people::{self, NewUser};
 use crate::access::tokens::{self as making, NewToken};
-use crate::access::{Administer, Caller, Right, Role};
+use crate::access::{Administer, Caller, Right, Role, sign_in};
 use crate::error::{Error, FieldError};
 use crate::http::AppState;
 use crate::http::client_address::Secure;
 use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::http::problem::Problem;
+use crate::store::sessions::Session;
+use crate::store::sign_in_failures::Source;
 use crate::store::tokens::Token;
 use crate::store::users::User;
-use crate::store::{TokenId, UserId, Writer, commit, tokens, users};
+use crate::store::{SessionId, TokenId, UserId, Writer, commit, sessions, sign_in_failures, tokens, users};
 use askama::Template;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
@@ -29,11 +31,17 @@ const SCOPES: [(Right, &str); 4] = [
     (Right::Rate, "compare gaits blindly"),
 ];
 
+/// Networks with failed sign-ins that are shown.
+const MOST_SOURCES: u32 = 20;
+
 #[derive(Template)]
 #[template(path = "people.html")]
 struct PeoplePage {
     users: Vec<User>,
     tokens: Vec<Token>,
+    sessions: Vec<Session>,
+    /// Networks with failed sign-ins.
+    failures: Vec<Source>,
     roles: [Role; 3],
     scopes: [(Right, &'static str); 4],
     outcome: Outcome,
@@ -157,6 +165,11 @@ impl Asked {
         SCOPES.iter().zip(given).filter(|(_, given)| given.is_some()).map(|((right, _), _)| *right).collect()
     }
 
+    fn role(&self) -> Result<Role, Error> {
+        let roles = Role::ALL.map(Role::as_str).join(", ");
+        self.role.parse().map_err(|_| Error::invalid("role", self.role.as_str(), &roles))
+    }
+
     fn id<T: FromStr>(&self) -> Result<T, Error> {
         self.id.parse().map_err(|_| Error::invalid("id", self.id.as_str(), "an identifier of this page"))
     }
@@ -170,7 +183,10 @@ pub(super) async fn get(_: May<Administer>, State(app): State<AppState>) -> Page
 async fn show(app: &AppState, outcome: Outcome, refused: Option<Refused>, typed: Asked) -> Page {
     let mut reader = app.read().await?;
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
-    page(&PeoplePage { users, tokens, roles: Role::ALL, scopes: SCOPES, outcome, refused, typed })
+    let now = app.access.clock.now(&mut reader).await?;
+    let sessions = sign_in::live(&mut reader, None, app.access.limits, now).await?;
+    let failures = sign_in_failures::most(&mut reader, MOST_SOURCES).await?;
+    page(&PeoplePage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, typed })
 }
 
 /// `POST /people`. A link or token is in the answer itself: it is not stored, and a reload does not make another one
@@ -187,6 +203,8 @@ pub(super) async fn post(
     match act(&mut writer, &may.caller, &origin, &asked).await {
         Ok(outcome) => {
             commit(writer).await?;
+            // Event streams of whoever may no more are listening to nothing else.
+            app.director.changed();
             Ok(show(&app, outcome, None, Asked::default()).await?.into_response())
         }
         Err(error) if error.is_input() => {
@@ -211,9 +229,7 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
     let done = |text: String| Outcome { done: Some(text), secret: None };
     match asked.act.as_str() {
         "add_user" => {
-            let roles = Role::ALL.map(Role::as_str).join(", ");
-            let role = asked.role.parse().map_err(|_| Error::invalid("role", asked.role.as_str(), &roles))?;
-            let user = people::add(writer, actor, &NewUser { name: asked.name.clone(), role }).await?;
+            let user = people::add(writer, actor, &NewUser { name: asked.name.clone(), role: asked.role()? }).await?;
             let secret = people::link(writer, actor, user.id).await?;
             Ok(link(&user, origin, &secret))
         }
@@ -226,6 +242,17 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
             let disabled = asked.act == "disable";
             let user = people::set_disabled(writer, actor, asked.id()?, disabled).await?;
             Ok(done(format!("{} is {}.", user.name, if disabled { "shut out" } else { "let in again" })))
+        }
+        "role" => {
+            let user = people::set_role(writer, actor, asked.id()?, asked.role()?).await?;
+            Ok(done(format!("{} is {} from now on.", user.name, user.role.as_str())))
+        }
+        "end_session" => {
+            let id: SessionId = asked.id()?;
+            let missing = || Error::NotFound { what: "session".to_owned(), id: id.to_string() };
+            let session = sessions::get(writer, id).await?.ok_or_else(missing)?;
+            sign_in::end(writer, actor, &session).await?;
+            Ok(done(format!("A session of {} was ended.", session.user_name)))
         }
         "make_token" => {
             let days = match asked.days.trim() {
@@ -240,7 +267,9 @@ async fn act(writer: &mut Writer, caller: &Caller, origin: &str, asked: &Asked) 
             let token = making::revoke(writer, actor, asked.id::<TokenId>()?).await?;
             Ok(done(format!("Token {} was ended.", token.name)))
         }
-        other => Err(Error::invalid("act", other, "add_user, link, disable, enable, make_token, revoke")),
+        other => {
+            Err(Error::invalid("act", other, "add_user, link, disable, enable, role, end_session, make_token, revoke"))
+        }
     }
 }
 

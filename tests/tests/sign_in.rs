@@ -1,0 +1,554 @@
+//! Signing in: back-off, passwords, sessions and their end, roles, and what ends with a user.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode, header};
+use futures_util::StreamExt;
+use gaitwright::access::back_off::{self, Origin};
+use gaitwright::access::people::{self, NewUser};
+use gaitwright::access::sign_in::Limits;
+use gaitwright::access::tokens::{self as making, NewToken};
+use gaitwright::access::{Caller, Clock, Right, Role};
+use gaitwright::http::Access;
+use gaitwright::store::audit::{self, Actor, AuditRow};
+use gaitwright::store::{Instant, SessionId, Store, UserId, commit, now, seals, sign_in_failures};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::{
+    As, FORM, cookie_of, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
+};
+use gaitwright_tests::service::Service;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+use tower::ServiceExt;
+
+const RIGHT: &str = "correct horse battery";
+const ME: &str = "/api/v1/me";
+const JSON: &str = "application/json";
+const OWNER: [u8; 4] = [10, 0, 0, 1];
+const ATTACKER: [u8; 4] = [192, 0, 2, 66];
+
+async fn status(service: &Service, who: &As) -> StatusCode {
+    send(service, who, &Method::GET, ME, "", "").await.status
+}
+
+async fn post(service: &Service, who: &As, path: &str, body: &Value) -> (StatusCode, Value) {
+    let answer = send(service, who, &Method::POST, path, JSON, &body.to_string()).await;
+    (answer.status, serde_json::from_str(&answer.text).unwrap_or_default())
+}
+
+/// A service on the record of one that has ended, when what that one wrote last lets go of it.
+async fn start_anew(database: &Path) -> Service {
+    for _ in 0..500 {
+        if Store::open(database).await.is_ok() {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    Service::start(database, Analytic::default(), 1).await
+}
+
+async fn trail(service: &Service, action: &str) -> Vec<AuditRow> {
+    let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
+    rows.into_iter().filter(|row| row.action == action).collect()
+}
+
+/// Attempts that were begun and never came to an end, as when the client goes away.
+async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<Item = String>) {
+    let mut writer = service.store.write().await.unwrap();
+    let at = now();
+    for name in names {
+        let origin = Origin { network: network.to_owned(), known: None };
+        let _ = back_off::begin(&mut writer, at, &name, origin).await.unwrap();
+    }
+    commit(writer).await.unwrap();
+}
+
+#[tokio::test]
+async fn right_password_is_accepted_while_others_fail_elsewhere() {
+    let (_folder, service) = service().await;
+    with_password(&service, "admin", Role::Admin, RIGHT).await;
+    let mut refused = Vec::new();
+    for _ in 0..6 {
+        refused.push(sign_in_from(&service, ATTACKER, None, "admin", "guess").await.status);
+    }
+    assert_eq!(refused[..4], [StatusCode::UNAUTHORIZED; 4]);
+    assert_eq!(refused[4..], [StatusCode::TOO_MANY_REQUESTS; 2]);
+    // The attacker would wait even with the right password; the owner does not.
+    let there = sign_in_from(&service, ATTACKER, None, "admin", RIGHT).await.status;
+    assert_eq!(there, StatusCode::TOO_MANY_REQUESTS);
+    let here = sign_in_from(&service, OWNER, None, "admin", RIGHT).await;
+    assert_eq!(here.status, StatusCode::SEE_OTHER);
+    assert_eq!(status(&service, &session_of(&here)).await, StatusCode::OK);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn known_browser_does_not_wait_for_others_in_its_network() {
+    let (_folder, service) = service().await;
+    with_password(&service, "Ada", Role::Clinician, RIGHT).await;
+    with_password(&service, "Bob", Role::Clinician, RIGHT).await;
+    let first = sign_in_from(&service, OWNER, None, "Ada", RIGHT).await;
+    let browser = cookie_of(&first, "gaitwright_browser");
+    for _ in 0..5 {
+        for name in ["Ada", "Bob"] {
+            sign_in_from(&service, OWNER, None, name, "guess").await;
+        }
+    }
+    let elsewhere = sign_in_from(&service, OWNER, None, "Ada", RIGHT).await.status;
+    assert_eq!(elsewhere, StatusCode::TOO_MANY_REQUESTS);
+    let known = sign_in_from(&service, OWNER, Some(&browser), "Ada", RIGHT).await;
+    assert_eq!(known.status, StatusCode::SEE_OTHER);
+    assert_eq!(cookie_of(&known, "gaitwright_browser"), browser);
+    // It is known for who signed in there, and its own failures count.
+    let other = sign_in_from(&service, OWNER, Some(&browser), "Bob", RIGHT).await.status;
+    assert_eq!(other, StatusCode::TOO_MANY_REQUESTS);
+    let mut own = Vec::new();
+    for _ in 0..5 {
+        own.push(sign_in_from(&service, OWNER, Some(&browser), "Ada", "guess").await.status);
+    }
+    assert_eq!(own[4], StatusCode::TOO_MANY_REQUESTS, "{own:?}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn ten_thousand_aborted_sign_ins_with_fresh_names_do_not_erase_the_failures_of_an_account() {
+    let (folder, service) = service().await;
+    with_password(&service, "Ada", Role::Admin, RIGHT).await;
+    for _ in 0..5 {
+        sign_in_from(&service, ATTACKER, None, "Ada", "guess").await;
+    }
+    let network = "192.0.2.66";
+    abort_attempts(&service, network, (0..10_000).map(|number| format!("nobody {number}"))).await;
+    let waits = |service: &Service| {
+        let store = service.store.clone();
+        async move { sign_in_failures::find(&mut store.read().await.unwrap(), "ada", network).await.unwrap().unwrap() }
+    };
+    assert_eq!(waits(&service).await.count, 4);
+    let mut reader = service.store.read().await.unwrap();
+    let source = sign_in_failures::of_network(&mut reader, network).await.unwrap().unwrap();
+    drop(reader);
+    assert_eq!(source.attempts, 10_005, "every one is counted");
+    assert!(source.names <= 1001, "and what is kept is bounded: {}", source.names);
+    // Nor does a restart.
+    service.stop().await;
+    let mut service = start_anew(&folder.path().join("a.db")).await;
+    service.access = Arc::new(Access::by_sign_in(3600.0));
+    assert_eq!(waits(&service).await.count, 4);
+    let mut statuses = Vec::new();
+    for _ in 0..2 {
+        statuses.push(sign_in_from(&service, ATTACKER, None, "Ada", "guess").await.status);
+    }
+    assert!(statuses.contains(&StatusCode::TOO_MANY_REQUESTS), "{statuses:?}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn thirty_thousand_attempts_are_visible_with_their_number() {
+    let (_folder, service) = service().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    abort_attempts(&service, "192.0.2.66", (0..30_000).map(|_| "admin".to_owned())).await;
+    let page = send(&service, &admin, &Method::GET, "/people", "", "").await.text;
+    assert!(page.contains("192.0.2.66") && page.contains("30000"), "{page}");
+    let noted = trail(&service, "session.wait").await;
+    assert_eq!(noted[0].detail["failed_attempts_of_network"], 20_000);
+    assert!(noted.len() < 20, "{}", noted.len());
+
+    // What is a day old leaves its number in the trail when it is forgotten.
+    let mut writer = service.store.write().await.unwrap();
+    let origin = Origin { network: "10.0.0.9".to_owned(), known: None };
+    let tomorrow = now().plus_seconds(25 * 3600);
+    let _ = back_off::begin(&mut writer, tomorrow, "Ada", origin).await.unwrap();
+    commit(writer).await.unwrap();
+    let forgotten = trail(&service, "session.refused").await;
+    assert_eq!(
+        (&forgotten[0].detail["network"], &forgotten[0].detail["failed_attempts"]),
+        (&json!("192.0.2.66"), &json!(30_000))
+    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn passwords_that_are_easily_guessed_are_refused() {
+    let (_folder, service) = service().await;
+    let (_, link) = user(&service, "Ada Lovelace", Role::Clinician).await;
+    let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
+    let ada = session_of(&come);
+    for weak in ["aaaaaaaaaa", "Password123!", "1234567890", "lovelace ada", "qwertyuiop"] {
+        let body = format!("password={}", weak.replace(' ', "+"));
+        let refused = send(&service, &ada, &Method::POST, "/account", FORM, &body).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{weak}");
+        assert!(refused.text.contains("hard to guess"), "{}", refused.text);
+    }
+    let set = send(&service, &ada, &Method::POST, "/account", FORM, "password=correct+horse").await;
+    assert_eq!(set.status, StatusCode::OK);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn administrators_who_never_signed_in_do_not_count_as_the_last_one() {
+    let (_folder, service) = service().await;
+    let admin = with_password(&service, "admin", Role::Admin, RIGHT).await;
+    let me = session_of(&sign_in_from(&service, OWNER, None, "admin", RIGHT).await);
+    let (ada, link) = user(&service, "Ada", Role::Admin).await;
+    let disable = format!("/api/v1/users/{admin}/disable");
+    let demote = format!("/api/v1/users/{admin}/role");
+    for (path, body) in [(&disable, json!({})), (&demote, json!({"role": "clinician"}))] {
+        let (refused, problem) = post(&service, &me, path, &body).await;
+        assert_eq!(refused, StatusCode::CONFLICT, "{path}");
+        assert!(problem["detail"].as_str().unwrap().contains("last administrator who can sign in"), "{problem}");
+    }
+    // A session without a password is less than the password that would be lost.
+    let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
+    let ada_session = session_of(&come);
+    assert_eq!(post(&service, &me, &disable, &json!({})).await.0, StatusCode::CONFLICT);
+    let set = send(&service, &ada_session, &Method::POST, "/account", FORM, "password=battery+staple").await;
+    let ada_session = session_of(&set);
+    assert_eq!(post(&service, &ada_session, &disable, &json!({})).await.0, StatusCode::OK);
+    assert_eq!(status(&service, &me).await, StatusCode::UNAUTHORIZED);
+    let last = post(&service, &ada_session, &format!("/api/v1/users/{ada}/disable"), &json!({})).await;
+    assert_eq!(last.0, StatusCode::CONFLICT);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn role_changes_hold_from_the_next_request_and_are_audited() {
+    let (_folder, service) = service().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    let (ada, link) = user(&service, "Ada", Role::Rater).await;
+    let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{link}"), FORM, "").await;
+    let ada_session = session_of(&come);
+    let role = format!("/api/v1/users/{ada}/role");
+    assert_eq!(
+        send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status,
+        StatusCode::FORBIDDEN
+    );
+    assert_eq!(post(&service, &ada_session, &role, &json!({"role": "admin"})).await.0, StatusCode::FORBIDDEN);
+    let (done, changed) = post(&service, &admin, &role, &json!({"role": "clinician"})).await;
+    assert_eq!((done, &changed["role"]), (StatusCode::OK, &json!("clinician")));
+    assert_eq!(send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status, StatusCode::OK);
+    let form = format!("act=role&id={ada}&role=rater");
+    let page = send(&service, &admin, &Method::POST, "/people", FORM, &form).await;
+    assert!(page.status == StatusCode::OK && page.text.contains("Ada is rater"), "{}", page.text);
+    assert_eq!(
+        send(&service, &ada_session, &Method::GET, "/api/v1/studies", "", "").await.status,
+        StatusCode::FORBIDDEN
+    );
+    let details: Vec<Value> = trail(&service, "user.role").await.into_iter().map(|row| row.detail).collect();
+    assert_eq!(
+        details,
+        [
+            json!({"name": "Ada", "before": "clinician", "role": "rater"}),
+            json!({"name": "Ada", "before": "rater", "role": "clinician"})
+        ]
+    );
+    let (unknown, problem) = post(&service, &admin, &role, &json!({"role": "king"})).await;
+    assert!(unknown.is_client_error() && problem["detail"].as_str().unwrap().contains("role"), "{problem}");
+    service.stop().await;
+}
+
+/// A token that this user made.
+async fn token_by(service: &Service, id: UserId, name: &str, role: Role) -> As {
+    let actor = Caller::person(id, name, role).actor;
+    let mut writer = service.store.write().await.unwrap();
+    let new = NewToken { name: format!("rig of {name}"), scopes: vec![Right::Read], days: None };
+    let (_, secret) = making::make(&mut writer, &actor, &new).await.unwrap();
+    commit(writer).await.unwrap();
+    As::Token(secret)
+}
+
+#[tokio::test]
+async fn tokens_and_sessions_end_with_the_user_who_made_them() {
+    let (_folder, service) = service().await;
+    let root = signed_in(&service, Role::Admin).await;
+    with_password(&service, "Dee", Role::Admin, RIGHT).await;
+    let mut made = Vec::new();
+    for name in ["Ada", "Bob", "Cy"] {
+        let id = with_password(&service, name, Role::Admin, RIGHT).await;
+        let session = session_of(&sign_in_from(&service, OWNER, None, name, RIGHT).await);
+        made.push((id, session, token_by(&service, id, name, Role::Admin).await));
+    }
+    // As an older version wrote it: the maker by name alone.
+    let mut writer = service.store.write().await.unwrap();
+    let id = made[2].0;
+    sqlx::query("update tokens set maker = null where maker = ?").bind(id).execute(&mut **writer).await.unwrap();
+    commit(writer).await.unwrap();
+    for (_, session, token) in &made {
+        assert_eq!((status(&service, session).await, status(&service, token).await), (StatusCode::OK, StatusCode::OK));
+    }
+    let to = |number: usize, what: &str| format!("/api/v1/users/{}/{what}", made[number].0);
+    assert_eq!(post(&service, &root, &to(0, "disable"), &json!({})).await.0, StatusCode::OK);
+    assert_eq!(post(&service, &root, &to(2, "disable"), &json!({})).await.0, StatusCode::OK);
+    let both = [StatusCode::UNAUTHORIZED; 2];
+    for ended in [0, 2] {
+        assert_eq!([status(&service, &made[ended].1).await, status(&service, &made[ended].2).await], both, "{ended}");
+    }
+    // Who administers no more keeps the session, with less, and no token.
+    assert_eq!(post(&service, &root, &to(1, "role"), &json!({"role": "rater"})).await.0, StatusCode::OK);
+    assert_eq!(status(&service, &made[1].1).await, StatusCode::OK);
+    assert_eq!(status(&service, &made[1].2).await, StatusCode::UNAUTHORIZED);
+    // What has ended stays so.
+    assert_eq!(post(&service, &root, &to(0, "enable"), &json!({})).await.0, StatusCode::OK);
+    assert_eq!([status(&service, &made[0].1).await, status(&service, &made[0].2).await], both);
+    assert_eq!(trail(&service, "token.revoke").await.len(), 3);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn sessions_are_listed_and_ended_one_by_one() {
+    let (_folder, service) = service().await;
+    let admin = signed_in(&service, Role::Admin).await;
+    with_password(&service, "Ada", Role::Rater, RIGHT).await;
+    let desk = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
+    let phone = session_of(&sign_in_from(&service, [10, 0, 0, 2], None, "Ada", RIGHT).await);
+    let list = |who: As| {
+        let service = &service;
+        async move { send(service, &who, &Method::GET, "/api/v1/sessions", "", "").await.json().as_array().unwrap().clone() }
+    };
+    let own = list(desk.clone()).await;
+    assert_eq!(own.len(), 2, "{own:?}");
+    let of = |address: &str| own.iter().find(|s| s["address"] == address).unwrap()["id"].as_str().unwrap().to_owned();
+    let (desk_id, phone_id) = (of("10.0.0.1"), of("10.0.0.2"));
+    let all = list(admin.clone()).await;
+    assert_eq!(all.len(), 3);
+    let admins = all.iter().find(|s| s["user_name"] != "Ada").unwrap()["id"].as_str().unwrap().to_owned();
+    assert!(list(token(&service, &[Right::Read]).await).await.is_empty());
+
+    let end = |id: &str| format!("/api/v1/sessions/{id}/end");
+    assert_eq!(post(&service, &desk, &end(&admins), &json!({})).await.0, StatusCode::NOT_FOUND, "not one's own");
+    let form = format!("id={admins}");
+    let page = send(&service, &desk, &Method::POST, "/account/sessions", FORM, &form).await;
+    assert_eq!(page.status, StatusCode::NOT_FOUND);
+    assert_eq!(status(&service, &admin).await, StatusCode::OK);
+    // One's own, on the page; and an administrator any, in REST or on the page.
+    let account = send(&service, &desk, &Method::GET, "/account", "", "").await.text;
+    assert!(
+        account.contains(&phone_id) && account.contains("this session") && !account.contains(&desk_id),
+        "{account}"
+    );
+    let form = format!("id={phone_id}");
+    let page = send(&service, &desk, &Method::POST, "/account/sessions", FORM, &form).await;
+    assert_eq!(page.status, StatusCode::SEE_OTHER);
+    assert_eq!(
+        [status(&service, &desk).await, status(&service, &phone).await],
+        [StatusCode::OK, StatusCode::UNAUTHORIZED]
+    );
+    let form = format!("act=end_session&id={desk_id}");
+    let page = send(&service, &admin, &Method::POST, "/people", FORM, &form).await;
+    assert!(page.text.contains("A session of Ada was ended"), "{}", page.text);
+    assert_eq!(status(&service, &desk).await, StatusCode::UNAUTHORIZED);
+    assert_eq!(list(admin.clone()).await.len(), 1);
+    assert_eq!(trail(&service, "session.end").await.len(), 2);
+    service.stop().await;
+}
+
+/// A clock that a test sets, s from the present.
+fn clock(offset: &Arc<AtomicI64>) -> Clock {
+    let offset = Arc::clone(offset);
+    Clock::over(move || now().plus_seconds(offset.load(Ordering::SeqCst)))
+}
+
+fn access(limits: Limits, offset: &Arc<AtomicI64>) -> Arc<Access> {
+    let mut access = Access::by_sign_in(limits.idle_seconds);
+    (access.limits, access.clock) = (limits, clock(offset));
+    Arc::new(access)
+}
+
+const LIMITS: Limits = Limits { idle_seconds: 3600.0, lifetime_seconds: 8.0 * 3600.0 };
+
+#[tokio::test]
+async fn sessions_in_use_end_after_their_lifetime() {
+    let (_folder, mut service) = service().await;
+    let offset = Arc::new(AtomicI64::new(0));
+    service.access = access(LIMITS, &offset);
+    let ada = signed_in(&service, Role::Clinician).await;
+    for minutes in (0..8 * 60).step_by(30) {
+        offset.store(60 * minutes, Ordering::SeqCst);
+        assert_eq!(status(&service, &ada).await, StatusCode::OK, "after {minutes} minutes");
+    }
+    offset.store(8 * 3600 + 5, Ordering::SeqCst);
+    assert_eq!(status(&service, &ada).await, StatusCode::UNAUTHORIZED);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn clock_that_is_set_back_revives_no_session_token_or_link() {
+    let (folder, mut service) = service().await;
+    let offset = Arc::new(AtomicI64::new(0));
+    service.access = access(LIMITS, &offset);
+    let ada = signed_in(&service, Role::Clinician).await;
+    let script = token(&service, &[Right::Read]).await;
+    let (_, link) = user(&service, "Bob", Role::Clinician).await;
+    let use_link = |service: &Service| {
+        let (router, path) = (service.router(), format!("/sign-in/{link}"));
+        let request = Request::post(path).header(header::CONTENT_TYPE, FORM).body(Body::empty()).unwrap();
+        async move { router.oneshot(request).await.unwrap().status() }
+    };
+    assert_eq!([status(&service, &ada).await, status(&service, &script).await], [StatusCode::OK; 2]);
+    // Two days later all are over, and that was seen.
+    offset.store(2 * 24 * 3600, Ordering::SeqCst);
+    let over = [StatusCode::UNAUTHORIZED; 3];
+    let all = async |service: &Service| {
+        [status(service, &ada).await, status(service, &script).await, use_link(service).await]
+    };
+    assert_eq!(all(&service).await, over);
+    offset.store(0, Ordering::SeqCst);
+    assert_eq!(all(&service).await, over, "the clock was set back");
+    service.stop().await;
+    let mut service = start_anew(&folder.path().join("a.db")).await;
+    service.access = access(LIMITS, &offset);
+    assert_eq!(all(&service).await, over, "and the service started anew");
+    // Whoever comes now has all the time that there is, and time passes.
+    let (_, fresh) = user(&service, "Cy", Role::Clinician).await;
+    let come = send(&service, &As::Nobody, &Method::POST, &format!("/sign-in/{fresh}"), FORM, "").await;
+    assert_eq!(status(&service, &session_of(&come)).await, StatusCode::OK);
+    let mut reader = service.store.read().await.unwrap();
+    let before: Instant = service.access.clock.now(&mut reader).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(20)).await;
+    assert!(service.access.clock.now(&mut reader).await.unwrap() > before);
+    drop(reader);
+    service.stop().await;
+}
+
+/// Reads an event stream until it ends: what came.
+async fn read_to_end(mut body: axum::body::BodyDataStream) -> String {
+    let mut text = Vec::new();
+    let all = async {
+        while let Some(Ok(bytes)) = body.next().await {
+            text.extend_from_slice(&bytes);
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(5), all).await.expect("the stream goes on");
+    String::from_utf8(text).unwrap()
+}
+
+async fn listen(service: &Service, who: &As, path: &str) -> axum::body::BodyDataStream {
+    let request = Request::get(path);
+    let request = match who {
+        As::Session(secret) => request.header(header::COOKIE, format!("gaitwright_session={secret}")),
+        As::Token(secret) => request.header(header::AUTHORIZATION, format!("Bearer {secret}")),
+        As::Nobody => request,
+    };
+    let answer = service.router().oneshot(request.body(Body::empty()).unwrap()).await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    let mut body = answer.into_body().into_data_stream();
+    let first = body.next().await.unwrap().unwrap();
+    assert!(first.starts_with(b"event: study_state"), "{first:?}");
+    body
+}
+
+#[tokio::test]
+async fn event_streams_end_with_what_allowed_them() {
+    let (_folder, mut service) = service().await;
+    let offset = Arc::new(AtomicI64::new(0));
+    service.access = access(LIMITS, &offset);
+    let admin = with_password(&service, "Ada", Role::Admin, RIGHT).await;
+    let root = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
+    let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    let path = format!("/api/v1/studies/{study}/events");
+    let users = ["signed out", "ended", "disabled", "demoted", "idle"];
+    let mut ids = Vec::new();
+    let mut listening = Vec::new();
+    for name in users {
+        ids.push(with_password(&service, name, Role::Clinician, RIGHT).await);
+        let session = session_of(&sign_in_from(&service, OWNER, None, name, RIGHT).await);
+        listening.push((listen(&service, &session, &path).await, session));
+    }
+    let script = token_by(&service, admin, "Ada", Role::Admin).await;
+    let by_token = listen(&service, &script, &path).await;
+    let (mut streams, sessions): (Vec<_>, Vec<_>) = listening.into_iter().unzip();
+
+    let done = send(&service, &sessions[0], &Method::POST, "/sign-out", FORM, "").await;
+    assert_eq!(done.status, StatusCode::SEE_OTHER);
+    let live = send(&service, &sessions[1], &Method::GET, "/api/v1/sessions", "", "").await.json();
+    let ended = format!("/api/v1/sessions/{}/end", live[0]["id"].as_str().unwrap());
+    assert_eq!(post(&service, &root, &ended, &json!({})).await.0, StatusCode::OK);
+    let user = |number: usize, what: &str| format!("/api/v1/users/{}/{what}", ids[number]);
+    assert_eq!(post(&service, &root, &user(2, "disable"), &json!({})).await.0, StatusCode::OK);
+    assert_eq!(post(&service, &root, &user(3, "role"), &json!({"role": "rater"})).await.0, StatusCode::OK);
+    let tokens = send(&service, &root, &Method::GET, "/api/v1/tokens", "", "").await.json();
+    let revoke = format!("/api/v1/tokens/{}/revoke", tokens[0]["id"].as_str().unwrap());
+    assert_eq!(post(&service, &root, &revoke, &json!({})).await.0, StatusCode::OK);
+    let idle = streams.pop().unwrap();
+    for (stream, name) in streams.into_iter().zip(users) {
+        let rest = read_to_end(stream).await;
+        assert!(!rest.contains("event: "), "{name}: {rest}");
+    }
+    read_to_end(by_token).await;
+    offset.store(3700, Ordering::SeqCst);
+    read_to_end(idle).await;
+
+    // The subject withdraws: no stream of the study goes on, whoever listens.
+    let root = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
+    let stream = listen(&service, &root, &path).await;
+    let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
+    let (withdrawn, problem) = post(&service, &root, &withdraw, &json!({"reason": "asked to"})).await;
+    assert!(withdrawn.is_success(), "{problem}");
+    read_to_end(stream).await;
+    service.stop().await;
+}
+
+#[test]
+fn event_streams_are_made_in_one_place_that_asks_who_listens() {
+    fn sources(folder: &Path, found: &mut Vec<(String, String)>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                sources(&path, found);
+            } else {
+                found.push((path.display().to_string(), std::fs::read_to_string(&path).unwrap()));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/src"), &mut found);
+    let makes = |text: &str| ["Sse::new", "Body::from_stream", "StreamBody"].iter().any(|way| text.contains(way));
+    let makers: Vec<&str> = found.iter().filter(|(_, text)| makes(text)).map(|(path, _)| path.as_str()).collect();
+    assert!(found.len() > 100 && makers.len() == 1 && makers[0].ends_with("http/event_stream.rs"), "{makers:?}");
+}
+
+#[tokio::test]
+async fn way_in_is_a_new_administrator_when_all_are_disabled() {
+    let (_folder, service) = service().await;
+    let mut writer = service.store.write().await.unwrap();
+    let add = NewUser { name: "admin".to_owned(), role: Role::Admin };
+    let admin = people::add(&mut writer, &Actor::program(), &add).await.unwrap();
+    assert_eq!(people::way_in(&mut writer).await.unwrap().id, admin.id);
+    let disable = "update users set disabled_at = created_at";
+    sqlx::query(disable).execute(&mut **writer).await.unwrap();
+    let fresh = people::way_in(&mut writer).await.unwrap();
+    assert_eq!((fresh.name.as_str(), fresh.role, fresh.has_password), ("admin-2", Role::Admin, false));
+    assert!(people::link(&mut writer, &Actor::terminal(), fresh.id).await.is_ok());
+    commit(writer).await.unwrap();
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn upgrade_from_the_baseline_keeps_sessions_and_seals() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let baseline = zstd::decode_all(&include_bytes!("../records/v1.db.zst")[..]).unwrap();
+    std::fs::write(&database, baseline).unwrap();
+    let pool = sqlx::SqlitePool::connect(&format!("sqlite:{}", database.display())).await.unwrap();
+    let begin = "insert into sessions (hash, user_id, created_at, seen_at) \
+                 select 'f' || substr(hex(zeroblob(32)), 2), id, created_at, created_at from users limit 1";
+    sqlx::query(begin).execute(&pool).await.unwrap();
+    pool.close().await;
+    let store = Store::open(&database).await.unwrap();
+    let mut reader = store.read().await.unwrap();
+    let ids: Vec<Option<String>> =
+        sqlx::query_scalar("select id from sessions").fetch_all(&mut **reader).await.unwrap();
+    assert!(!ids.is_empty());
+    for id in ids {
+        id.unwrap().parse::<SessionId>().expect("every session has an identifier now");
+    }
+    drop(reader);
+    let tokens = gaitwright::store::tokens::all(&mut store.read().await.unwrap()).await.unwrap();
+    assert!(!tokens.is_empty());
+    let found = seals::verify(&mut store.read().await.unwrap()).await.unwrap();
+    assert!(matches!(found, seals::Verdict::Whole { .. }), "{found:?}");
+    store.close().await;
+}
