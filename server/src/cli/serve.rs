@@ -53,6 +53,7 @@ impl Serve {
         let (workers, idle_seconds, database) = (settings.workers()?, settings.idle_seconds()?, settings.database());
         let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
         let access_log_days = settings.access_log_days()?;
+        let backups = settings.backups()?;
         // What can be refused is refused before a file is made.
         let tls = match tls {
             Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
@@ -62,7 +63,7 @@ impl Serve {
         let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
         listener.set_nonblocking(true).map_err(cannot_listen)?;
         let address = listener.local_addr().map_err(cannot_listen)?;
-        let store = Store::open(&database).await?;
+        let store = Store::open_anchored(&database, settings.anchor().as_deref()).await?;
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
         commit(writer).await?;
@@ -91,6 +92,9 @@ impl Serve {
             let director = director.clone();
             async move { Box::pin(director.run()).await }
         });
+        if let Some(plan) = backups {
+            tokio::spawn(plan.follow(store.clone(), director.stopping()));
+        }
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");

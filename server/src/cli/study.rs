@@ -6,6 +6,7 @@ use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::archive::Archive;
 use crate::store::audit::{self, Actor};
+use crate::store::whole_file::WholeFile;
 use crate::store::{Store, StoreError, StudyId, archive, backup, commit, events, gaits, studies};
 use crate::studies::belief::Beliefs;
 use crate::studies::choice::ranking_to_show;
@@ -38,8 +39,9 @@ impl Export {
         let bytes = packed?;
         note_export(&self.database, "export", &format!("study {}", self.study), vec![self.study.to_string()]);
         let cannot = |e: std::io::Error| Error::Malformed(format!("cannot write {}: {e}", self.to.display()));
-        let mut file = std::fs::File::create_new(&self.to).map_err(cannot)?;
-        std::io::Write::write_all(&mut file, &bytes).and_then(|()| file.sync_all()).map_err(cannot)?;
+        let family = self.to.file_name().unwrap_or_default().to_string_lossy();
+        let mut file = WholeFile::begin(&self.to, &family).map_err(cannot)?;
+        std::io::Write::write_all(file.file(), &bytes).and_then(|()| file.keep_as(&self.to)).map_err(cannot)?;
         data(&self.to.display().to_string())
     }
 }

@@ -2,6 +2,7 @@
 
 use super::problem_kinds::Kind;
 use crate::error::{Error, FieldError};
+use crate::store::StoreError;
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -81,6 +82,9 @@ impl From<&Error> for Problem {
             Error::Forbidden(_) => Self::new(Kind::Forbidden, detail),
             Error::Conflict(_) => Self::new(Kind::Conflict, detail),
             Error::Learner(_) => Self::new(Kind::Learner, detail),
+            Error::Store(StoreError::RecordVanished { .. }) => {
+                Self::new(Kind::RecordVanished, Kind::RecordVanished.entry().meaning.to_owned())
+            }
             Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => {
                 Self::new(Kind::Internal, "the failure was logged; nothing was changed".to_owned())
             }

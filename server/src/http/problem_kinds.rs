@@ -33,6 +33,8 @@ pub(super) enum Kind {
     Internal,
     /// 503, too slow.
     TimedOut,
+    /// 503, no changes.
+    RecordVanished,
 }
 
 /// What is known of a kind.
@@ -62,7 +64,7 @@ const fn entry(
 
 impl Kind {
     /// Every kind, by status.
-    pub(super) const ALL: [Self; 14] = [
+    pub(super) const ALL: [Self; 15] = [
         Self::Malformed,
         Self::NotSignedIn,
         Self::Forbidden,
@@ -77,6 +79,7 @@ impl Kind {
         Self::TooManyAttempts,
         Self::Internal,
         Self::TimedOut,
+        Self::RecordVanished,
     ];
 
     /// What is known of it.
@@ -182,6 +185,15 @@ impl Kind {
                 "The answer took too long",
                 "The service gave the request up. A change that it asked for may have happened.",
                 "Look at the present state, then try again; with the same Idempotency-Key a change happens once.",
+            ),
+            Self::RecordVanished => entry(
+                "/problems/record-vanished",
+                StatusCode::SERVICE_UNAVAILABLE,
+                "The record takes no changes",
+                "The database file or its write-ahead log was deleted, replaced or cut while the service ran. No change is \
+                 accepted, so that none is lost.",
+                "Tell whoever runs the service: stop it, run `gaitwright audit verify`, and put a copy in place if the record \
+                 is not whole.",
             ),
         }
     }
