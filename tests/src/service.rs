@@ -155,6 +155,14 @@ impl Service {
         self.store.close().await;
     }
 
+    /// Stops it as it is: of a record that takes no changes any more, its tasks may end with an error.
+    pub async fn abandon(self) {
+        self.director.stop();
+        self.work.abort();
+        let _ = self.work.await;
+        self.store.close().await;
+    }
+
     /// The paper's first subject.
     pub async fn subject(&self) -> SubjectId {
         let mut reader = self.store.read().await.unwrap();

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright::store::seals::{self, Verdict};
-use gaitwright::store::{audit, backup};
+use gaitwright::store::{Store, StoreError, audit, backup, verify as store_verify};
 use gaitwright_tests::every_table::filled;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection, Row};
@@ -89,15 +89,85 @@ async fn seals_and_audit_rows_that_are_missing_are_found_at_the_end_too() {
     assert!(matches!(found, audit::Verdict::Broken { .. }), "{found:?}");
 }
 
+/// A row like another one, with a key of its own.
+async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) -> String {
+    let columns = "select name from pragma_table_info(?) order by cid";
+    let columns: Vec<String> = sqlx::query_scalar(columns).bind(table).fetch_all(connection).await.unwrap();
+    let last = *key.last().unwrap();
+    let value = |column: &String| match (table, column.as_str()) {
+        (_, column) if column == last && ["seq", "attempt", "version", "format_version"].contains(&last) => {
+            format!("{column} + 1000")
+        }
+        (_, column) if column == last && ["feedback_seq", "number"].contains(&last) => format!("{column} + 1000"),
+        ("lab_acts", "act") => "'closed'".to_owned(),
+        ("presentations", "number") | ("trials", "number") | ("lab_sessions", "number") => format!("{column} + 1000"),
+        (_, "hash") | (_, "token") => "hex(randomblob(32))".to_owned(),
+        (_, "sha256") | (_, "pseudonym") | (_, "name") => "hex(randomblob(8))".to_owned(),
+        ("feedback", "kind") => "'tie'".to_owned(),
+        (_, "id") | ("jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
+        (_, column) if column == last => "hex(randomblob(8))".to_owned(),
+        (_, column) => column.to_owned(),
+    };
+    let values: Vec<String> = columns.iter().map(value).collect();
+    format!("insert into {table} ({}) select {} from {table} limit 1", columns.join(", "), values.join(", "))
+}
+
 #[tokio::test]
-async fn every_table_is_sealed_or_said_not_to_be() {
+async fn a_forged_row_of_any_table_keeps_the_record_from_opening() {
     let (_folder, database) = filled().await;
-    let tables = "select name from sqlite_master where type = 'table' and name not glob 'sqlite_*' \
-                  and name not glob '_sqlx*'";
+    let (mut tables, mut found) = (0, 0);
+    for sealed in seals::TABLES.iter().chain(seals::CHECKED) {
+        let table = sealed.table;
+        let sql = forged(&mut open(&database).await, table, sealed.key).await;
+        let copy = touched(&database, &sql).await;
+        let before = std::fs::read(&copy).unwrap();
+        let refused = Store::open(&copy).await;
+        tables += 1;
+        let at_open = matches!(&refused, Err(StoreError::Unsealed { table: named, .. }) if named == table);
+        let newer = table == "_sqlx_migrations" && matches!(&refused, Err(StoreError::NewerSchema { .. }));
+        assert!(at_open || newer, "{sql}: {:?}", refused.err());
+        let refused = store_verify::file(&copy, &[]).await;
+        assert!(refused.is_err(), "{sql}");
+        assert_eq!(std::fs::read(&copy).unwrap(), before, "{sql}: nothing was changed");
+        found += 1;
+    }
+    println!("{found} of {tables} forged rows found at open and by audit verify");
+}
+
+#[tokio::test]
+async fn a_changed_row_of_a_table_with_checksums_is_found() {
+    let (_folder, database) = filled().await;
+    store_verify::file(&database, &[]).await.unwrap();
+    for (sql, table) in [
+        ("update events set payload = '{}' where seq = 1", "events"),
+        ("delete from events where seq = 1", "events"),
+        ("update jobs set failures = 1", "jobs"),
+        ("update sessions set by_link = 1", "sessions"),
+        ("update sign_in_links set expires_at = '9999'", "sign_in_links"),
+        ("update idempotency_keys set body = 'x'", "idempotency_keys"),
+        ("delete from idempotency_keys", "idempotency_keys"),
+        ("update _sqlx_migrations set execution_time = 7", "_sqlx_migrations"),
+    ] {
+        let found = verify(&touched(&database, sql).await).await;
+        assert!(matches!(&found, Verdict::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
+    }
+    let copy = touched(&database, "update events set payload = '{}' where seq = 1").await;
+    let mut connection = open(&copy).await;
+    sqlx::query("drop trigger feedback_no_update").execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+    let refused = store_verify::file(&copy, &[]).await.unwrap_err().to_string();
+    assert!(refused.contains("trigger feedback_no_update"), "{refused}");
+}
+
+#[tokio::test]
+async fn every_table_is_sealed_or_has_checksums() {
+    let (_folder, database) = filled().await;
+    let tables = "select name from sqlite_master where type = 'table' and name not glob 'sqlite_*'";
     let mut connection = open(&database).await;
     for row in sqlx::query(tables).fetch_all(&mut connection).await.unwrap() {
         let table: &str = row.get(0);
-        let known = seals::TABLES.iter().any(|sealed| sealed.table == table) || seals::NOT_SEALED.contains(&table);
-        assert!(known, "{table}: name it in store/seals.rs, in TABLES or in NOT_SEALED");
+        let mut known = seals::TABLES.iter().chain(seals::CHECKED);
+        let known = known.any(|sealed| sealed.table == table) || seals::NOT_SEALED.contains(&table);
+        assert!(known, "{table}: name it in store/seals.rs, in TABLES or in CHECKED");
     }
 }

@@ -2,6 +2,7 @@
 
 use super::numbers::workers;
 use super::output::data;
+use super::scheduled_backups::BackupPlan;
 use crate::access::sign_in::Limits as SessionLimits;
 use crate::error::Error;
 use crate::http::connections::Limits;
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
 /// The file that is read when none is named.
@@ -20,6 +22,10 @@ const DEFAULT_FILE: &str = "gaitwright.toml";
 const KNOWN: &[(&str, &str, &str)] = &[
     ("listen", "127.0.0.1:8080", "where to listen"),
     ("database", "gaitwright.db", "the SQLite file"),
+    ("anchor", "", "a second file for the newest hashes of the record, best on another disk; one is always beside it"),
+    ("backup_folder", "", "where the service copies the record by itself, best on another disk; empty: nowhere"),
+    ("backup_hours", "24", "a copy every so many hours; with backup_folder"),
+    ("backup_keep", "14", "how many of these copies are kept; with backup_folder"),
     (
         "host_names",
         "",
@@ -63,6 +69,18 @@ pub(super) struct Flags {
     /// The SQLite file, made if it does not exist; default gaitwright.db.
     #[arg(long, value_name = "FILE")]
     database: Option<String>,
+    /// A second file for the newest hashes of the record, best on another disk than the one that is kept beside it.
+    #[arg(long, value_name = "FILE")]
+    anchor: Option<String>,
+    /// Where the service copies the record by itself, best on another disk; default: nowhere.
+    #[arg(long, value_name = "FOLDER")]
+    backup_folder: Option<String>,
+    /// A copy every so many hours; default 24.
+    #[arg(long, value_name = "HOURS")]
+    backup_hours: Option<String>,
+    /// How many of these copies are kept; default 14.
+    #[arg(long, value_name = "NUMBER")]
+    backup_keep: Option<String>,
     /// A name under which browsers reach the service, besides its address and localhost; may be given several times.
     #[arg(long, value_delimiter = ',', value_name = "NAME")]
     host_name: Vec<String>,
@@ -176,6 +194,31 @@ impl Settings {
         PathBuf::from(self.text("database"))
     }
 
+    /// The second anchor.
+    pub(super) fn anchor(&self) -> Option<PathBuf> {
+        Some(self.text("anchor")).filter(|path| !path.is_empty()).map(PathBuf::from)
+    }
+
+    /// Where the service copies the record by itself; `None`: nowhere.
+    pub(super) fn backups(&self) -> Result<Option<BackupPlan>, Error> {
+        let hours: u64 = self.parsed("backup_hours", "1 to 8760")?;
+        let keep: usize = self.parsed("backup_keep", "1 to 10000")?;
+        if !(1..=8760).contains(&hours) {
+            return Err(self.refused("backup_hours", "1 to 8760"));
+        }
+        if !(1..=10_000).contains(&keep) {
+            return Err(self.refused("backup_keep", "1 to 10000"));
+        }
+        let folder = PathBuf::from(self.text("backup_folder"));
+        if folder.as_os_str().is_empty() {
+            return Ok(None);
+        }
+        if !folder.is_dir() {
+            return Err(self.refused("backup_folder", "a folder that exists"));
+        }
+        Ok(Some(BackupPlan { folder, every: Duration::from_secs(3600 * hours), keep }))
+    }
+
     pub(super) fn workers(&self) -> Result<Option<usize>, Error> {
         match self.text("workers") {
             "cores" => Ok(None),
@@ -279,6 +322,10 @@ impl Flags {
         match name {
             "listen" => self.listen.clone(),
             "database" => self.database.clone(),
+            "anchor" => self.anchor.clone(),
+            "backup_folder" => self.backup_folder.clone(),
+            "backup_hours" => self.backup_hours.clone(),
+            "backup_keep" => self.backup_keep.clone(),
             "host_names" => Some(self.host_name.join(",")).filter(|names| !names.is_empty()),
             "workers" => self.workers.map(|workers| workers.to_string()),
             "nats" => self.nats.clone(),
@@ -421,6 +468,16 @@ mod tests {
         assert!(parse(Path::new("x.toml"), "workers = ").is_err());
         let dotted = Flags { nats_queue: Some("a.b".to_owned()), ..Flags::default() };
         assert!(settings(&dotted, &[]).unwrap().nats().unwrap_err().to_string().contains("letters, digits"));
+    }
+
+    #[test]
+    fn backup_settings_out_of_range_are_refused() {
+        for (name, value) in [("HOURS", "0"), ("HOURS", "1.5"), ("KEEP", "0"), ("FOLDER", "/no such folder")] {
+            let name = format!("GAITWRIGHT_BACKUP_{name}");
+            let refused = settings(&Flags::default(), &[(&name, value)]).unwrap().backups().unwrap_err().to_string();
+            assert!(refused.contains(&name), "{refused}");
+        }
+        assert!(settings(&Flags::default(), &[]).unwrap().backups().unwrap().is_none());
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod problem;
 mod record;
 mod reference;
 mod reproduce;
+mod scheduled_backups;
 mod serve;
 mod solve;
 pub mod study;

@@ -3,6 +3,7 @@
 
 use super::output::tell;
 use crate::error::Error;
+use crate::store::whole_file::sync_folder;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -99,7 +100,8 @@ impl OutFile {
     /// [`Error::Malformed`] with the reason.
     pub(super) fn finish(mut self) -> Result<(), Error> {
         let (Some(file), Some(part)) = (self.file.take(), &self.part) else { return Ok(()) };
-        let done = file.sync_all().and_then(|()| std::fs::rename(part, &self.path));
+        let renamed = file.sync_all().and_then(|()| std::fs::rename(part, &self.path));
+        let done = renamed.and_then(|()| sync_folder(&self.path));
         if done.is_err() {
             self.clean();
         }

@@ -4,7 +4,7 @@ use super::output::{data, tell};
 use crate::error::Error;
 use crate::store::access_log::{Access, Kind};
 use crate::store::audit::Actor;
-use crate::store::{Connection, StoreError, access_spool, audit, backup, restore, seals};
+use crate::store::{access_spool, backup, restore, verify};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -16,44 +16,37 @@ pub(super) struct Audit {
 
 #[derive(Debug, Subcommand)]
 enum AuditCommand {
-    /// Walk the hash chain of the audit trail and compare every row with its seal; a change of the past is found.
+    /// Examine the database file, walk the hash chains, compare every row with its seal or checksum, and the record with its
+    /// anchors: a change of the past is found, and an end that is missing.
     Verify {
         /// The SQLite file.
         #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
         database: PathBuf,
+        /// The anchor that the service keeps elsewhere, besides the one beside the record.
+        #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
+        anchor: Option<PathBuf>,
     },
 }
 
 impl Audit {
     pub(super) async fn run(self) -> Result<(), Error> {
-        let AuditCommand::Verify { database } = self.what;
+        let AuditCommand::Verify { database, anchor } = self.what;
         exists(&database)?;
-        let pool = backup::open_read_only(&database).await?;
-        let found = match pool.acquire().await {
-            Ok(mut reader) => verify(&mut reader).await,
-            Err(error) => Err(StoreError::from(error).into()),
-        };
-        pool.close().await;
-        data(&found?)
-    }
-}
-
-/// What is to be said of a whole record.
-async fn verify(db: &mut Connection) -> Result<String, Error> {
-    let broken = |reason| Error::Store(StoreError::Damaged { what: "evidence", reason });
-    let trail = match audit::verify(db).await? {
-        audit::Verdict::Whole { rows, last } => format!("whole: {rows} rows, last hash {last}"),
-        audit::Verdict::Broken { seq } => return Err(broken(format!("the audit trail is broken at row {seq}"))),
-    };
-    match seals::verify(db).await? {
-        seals::Verdict::Whole { seals, last } => Ok(format!("{trail}\nwhole: {seals} seals, last hash {last}")),
-        seals::Verdict::None => {
-            Ok(format!("{trail}\nno seals: an older version wrote this record; it is sealed when it is next opened"))
+        let found = verify::file(&database, anchor.as_slice()).await?;
+        let (rows, last) = found.audit;
+        data(&format!("whole: {rows} rows, last hash {last}"))?;
+        data(&match found.seals {
+            Some((seals, last)) => format!("whole: {seals} seals, last hash {last}"),
+            None => "no seals: an older version wrote this record; it is sealed when it is next opened".to_owned(),
+        })?;
+        for (anchor, ends) in &found.anchors {
+            let (audit, seals) = (ends.audit.seq, ends.seals.seq);
+            data(&format!("nothing is missing that {} has seen: {audit} rows, {seals} seals", anchor.display()))?;
         }
-        seals::Verdict::Broken { seq } => Err(broken(format!("the seals are broken at number {seq}"))),
-        seals::Verdict::Touched { table, key } => {
-            Err(broken(format!("row {key} of {table} is not as this program wrote it")))
+        if found.anchors.is_empty() {
+            data("no anchor: rows that are missing at the end cannot be seen")?;
         }
+        Ok(())
     }
 }
 
@@ -86,12 +79,15 @@ pub(super) struct Restore {
     /// The SQLite file to put it in place of; the present one is kept beside it.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
+    /// The anchor that the service keeps elsewhere; it then holds what the copy ends with.
+    #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
+    anchor: Option<PathBuf>,
 }
 
 impl Restore {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.from)?;
-        if let Some(kept) = restore::from_file(&self.from, &self.database).await? {
+        if let Some(kept) = restore::from_file(&self.from, &self.database, self.anchor.as_deref()).await? {
             tell(&format!("the present record is kept as {}", kept.display()));
         }
         tell(&format!("restored {}", self.database.display()));

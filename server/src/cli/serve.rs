@@ -55,6 +55,7 @@ impl Serve {
         let (workers, sessions, database) = (settings.workers()?, settings.session_limits()?, settings.database());
         let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
         let access_log_days = settings.access_log_days()?;
+        let backups = settings.backups()?;
         // What can be refused is refused before a file is made.
         let reserve = settings.reserve_bytes()?;
         let tls = match tls {
@@ -65,7 +66,7 @@ impl Serve {
         let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
         listener.set_nonblocking(true).map_err(cannot_listen)?;
         let address = listener.local_addr().map_err(cannot_listen)?;
-        let store = Store::open(&database).await?;
+        let store = Store::open_anchored(&database, settings.anchor().as_deref()).await?;
         store.set_reserve(reserve);
         let mut writer = store.write().await?;
         catalogue::ensure(&mut writer).await?;
@@ -97,6 +98,9 @@ impl Serve {
             async move { Box::pin(director.run()).await }
         });
         let dropping = tokio::spawn(retention::keep_dropping(store.clone()));
+        if let Some(plan) = backups {
+            tokio::spawn(plan.follow(store.clone(), director.stopping()));
+        }
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");

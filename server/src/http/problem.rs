@@ -2,6 +2,7 @@
 
 use super::problem_kinds::Kind;
 use crate::error::{Error, FieldError};
+use crate::store::StoreError;
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -83,6 +84,9 @@ impl From<&Error> for Problem {
             Error::Learner(_) => Self::new(Kind::Learner, detail),
             Error::StorageFull(_) => Self::new(Kind::StorageFull, detail),
             Error::NotReady(_) => Self::new(Kind::NotReady, detail),
+            Error::Store(StoreError::RecordVanished { .. }) => {
+                Self::new(Kind::RecordVanished, Kind::RecordVanished.entry().meaning.to_owned())
+            }
             Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => {
                 Self::new(Kind::Internal, "the failure was logged; nothing was changed".to_owned())
             }

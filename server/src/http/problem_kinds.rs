@@ -37,6 +37,8 @@ pub(super) enum Kind {
     NotReady,
     /// 507.
     StorageFull,
+    /// 503, no changes.
+    RecordVanished,
 }
 
 /// What is known of a kind.
@@ -66,7 +68,7 @@ const fn entry(
 
 impl Kind {
     /// Every kind, by status.
-    pub(super) const ALL: [Self; 16] = [
+    pub(super) const ALL: [Self; 17] = [
         Self::Malformed,
         Self::NotSignedIn,
         Self::Forbidden,
@@ -83,6 +85,7 @@ impl Kind {
         Self::TimedOut,
         Self::NotReady,
         Self::StorageFull,
+        Self::RecordVanished,
     ];
 
     /// What is known of it.
@@ -204,6 +207,15 @@ impl Kind {
                 "The disk of the record has no room for the change, or too little for what it would begin. Nothing was \
                  changed.",
                 "Make room on the disk and send the request again. The service goes on by itself.",
+            ),
+            Self::RecordVanished => entry(
+                "/problems/record-vanished",
+                StatusCode::SERVICE_UNAVAILABLE,
+                "The record takes no changes",
+                "The database file or its write-ahead log was deleted, replaced or cut while the service ran. No change is \
+                 accepted, so that none is lost.",
+                "Tell whoever runs the service: stop it, run `gaitwright audit verify`, and put a copy in place if the record \
+                 is not whole.",
             ),
         }
     }

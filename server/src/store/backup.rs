@@ -1,7 +1,7 @@
 //! Copies of the record: consistent while the service runs, checked before they are trusted.
 
-use super::{Store, StoreError, StoreResult, free_name};
-use super::{file_kind, migrations};
+use super::whole_file::{WholeFile, folder_of};
+use super::{Store, StoreError, StoreResult, beside, file_kind, free_name, migrations};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// When the file exists, cannot be written, or the copy is not whole.
 pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
-    into_file(&store.readers, to).await
+    into_file(&store.readers, to, store.path()).await
 }
 
 /// Writes a compact copy beside the record (`gaitwright.db.backup-20260501T101500`) and checks it: the file and its size.
@@ -26,15 +26,52 @@ pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
     Ok((to, size))
 }
 
+/// Begins the names of copies that the service makes by itself.
+const SCHEDULED: &str = "scheduled";
+
+/// Writes a compact copy into a folder (`gaitwright.db.scheduled-20260501T101500`), checks it, and removes the oldest copies
+/// that were made in this way beyond `keep`: the new file and its size.
+///
+/// # Errors
+/// As [`of_store`], and when an old copy cannot be removed.
+pub async fn into_folder(store: &Store, folder: &Path, keep: usize) -> StoreResult<(PathBuf, u64)> {
+    let _turn = store.copying.lock().await;
+    let name = store.path().file_name().unwrap_or_default();
+    let to = free_name(&folder.join(name), SCHEDULED);
+    of_store(store, &to).await?;
+    let cannot = |source| StoreError::Open { path: folder.to_owned(), source };
+    let size = std::fs::metadata(&to).map_err(cannot)?.len();
+    for (old, _) in scheduled(store.path(), folder).map_err(cannot)?.into_iter().skip(keep) {
+        std::fs::remove_file(&old).map_err(|source| StoreError::Open { path: old, source })?;
+    }
+    Ok((to, size))
+}
+
+/// The copies of a record that [`into_folder`] left in a folder, newest first, and when each was made.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn scheduled(record: &Path, folder: &Path) -> std::io::Result<Vec<(PathBuf, std::time::SystemTime)>> {
+    let start = format!("{}.{SCHEDULED}-", record.file_name().unwrap_or_default().to_string_lossy());
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(&start) {
+            found.push((entry.metadata()?.modified()?, entry.path()));
+        }
+    }
+    found.sort();
+    Ok(found.into_iter().rev().map(|(made, path)| (path, made)).collect())
+}
+
 /// The copies that lie beside the record under the names that this program gives them, newest first: name and bytes.
 ///
 /// # Errors
 /// When the folder cannot be read.
 pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
     let own = record.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let folder = record.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
+    for entry in std::fs::read_dir(folder_of(record))? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
         let kind = name.strip_prefix(&own).and_then(|rest| rest.strip_prefix('.'));
@@ -58,7 +95,7 @@ pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
 /// As [`of_store`].
 pub async fn of_file(from: &Path, to: &Path) -> StoreResult<()> {
     let pool = open_read_only(from).await?;
-    let done = into_file(&pool, to).await;
+    let done = into_file(&pool, to, from).await;
     pool.close().await;
     done
 }
@@ -74,7 +111,7 @@ pub async fn check(file: &Path) -> StoreResult<()> {
     found
 }
 
-/// A connection to read a record that another process may own.
+/// A connection to read a record that another process may own, also where nothing can be written beside it.
 ///
 /// # Errors
 /// When it cannot be opened, [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
@@ -83,7 +120,31 @@ pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
     // A row may hold a whole recording.
     let options = options.row_buffer_size(super::quarantine::ROWS_AHEAD);
-    let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await?;
+    let refused = match connect(options.clone(), file).await {
+        Err(error @ StoreError::Open { .. }) => error,
+        other => return other,
+    };
+    // SQLite cannot make its shared memory there. Without a log it needs none; with one it reads a copy of both.
+    let log = beside(file, "-wal");
+    if std::fs::metadata(&log).map_or(0, |log| log.len()) == 0 {
+        return connect(options.immutable(true), file).await;
+    }
+    let Ok(folder) = private_folder() else { return Err(refused) };
+    let copy = folder.join("record.db");
+    let copied = std::fs::copy(file, &copy).and_then(|_| std::fs::copy(&log, beside(&copy, "-wal")));
+    let opened = match copied {
+        Ok(_) => connect(SqliteConnectOptions::new().filename(&copy), file).await,
+        Err(source) => Err(StoreError::Open { path: file.to_owned(), source }),
+    };
+    // What is open stays readable without a name.
+    let _ = std::fs::remove_dir_all(&folder);
+    opened
+}
+
+/// One connection that stays open, to a record.
+async fn connect(options: SqliteConnectOptions, file: &Path) -> StoreResult<SqlitePool> {
+    let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
+    let pool = one.connect_with(options).await.map_err(|error| file_kind::named(file, error.into()))?;
     let refusal = match migrations::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error)) {
         Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it holds no record yet".to_owned() },
         Ok(_) => return Ok(pool),
@@ -93,22 +154,36 @@ pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
     Err(refusal)
 }
 
-/// Writes a compact copy to a new file and checks the copy.
-pub(super) async fn into_file(pool: &SqlitePool, to: &Path) -> StoreResult<()> {
-    if to.exists() {
-        let source = std::io::ErrorKind::AlreadyExists.into();
-        return Err(StoreError::Open { path: to.to_owned(), source });
-    }
-    sqlx::query("vacuum into ?").bind(to.to_string_lossy().into_owned()).execute(pool).await?;
-    let whole = check(to).await;
-    if whole.is_err() {
-        // A copy that is not whole is none.
-        let _ = std::fs::remove_file(to);
-    }
-    whole
+/// A new folder that its owner alone may open.
+fn private_folder() -> std::io::Result<PathBuf> {
+    let folder = std::env::temp_dir().join(format!("gaitwright-{}", uuid::Uuid::now_v7()));
+    #[allow(unused_mut, reason = "not where there are no permissions of this kind")]
+    let mut builder = std::fs::DirBuilder::new();
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(&folder)?;
+    Ok(folder)
 }
 
-async fn check_open(pool: &SqlitePool) -> StoreResult<()> {
+/// Writes a compact copy to a new file, checks it and gives it its name.
+async fn into_file(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<()> {
+    let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
+    if to.exists() {
+        return Err(cannot_write(std::io::ErrorKind::AlreadyExists.into()));
+    }
+    whole_copy(pool, to, record).await?.keep_as(to).map_err(cannot_write)
+}
+
+/// A compact copy that was checked and has no name yet.
+pub(super) async fn whole_copy(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<WholeFile> {
+    let family = record.file_name().unwrap_or_default().to_string_lossy();
+    let copy = WholeFile::begin(to, &family).map_err(|source| StoreError::Open { path: to.to_owned(), source })?;
+    sqlx::query("vacuum into ?").bind(copy.part().to_string_lossy().into_owned()).execute(pool).await?;
+    check(copy.part()).await?;
+    Ok(copy)
+}
+
+pub(super) async fn check_open(pool: &SqlitePool) -> StoreResult<()> {
     let damaged = |reason: String| StoreError::Damaged { what: "database file", reason };
     let integrity: String = sqlx::query("pragma integrity_check").fetch_one(pool).await?.try_get(0)?;
     if integrity != "ok" {

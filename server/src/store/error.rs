@@ -54,6 +54,76 @@ pub enum StoreError {
         /// The newest version this program knows.
         known: i64,
     },
+    /// There is nothing where a record was.
+    #[error(
+        "there is no record at {}, but {} says that there was one: put a copy in place with `gaitwright restore`; to begin \
+         an empty record, remove that file",
+        path.display(), evidence.display()
+    )]
+    RecordMissing {
+        /// Where the record should be.
+        path: PathBuf,
+        /// Its anchor or its log.
+        evidence: PathBuf,
+    },
+    /// The file of the open record, or its log, was deleted, replaced or cut.
+    #[error(
+        "the record {} takes no changes: {what} while it was open; what was acknowledged before may be lost with the \
+         process. Stop the service, then run `gaitwright audit verify`",
+        path.display()
+    )]
+    RecordVanished {
+        /// The database file.
+        path: PathBuf,
+        /// What happened to which file.
+        what: String,
+    },
+    /// The record has lost its end, or is an earlier state of itself.
+    #[error(
+        "the record {} ends with row {found} of {table}, but its anchor {} has seen row {seen}: acknowledged changes are \
+         missing, nothing was changed. Put the missing log or a newer copy in place; if this state is the right one, remove \
+         the anchor",
+        record.display(), anchor.display()
+    )]
+    CutOff {
+        /// The database file.
+        record: PathBuf,
+        /// The anchor.
+        anchor: PathBuf,
+        /// `audit` or `seals`.
+        table: &'static str,
+        /// The last row there is.
+        found: i64,
+        /// The last row that the anchor saw.
+        seen: i64,
+    },
+    /// The record has another past than the one its anchor saw.
+    #[error(
+        "row {seq} of {table} in the record {} is not the one that its anchor {} has seen: the past was rewritten, or this is \
+         another record. Nothing was changed; if this record is the right one, remove the anchor",
+        record.display(), anchor.display()
+    )]
+    Rewritten {
+        /// The database file.
+        record: PathBuf,
+        /// The anchor.
+        anchor: PathBuf,
+        /// `audit` or `seals`.
+        table: &'static str,
+        /// The row.
+        seq: i64,
+    },
+    /// A row was not written by this program.
+    #[error(
+        "row {key} of {table} in the record was not written by this program: it has no seal. Nothing was changed; run \
+         `gaitwright audit verify` and put a copy in place with `gaitwright restore`"
+    )]
+    Unsealed {
+        /// Its table.
+        table: String,
+        /// Its primary key.
+        key: String,
+    },
     /// The schema could not be brought up to date.
     #[error("migrating the database: {0}")]
     Migrate(#[from] sqlx::migrate::MigrateError),
@@ -125,6 +195,15 @@ impl StoreError {
             Self::NotDurable(_) | Self::Closed => true,
             Self::Database(sqlx::Error::Database(found)) => says_so(found.message()),
             _ => false,
+        }
+    }
+
+    /// The same for everybody whose change was made durable together with another.
+    pub(super) fn for_all(&self) -> Self {
+        match self {
+            Self::RecordVanished { path, what } => Self::RecordVanished { path: path.clone(), what: what.clone() },
+            Self::NotDurable(reason) => Self::NotDurable(reason.clone()),
+            other => Self::NotDurable(other.to_string()),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The schema: numbered SQL files, embedded, applied at start in one go.
 
-use super::{Connection, StoreError, StoreResult, backup, beside};
+use super::{Connection, StoreError, StoreResult, backup, beside, seals};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::{Row, SqlSafeStr, SqlitePool};
 use std::borrow::Cow;
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 /// Version, description and text of each migration. An applied file is never edited: add the next one.
 const FILES: &[(i64, &str, &str)] = &[
     (1, "baseline", include_str!("../../../migrations/0001_baseline.sql")),
+    (2, "checksums", include_str!("../../../migrations/0002_checksums.sql")),
     (3, "imports", include_str!("../../../migrations/0003_imports.sql")),
     (4, "sessions", include_str!("../../../migrations/0004_sessions.sql")),
     (5, "access_log", include_str!("../../../migrations/0005_access_log.sql")),
@@ -21,21 +22,30 @@ pub const FORM: i64 = FILES[FILES.len() - 1].0;
 /// Length of the header of an SQLite file.
 const SQLITE_HEADER_BYTES: usize = 100;
 
+/// Brings a record up to date. The schema, and the seals of what the migrations wrote, change together or not at all; a
+/// record with a row that this program did not write is refused and left as it is.
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
     back_up_before(pool, path, found).await?;
-    migrator().run(pool).await?;
-    Ok(())
+    let mut change = pool.begin().await?;
+    let before = seals::present(&mut change).await?;
+    seals::watch(&mut change).await?;
+    up_to(FORM).run_direct(None, &mut *change, false).await?;
+    seals::adopt(&mut change, &before).await?;
+    seals::refuse_unsealed(&mut change).await?;
+    Ok(change.commit().await?)
 }
 
 /// Makes the tables of a record in an empty database.
 pub(super) async fn fresh(db: &mut Connection) -> StoreResult<()> {
-    Ok(migrator().run(db).await?)
+    Ok(up_to(FORM).run_direct(None, db, false).await?)
 }
 
-fn migrator() -> Migrator {
+/// The migrations up to a version.
+pub(super) fn up_to(newest: i64) -> Migrator {
     let migrations = FILES
         .iter()
+        .filter(|(version, ..)| *version <= newest)
         .map(|&(version, description, sql)| {
             let description = Cow::Borrowed(description);
             Migration::new(version, description, MigrationType::Simple, sql.into_sql_str(), false)
@@ -68,24 +78,18 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
     Ok(found)
 }
 
-/// A file that is about to be changed is copied first: `gaitwright.db.v1`. The copy gets its name when it is whole, so
-/// that a process which is killed while it copies leaves nothing that looks like one.
+/// A file that is about to be changed is copied first: `gaitwright.db.v1`.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
     if found == 0 || found == FILES[FILES.len() - 1].0 {
         return Ok(());
     }
-    let part = beside(path, &format!(".v{found}.part"));
-    let cannot_write = |source| StoreError::Open { path: part.clone(), source };
-    if part.exists() {
-        std::fs::remove_file(&part).map_err(cannot_write)?;
+    let name = beside(path, &format!(".v{found}"));
+    let cannot_write = |source| StoreError::Open { path: name.clone(), source };
+    let copy = backup::whole_copy(pool, &name, path).await?;
+    match free_name(&name, copy.part()).map_err(cannot_write)? {
+        Some(free) => copy.keep_as(&free).map_err(cannot_write),
+        None => Ok(()),
     }
-    backup::into_file(pool, &part).await?;
-    let kept = match free_name(&beside(path, &format!(".v{found}")), &part) {
-        Ok(Some(copy)) => std::fs::rename(&part, &copy),
-        Ok(None) => std::fs::remove_file(&part),
-        Err(error) => Err(error),
-    };
-    kept.map_err(cannot_write)
 }
 
 /// The name itself, or with a number where another record has it; `None`: this very record was copied already.

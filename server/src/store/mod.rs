@@ -6,6 +6,7 @@
 
 pub mod access_log;
 pub mod access_spool;
+pub mod anchor;
 pub mod archive;
 pub mod audit;
 pub mod backup;
@@ -18,6 +19,7 @@ pub mod events;
 pub mod explanations;
 pub mod feedback;
 mod file_kind;
+mod files;
 pub mod gaits;
 mod id;
 pub mod idempotency;
@@ -31,6 +33,7 @@ mod lent;
 pub mod listing;
 pub mod members;
 mod migrations;
+mod ownership;
 pub mod presentations;
 pub mod quarantine;
 pub mod reference_gaits;
@@ -51,6 +54,8 @@ pub mod tokens;
 pub mod totals;
 pub mod trials;
 pub mod users;
+pub mod verify;
+pub(crate) mod whole_file;
 mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
@@ -65,14 +70,16 @@ pub use time::{Instant, now};
 pub use writing::Writer;
 
 use crate::compute::{ComputeError, OnPool, Pool};
+use anchor::Anchors;
+use files::Files;
+use ownership::Ownership;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{SqliteConnection, SqlitePool};
-use std::fs::{File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::Mutex;
-use writing::Writing;
+use writing::{Outside, Writing};
 
 /// Whether the record takes changes is tried at most so often.
 const PROBED_AGAIN: Duration = Duration::from_secs(1);
@@ -113,42 +120,80 @@ pub struct Store {
     /// When it was last tried whether the record takes changes, and what was found.
     probed: Arc<Mutex<Option<(std::time::Instant, Result<(), String>)>>>,
     /// Held as long as any clone lives: a second process that opens the file for writing is refused.
-    _owner: Arc<File>,
+    _owner: Arc<Ownership>,
 }
 
 impl Store {
     /// Opens or creates the file, takes ownership of it and brings its schema up to date.
     ///
     /// # Errors
-    /// [`StoreError::NotADatabase`] when the file is something else, [`StoreError::InUse`] when another process owns
-    /// it, [`StoreError::NewerSchema`] when a newer version of the program wrote it, otherwise what the database
-    /// reports.
+    /// As [`Store::open_anchored`].
     pub async fn open(path: &Path) -> StoreResult<Self> {
-        file_kind::check(path)?;
-        let (owner, made) = take_ownership(path)?;
-        let opened = Self::open_owned(path, owner).await.map_err(|error| file_kind::named(path, error));
-        if made && opened.as_ref().is_err_and(StoreError::is_wrong_file) {
-            // Nothing is left beside a file that is not ours.
-            let _ = std::fs::remove_file(beside(path, ".lock"));
-        }
-        opened
+        Self::open_anchored(path, None).await
     }
 
-    async fn open_owned(path: &Path, owner: File) -> StoreResult<Self> {
-        refuse_unchanged(path).await?;
+    /// [`Store::open`] with a second anchor, best on another disk than the record and the anchor beside it.
+    ///
+    /// # Errors
+    /// [`StoreError::NotADatabase`] when the file is something else, [`StoreError::InUse`] when another process owns
+    /// it, [`StoreError::NewerSchema`] when a newer version of the program wrote it, [`StoreError::RecordMissing`],
+    /// [`StoreError::CutOff`] and [`StoreError::Rewritten`] when an anchor has seen more than there is,
+    /// [`StoreError::Unsealed`] when another program wrote a row, otherwise what the database reports.
+    pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
+        file_kind::check(path)?;
+        let anchors: Vec<PathBuf> =
+            [Some(anchor::beside_record(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
+        let mut owner = Ownership::take(path)?;
+        let checked = async {
+            refuse_unchanged(path).await?;
+            refuse_empty_in_place_of_record(path, &anchors)?;
+            owner.make_database(path)
+        };
+        if let Err(error) = checked.await {
+            let error = file_kind::named(path, error);
+            if error.is_wrong_file() {
+                owner.withdraw();
+            }
+            return Err(error);
+        }
+        Self::open_owned(path, anchors, owner).await.map_err(|error| file_kind::named(path, error))
+    }
+
+    async fn open_owned(path: &Path, anchors: Vec<PathBuf>, owner: Ownership) -> StoreResult<Self> {
         let options = SqliteConnectOptions::new()
             .filename(path)
             .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
             .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(10));
+            .busy_timeout(Duration::from_secs(10))
+            // Every table has statements of its own for its seals.
+            .statement_cache_capacity(400);
         let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
+        if migrations::check_version(&only, path).await? == 0 {
+            refuse_to_begin_anew(path, &anchors)?;
+        } else {
+            for anchor in &anchors {
+                anchor::check(&mut *only.acquire().await?, path, anchor).await?;
+            }
+        }
         migrations::apply(&only, path).await?;
         let mut connection = only.acquire().await?.detach();
         seals::watch(&mut connection).await?;
-        let writing = Arc::new(Writing::new(connection, space::Space::of(path)));
-        let readers = SqlitePoolOptions::new().max_connections(4).connect_with(options.read_only(true)).await?;
+        let files = Arc::new(Files::of(path)?);
+        let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
+        let writing = Arc::new(Writing::new(connection, space::Space::of(path), outside));
+        let readers = SqlitePoolOptions::new()
+            .max_connections(4)
+            .idle_timeout(None)
+            .max_lifetime(None)
+            // Never what lies there in place of the record.
+            .after_connect(move |_, _| {
+                let files = files.check().map_err(|error| sqlx::Error::Configuration(error.into()));
+                Box::pin(async move { files })
+            })
+            .connect_with(options.read_only(true))
+            .await?;
         let store = Self {
             readers,
             writing,
@@ -283,6 +328,29 @@ async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     }
 }
 
+/// An empty file is a record to be made, unless there was one.
+fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
+    let bytes = |file: &Path| std::fs::metadata(file).map_or(0, |file| file.len());
+    if bytes(path) > 0 {
+        return Ok(());
+    }
+    let log = beside(path, "-wal");
+    if bytes(&log) > 0 {
+        return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: log });
+    }
+    refuse_to_begin_anew(path, anchors)
+}
+
+/// A file without a schema is all that is left of a record whose log was lost.
+fn refuse_to_begin_anew(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
+    for anchor in anchors {
+        if anchor::has_seen_rows(anchor)? {
+            return Err(StoreError::RecordMissing { path: path.to_owned(), evidence: anchor.clone() });
+        }
+    }
+    Ok(())
+}
+
 /// The file next to the record whose name ends so.
 fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -301,32 +369,4 @@ fn free_name(of: &Path, what: &str) -> PathBuf {
         name = beside(&first, &format!("-{number}"));
     }
     name
-}
-
-/// SQLite finds its log by the name of the file, and so is our lock found: a file with two names has two of each.
-fn refuse_second_name(path: &Path) -> StoreResult<()> {
-    #[cfg(unix)]
-    if std::fs::metadata(path).is_ok_and(|file| std::os::unix::fs::MetadataExt::nlink(&file) > 1) {
-        return Err(StoreError::SeveralNames { path: path.to_owned() });
-    }
-    Ok(())
-}
-
-/// The locked file, and whether it was made for this.
-fn take_ownership(path: &Path) -> StoreResult<(File, bool)> {
-    refuse_second_name(path)?;
-    // One file has one lock, whatever link it is opened through.
-    let lock = beside(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
-    let made = !lock.exists();
-    let file = OpenOptions::new()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(lock)
-        .map_err(|source| StoreError::Open { path: path.to_owned(), source })?;
-    match file.try_lock() {
-        Ok(()) => Ok((file, made)),
-        Err(TryLockError::WouldBlock) => Err(StoreError::InUse { path: path.to_owned() }),
-        Err(TryLockError::Error(source)) => Err(StoreError::Open { path: path.to_owned(), source }),
-    }
 }

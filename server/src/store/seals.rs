@@ -1,10 +1,12 @@
-//! Seals: a hash of each row of the record, chained, so that a row that another hand touched is found.
+//! Seals: a hash of each row of the record, chained, so that a row that another hand touched is found. Rows that come and go
+//! with the work have a hash too, a checksum that changes with them, so that the chain does not grow with each lease.
 //!
 //! Triggers of the writing connection note which rows a change writes, and they are sealed before the change is
 //! made durable: no way in can forget it. The triggers are temporary, so what another program writes is not noted.
 
 use super::audit::ORIGIN;
-use super::{Connection, StoreResult, json};
+use super::{Connection, StoreError, StoreResult, json};
+use futures_util::TryStreamExt;
 use sha2::{Digest, Sha256};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
@@ -21,15 +23,17 @@ pub struct Sealed {
     pub table: &'static str,
     /// Its primary key.
     pub key: &'static [&'static str],
+    /// The columns of the key may hold any text, so they are joined in hexadecimal digits.
+    hex: bool,
 }
 
 const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
-    Sealed { table, key }
+    Sealed { table, key, hex: false }
 }
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 36] = [
+pub const TABLES: &[Sealed] = &[
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
@@ -68,44 +72,62 @@ pub const TABLES: [Sealed; 36] = [
     sealed("imports", &["seq"]),
 ];
 
-/// Tables whose rows come and go with the work, or only repeat what others say.
-pub const NOT_SEALED: [&str; 10] = [
-    "audit",
-    "clock",
-    "events",
-    "idempotency_keys",
-    "jobs",
-    "seals",
-    "sessions",
-    "sign_in_failures",
-    "sign_in_links",
-    "sign_in_sources",
+/// Every other table: its rows come and go with the work, or only repeat what others say. Each row has a checksum.
+pub const CHECKED: &[Sealed] = &[
+    sealed("events", &["seq"]),
+    sealed("jobs", &["id"]),
+    Sealed { table: "idempotency_keys", key: &["actor", "key"], hex: true },
+    sealed("sessions", &["hash"]),
+    sealed("sign_in_links", &["hash"]),
+    sealed("clock", &["id"]),
+    Sealed { table: "sign_in_failures", key: &["name", "source"], hex: true },
+    sealed("sign_in_sources", &["network"]),
+    sealed(MIGRATIONS, &["version"]),
 ];
+
+/// Tables that are chains of hashes themselves, and the one that holds the checksums.
+pub const NOT_SEALED: &[&str] = &["audit", "seals", "checksums"];
+
+/// The table of the migrations that were applied.
+const MIGRATIONS: &str = "_sqlx_migrations";
 
 impl Sealed {
     /// The key of a row as text, in SQL; `row` is `new.`, `old.`, or the table and a dot.
     fn key_of(&self, row: &str) -> String {
-        let columns: Vec<String> = self.key.iter().map(|column| format!("{row}{column}")).collect();
+        let column = |column| if self.hex { format!("hex({row}{column})") } else { format!("{row}{column}") };
+        let columns: Vec<String> = self.key.iter().map(column).collect();
         columns.join(&format!(" || '{JOINT}' || "))
     }
 
-    /// Notes the rows that `event` (`after insert`) touches.
-    fn trigger(&self, event: &str, row: &str) -> String {
-        let (table, key) = (self.table, self.key_of(row));
+    fn is_checked(&self) -> bool {
+        CHECKED.iter().any(|checked| checked.table == self.table)
+    }
+
+    /// Notes the rows that `event` (`after insert`) touches. A checksum goes with its row at once: much is pruned together.
+    fn trigger(&self, event: &str) -> String {
+        let (table, old, new) = (self.table, self.key_of("old."), self.key_of("new."));
+        let forget = format!("delete from checksums where evidence = '{table}' and key = {old};");
+        let note = |key: &str| format!("insert into unsealed (evidence, key) values ('{table}', {key});");
+        let act = match event {
+            "after delete" if self.is_checked() => forget,
+            "after update" if self.is_checked() => forget + &note(&new),
+            "after delete" => note(&old),
+            _ => note(&new),
+        };
         let name = format!("{table}_{}", event.replace(' ', "_"));
-        format!(
-            "create temp trigger {name} {event} on main.{table} begin \
-             insert into unsealed (evidence, key) values ('{table}', {key}); end"
-        )
+        format!("create temp trigger if not exists {name} {event} on main.{table} begin {act} end")
     }
 
     /// Hash of a row as it stands; empty when there is none.
     async fn hash_of(&self, db: &mut Connection, key: &str) -> StoreResult<String> {
         let columns: Vec<String> = self.key.iter().map(|column| format!("{column} = ?")).collect();
         let sql = format!("select * from {} where {}", self.table, columns.join(" and "));
-        let query = key
-            .splitn(self.key.len(), JOINT)
-            .fold(sqlx::query(AssertSqlSafe(sql)), |query, part| query.bind(part.to_owned()));
+        let part = |part: &str| {
+            let text = hex::decode(part).ok().and_then(|bytes| String::from_utf8(bytes).ok());
+            text.filter(|_| self.hex).unwrap_or_else(|| part.to_owned())
+        };
+        let parts = key.splitn(self.key.len(), JOINT).map(part);
+        let query = parts.fold(sqlx::query(AssertSqlSafe(sql)), |query, part| query.bind(part));
         query.fetch_optional(db).await?.map_or(Ok(String::new()), |row| hash_of_row(&row))
     }
 }
@@ -120,22 +142,48 @@ pub(super) fn newest_of(table: &str) -> Option<String> {
     ))
 }
 
-/// Makes a connection note what it writes. What was written before there were seals is noted at once.
+/// Makes a connection note what it writes into the tables that there are.
 pub(super) async fn watch(db: &mut Connection) -> StoreResult<()> {
     // The order of writing is the order of the seals.
-    let notes = "create temp table unsealed (place integer primary key, evidence text not null, key text not null)";
+    let notes = "create temp table if not exists unsealed \
+                 (place integer primary key, evidence text not null, key text not null)";
     sqlx::query(notes).execute(&mut *db).await?;
-    for sealed in TABLES {
-        for (event, row) in [("after insert", "new."), ("after update", "new."), ("after delete", "old.")] {
-            sqlx::query(AssertSqlSafe(sealed.trigger(event, row))).execute(&mut *db).await?;
+    for sealed in present(db).await? {
+        for event in ["after insert", "after update", "after delete"] {
+            sqlx::query(AssertSqlSafe(sealed.trigger(event))).execute(&mut *db).await?;
         }
-        let first = format!(
-            "insert into unsealed (evidence, key) select '{table}', {key} from {table} \
-             where not exists (select 1 from seals where evidence = '{table}')",
-            table = sealed.table,
-            key = sealed.key_of(&format!("{}.", sealed.table)),
-        );
-        sqlx::query(AssertSqlSafe(first)).execute(&mut *db).await?;
+    }
+    Ok(())
+}
+
+/// The tables of this program that there are and whose rows can be sealed.
+pub(super) async fn present(db: &mut Connection) -> StoreResult<Vec<Sealed>> {
+    let names: Vec<String> =
+        sqlx::query_scalar("select name from sqlite_master where type = 'table'").fetch_all(db).await?;
+    let is_there = |table: &str| names.iter().any(|name| name == table);
+    let all = TABLES.iter().filter(|_| is_there("seals")).chain(CHECKED.iter().filter(|_| is_there("checksums")));
+    Ok(all.filter(|sealed| is_there(sealed.table)).copied().collect())
+}
+
+/// Seals what the migrations wrote that were applied in the present transaction: the rows of every table that could not be
+/// sealed `before`. The only way in for rows that are there already.
+pub(super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> StoreResult<()> {
+    watch(db).await?;
+    let added = present(db).await?.into_iter().filter(|sealed| !before.iter().any(|known| known.table == sealed.table));
+    for sealed in added {
+        let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
+        let all = format!("insert into unsealed (evidence, key) select '{table}', {key} from {table}");
+        sqlx::query(AssertSqlSafe(all)).execute(&mut *db).await?;
+    }
+    seal(db).await
+}
+
+/// Refuses a record with a row that was not written by this program: one that has no seal and no checksum.
+pub(super) async fn refuse_unsealed(db: &mut Connection) -> StoreResult<()> {
+    for sealed in present(db).await? {
+        if let Some(key) = without_seal(db, sealed).await? {
+            return Err(StoreError::Unsealed { table: sealed.table.to_owned(), key });
+        }
     }
     Ok(())
 }
@@ -150,6 +198,14 @@ pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     let mut previous: String = first.try_get::<Option<String>, _>(2)?.unwrap_or_else(|| ORIGIN.to_owned());
     for row in &noted {
         let (table, key): (&str, &str) = (row.try_get(0)?, row.try_get(1)?);
+        if let Some(checked) = CHECKED.iter().find(|checked| checked.table == table) {
+            let sha256 = checked.hash_of(db, key).await?;
+            if !sha256.is_empty() {
+                let keep = sqlx::query("insert or replace into checksums (evidence, key, sha256) values (?, ?, ?)");
+                keep.bind(table).bind(key).bind(sha256).execute(&mut *db).await?;
+            }
+            continue;
+        }
         let Some(sealed) = TABLES.iter().find(|sealed| sealed.table == table) else { continue };
         let sha256 = sealed.hash_of(db, key).await?;
         let hash = chained(&previous, table, key, &sha256);
@@ -206,15 +262,33 @@ pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
     if !matches!(chain, Verdict::Whole { .. }) {
         return Ok(chain);
     }
-    for sealed in TABLES {
-        if let Some(key) = without_seal(db, sealed).await? {
-            return Ok(Verdict::Touched { table: sealed.table.to_owned(), key });
-        }
-        if let Some(key) = unlike_seal(db, sealed).await? {
+    let known = present(db).await?;
+    for sealed in &known {
+        let unlike = match without_seal(db, *sealed).await? {
+            None if sealed.is_checked() => unlike_checksum(db, *sealed).await?,
+            None => unlike_seal(db, *sealed).await?,
+            found => found,
+        };
+        if let Some(key) = unlike {
             return Ok(Verdict::Touched { table: sealed.table.to_owned(), key });
         }
     }
-    Ok(chain)
+    Ok(match of_no_table(db, &known).await? {
+        Some((table, key)) => Verdict::Touched { table, key },
+        None => chain,
+    })
+}
+
+/// A seal or checksum of a row in a table that there is not.
+async fn of_no_table(db: &mut Connection, known: &[Sealed]) -> StoreResult<Option<(String, String)>> {
+    let checksums =
+        if known.iter().any(Sealed::is_checked) { "union all select evidence, key from checksums" } else { "" };
+    let names: Vec<String> = known.iter().map(|sealed| format!("'{}'", sealed.table)).collect();
+    let sql = format!(
+        "select evidence, key from (select evidence, key from seals {checksums}) where evidence not in ({}) limit 1",
+        names.join(", ")
+    );
+    Ok(sqlx::query_as(AssertSqlSafe(sql)).fetch_optional(db).await?)
 }
 
 async fn walk(db: &mut Connection) -> StoreResult<Verdict> {
@@ -251,11 +325,34 @@ async fn walk(db: &mut Connection) -> StoreResult<Verdict> {
 /// The key of a row that nobody sealed.
 async fn without_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<String>> {
     let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
+    let seals = if sealed.is_checked() { "checksums" } else { "seals" };
     let sql = format!(
         "select cast({key} as text) as k from {table} \
-         where not exists (select 1 from seals where evidence = '{table}' and key = cast({key} as text)) limit 1"
+         where not exists (select 1 from {seals} where evidence = '{table}' and key = cast({key} as text)) limit 1"
     );
     Ok(sqlx::query_scalar(AssertSqlSafe(sql)).fetch_optional(db).await?)
+}
+
+/// The key of a row that differs from its checksum, or of a checksum without a row.
+async fn unlike_checksum(db: &mut Connection, checked: Sealed) -> StoreResult<Option<String>> {
+    let (table, key) = (checked.table, checked.key_of(&format!("{}.", checked.table)));
+    let gone = format!(
+        "select key from checksums where evidence = '{table}' except select cast({key} as text) from {table} limit 1"
+    );
+    if let Some(key) = sqlx::query_scalar(AssertSqlSafe(gone)).fetch_optional(&mut *db).await? {
+        return Ok(Some(key));
+    }
+    let sql = format!(
+        "select {table}.*, k.key as \"{JOINT}key\", k.sha256 as \"{JOINT}sha256\" from {table} \
+         join checksums k on k.evidence = '{table}' and k.key = cast({key} as text)"
+    );
+    let mut rows = sqlx::query(AssertSqlSafe(sql)).fetch(db);
+    while let Some(row) = rows.try_next().await? {
+        if hash_of_row(&row)? != row.try_get::<&str, _>(format!("{JOINT}sha256").as_str())? {
+            return Ok(Some(row.try_get(format!("{JOINT}key").as_str())?));
+        }
+    }
+    Ok(None)
 }
 
 /// The key of a row that differs from its newest seal.
@@ -291,7 +388,8 @@ fn chained(previous: &str, table: &str, key: &str, sha256: &str) -> String {
 
 /// Hash of a row: name, kind, length and bytes of each column that is not null, by name.
 fn hash_of_row(row: &SqliteRow) -> StoreResult<String> {
-    let mut columns: Vec<(&str, usize)> = row.columns().iter().map(|c| (c.name(), c.ordinal())).collect();
+    let mut columns: Vec<(&str, usize)> =
+        row.columns().iter().map(|c| (c.name(), c.ordinal())).filter(|(name, _)| !name.starts_with(JOINT)).collect();
     columns.sort_unstable();
     let mut hash = Sha256::new();
     for (name, place) in columns {

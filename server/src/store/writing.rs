@@ -4,6 +4,8 @@
 //! are ready while the disk is busy are therefore made durable together: each is a savepoint of its own within one
 //! transaction, and each is acknowledged only when that transaction is on the disk.
 
+use super::anchor::{self, Anchors};
+use super::files::Files;
 use super::space::Space;
 use super::{StoreError, StoreResult};
 use sqlx::{Connection as _, SqliteConnection};
@@ -21,7 +23,7 @@ type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// How the disk answered for a group of changes; `None`: not yet.
-type Outcome = Option<Result<(), String>>;
+type Outcome = Option<Result<(), Arc<StoreError>>>;
 
 /// The writing connection, and what makes its changes durable.
 #[derive(Debug)]
@@ -44,6 +46,23 @@ struct Shared {
     /// A change ended: what is there is to be made durable.
     ended: Notify,
     space: Space,
+    /// What is outside the database.
+    outside: Outside,
+}
+
+/// What is outside the database and has a say in its changes; none of it: nobody asks.
+#[derive(Debug, Default)]
+pub(super) struct Outside {
+    /// The files, which must be those that were opened.
+    pub(super) files: Option<Arc<Files>>,
+    /// What holds the newest hashes.
+    pub(super) anchors: Option<Anchors>,
+}
+
+impl Outside {
+    fn check(&self) -> StoreResult<()> {
+        self.files.as_ref().map_or(Ok(()), |files| files.check())
+    }
 }
 
 /// Changes only while the connection is held.
@@ -57,9 +76,9 @@ struct State {
 
 impl Writing {
     /// Over a connection that nobody else writes with.
-    pub(super) fn new(connection: SqliteConnection, space: Space) -> Self {
+    pub(super) fn new(connection: SqliteConnection, space: Space, outside: Outside) -> Self {
         let line = Line::new(Some(connection).into());
-        let shared = Arc::new(Shared { state: Mutex::default(), ended: Notify::new(), space });
+        let shared = Arc::new(Shared { state: Mutex::default(), ended: Notify::new(), space, outside });
         let flusher = tokio::spawn(supervise_flushing(Arc::clone(&line), Arc::clone(&shared)));
         Self { line, shared, flusher }
     }
@@ -81,6 +100,9 @@ impl Writing {
         let mut line = self.line.lock().await;
         if let Some(mut connection) = line.take() {
             self.shared.flush(&mut connection).await;
+            if let Some(anchors) = &self.shared.outside.anchors {
+                anchors.sync();
+            }
             if let Err(error) = connection.close().await {
                 tracing::warn!(%error, "closing the database");
             }
@@ -115,7 +137,7 @@ impl Writer {
         let group = ended.await.map_err(|_| StoreError::Closed)??;
         let mut group = group.ok_or(StoreError::Closed)?;
         let outcome = group.wait_for(Option::is_some).await.map_err(|_| StoreError::Closed)?.clone();
-        outcome.unwrap_or(Ok(())).map_err(StoreError::NotDurable)
+        outcome.unwrap_or(Ok(())).map_err(|error| error.for_all())
     }
 }
 
@@ -167,19 +189,46 @@ impl Shared {
         if self.state().group.is_none() {
             return;
         }
-        match run(connection, "commit").await {
+        match self.make_durable(connection).await {
             Ok(()) => self.tell(Ok(())),
             Err(error) => self.give_up(connection, &error).await,
         }
     }
 
+    async fn make_durable(&self, connection: &mut SqliteConnection) -> StoreResult<()> {
+        let anchored = match &self.outside.anchors {
+            Some(anchors) => Some((anchors, anchor::ends(connection).await?)),
+            None => None,
+        };
+        run(connection, "commit").await?;
+        // Nobody is told that a change is durable which went into a file that nobody will find again.
+        self.outside.check()?;
+        if let Some((anchors, ends)) = anchored {
+            anchors.write(&ends);
+        }
+        Ok(())
+    }
+
     async fn give_up(&self, connection: &mut SqliteConnection, error: &StoreError) {
         // Fails when the database did so already.
         let _ = run(connection, "rollback").await;
-        self.tell(Err(error.to_string()));
+        self.save(connection, error).await;
+        self.tell(Err(Arc::new(error.for_all())));
     }
 
-    fn tell(&self, outcome: Result<(), String>) {
+    /// A log that has no name any more is lost with the process. As long as the database file is there, what is in the log
+    /// can go where it belongs.
+    async fn save(&self, connection: &mut SqliteConnection, error: &StoreError) {
+        let vanished = matches!(error, StoreError::RecordVanished { .. });
+        if vanished && self.outside.files.as_ref().is_some_and(|files| files.log_is_to_be_saved()) {
+            match run(connection, "pragma wal_checkpoint(passive)").await {
+                Ok(()) => tracing::warn!("what was in the write-ahead log was written into the database file"),
+                Err(error) => tracing::error!(%error, "the write-ahead log cannot be written into the database file"),
+            }
+        }
+    }
+
+    fn tell(&self, outcome: Result<(), Arc<StoreError>>) {
         let mut state = self.state();
         state.begun = false;
         if let Some(group) = state.group.take() {
@@ -193,6 +242,10 @@ async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
     let mut connection = OwnedMutexGuard::try_map(held, Option::as_mut).map_err(|_| StoreError::Closed)?;
     shared.take_back(&mut connection).await;
     if shared.state().group.is_none() {
+        if let Err(error) = shared.outside.check() {
+            shared.save(&mut connection, &error).await;
+            return Err(error);
+        }
         run(&mut connection, "begin immediate").await?;
         shared.state().group = Some(watch::channel(None).0);
     }
@@ -247,7 +300,7 @@ mod tests {
     async fn table(file: &std::path::Path) -> Writing {
         let mut connection = open(file).await;
         run(&mut connection, "create table t (x integer primary key) strict").await.unwrap();
-        Writing::new(connection, Space::of(file))
+        Writing::new(connection, Space::of(file), Outside::default())
     }
 
     async fn insert(writer: &mut Writer, x: i64) -> Result<(), sqlx::Error> {

@@ -8,7 +8,7 @@ use crate::http::AppState;
 use crate::http::api::{Copy, Workers};
 use crate::http::may::May;
 use crate::store::totals::{self, Totals};
-use crate::store::{FORM, backup, commit, jobs, trials};
+use crate::store::{FORM, backup, jobs, trials};
 use askama::Template;
 use axum::extract::State;
 
@@ -54,10 +54,7 @@ pub(super) async fn get(may: May<Read>, State(app): State<AppState>) -> Page {
 
 /// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
 pub(super) async fn make_backup(may: May<Administer>, State(app): State<AppState>) -> Page {
-    let copy = Copy::make(&app).await?;
-    let mut writer = app.write().await?;
-    copy.record(&mut writer, &may.caller.actor).await?;
-    commit(writer).await?;
+    let copy = Copy::for_page(app.clone(), may.caller.actor.clone()).await?;
     show(&app, &may.caller, Some(copy)).await
 }
 

@@ -1,0 +1,62 @@
+//! Copies of the record that the service makes by itself.
+
+use crate::error::Error;
+use crate::store::audit::{self, Actor};
+use crate::store::{Store, backup, commit};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+use tokio_util::sync::CancellationToken;
+
+/// A copy that failed is tried again after so long.
+const RETRY: Duration = Duration::from_secs(600);
+
+/// Where copies go, how often, and how many are kept.
+#[derive(Debug, Clone)]
+pub(super) struct BackupPlan {
+    pub(super) folder: PathBuf,
+    pub(super) every: Duration,
+    pub(super) keep: usize,
+}
+
+impl BackupPlan {
+    /// Makes copies until the service stops. What fails is logged and tried again.
+    pub(super) async fn follow(self, store: Store, stopping: CancellationToken) {
+        loop {
+            let wait = match self.due_in(&store) {
+                Ok(Duration::ZERO) => match self.copy(&store).await {
+                    Ok(()) => continue,
+                    Err(error) => self.failed(&error),
+                },
+                Ok(wait) => wait,
+                Err(error) => self.failed(&Error::Internal(error.to_string())),
+            };
+            tokio::select! {
+                () = stopping.cancelled() => return,
+                () = tokio::time::sleep(wait) => {}
+            }
+        }
+    }
+
+    /// How long until the next copy: measured from the newest one, so that a restart neither adds nor skips one.
+    fn due_in(&self, store: &Store) -> std::io::Result<Duration> {
+        let copies = backup::scheduled(store.path(), &self.folder)?;
+        let age = |made: SystemTime| SystemTime::now().duration_since(made).unwrap_or_default();
+        Ok(copies.first().map_or(Duration::ZERO, |(_, made)| self.every.saturating_sub(age(*made))))
+    }
+
+    async fn copy(&self, store: &Store) -> Result<(), Error> {
+        let (file, bytes) = backup::into_folder(store, &self.folder, self.keep).await?;
+        let mut writer = store.write().await?;
+        let (object, detail) = (format!("file {}", file.display()), json!({ "bytes": bytes, "scheduled": true }));
+        audit::append(&mut writer, &Actor::program(), "record.backup", &object, &detail).await?;
+        commit(writer).await?;
+        tracing::info!(file = %file.display(), bytes, "the record was copied and the copy checked");
+        Ok(())
+    }
+
+    fn failed(&self, error: &Error) -> Duration {
+        tracing::error!(folder = %self.folder.display(), %error, "the record was not copied; the next try is in ten minutes");
+        RETRY
+    }
+}

@@ -1,0 +1,111 @@
+//! Whether the files of the record are still the ones that were opened. SQLite goes on writing into a file that was deleted
+//! or replaced: every change is acknowledged, and all of them are gone with the process.
+
+use super::{StoreError, StoreResult, beside};
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+/// Which file a name stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct FileId(u64, u64);
+
+impl FileId {
+    #[cfg(unix)]
+    pub(super) fn of(file: &Metadata) -> Self {
+        use std::os::unix::fs::MetadataExt;
+        Self(file.dev(), file.ino())
+    }
+
+    #[cfg(not(unix))]
+    pub(super) fn of(_: &Metadata) -> Self {
+        // An open file cannot be deleted or replaced there.
+        Self(0, 0)
+    }
+}
+
+/// A file and what was seen of it last.
+#[derive(Debug)]
+struct Seen {
+    what: &'static str,
+    path: PathBuf,
+    id: FileId,
+    /// SQLite itself makes neither the file nor its log shorter while the record is open. `None`: it may.
+    bytes: Option<u64>,
+}
+
+/// The files of an open record.
+#[derive(Debug)]
+pub(super) struct Files {
+    path: PathBuf,
+    seen: Mutex<Vec<Seen>>,
+    /// What was found once stays found: whatever lies there later is not what was written to.
+    gone: OnceLock<String>,
+    /// Saving what is only in the log was tried.
+    saved: OnceLock<()>,
+}
+
+impl Files {
+    /// The file of a record that a connection has open, and what SQLite keeps beside it.
+    pub(super) fn of(path: &Path) -> StoreResult<Self> {
+        let files =
+            [("the database file", ""), ("its write-ahead log (-wal)", "-wal"), ("its shared memory (-shm)", "-shm")];
+        let mut seen = Vec::new();
+        for (what, ending) in files {
+            let path = beside(path, ending);
+            let file = std::fs::metadata(&path).map_err(|source| StoreError::Open { path: path.clone(), source })?;
+            let bytes = (ending != "-shm").then_some(file.len());
+            seen.push(Seen { what, path, id: FileId::of(&file), bytes });
+        }
+        Ok(Self { path: path.to_owned(), seen: Mutex::new(seen), gone: OnceLock::new(), saved: OnceLock::new() })
+    }
+
+    /// Refuses when one of them is not the file that was opened, now or at any time before.
+    pub(super) fn check(&self) -> StoreResult<()> {
+        if let Some(what) = self.gone.get() {
+            return Err(self.vanished(what));
+        }
+        let found = self.seen.lock().unwrap_or_else(PoisonError::into_inner).iter_mut().find_map(Seen::look);
+        let Some(found) = found else { return Ok(()) };
+        let what = self.gone.get_or_init(|| found);
+        let refusal = self.vanished(what);
+        tracing::error!("{refusal}");
+        Err(refusal)
+    }
+
+    /// Whether the database file itself is there, so that what is only in a log without a name can be saved: once.
+    pub(super) fn log_is_to_be_saved(&self) -> bool {
+        if self.saved.set(()).is_err() {
+            return false;
+        }
+        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_there = |seen: &Seen| std::fs::metadata(&seen.path).is_ok_and(|file| FileId::of(&file) == seen.id);
+        let was_cut = |seen: &Seen| std::fs::metadata(&seen.path).is_ok_and(|file| seen.is_cut(&file));
+        seen.first().is_some_and(is_there) && !seen.iter().any(was_cut)
+    }
+
+    fn vanished(&self, what: &str) -> StoreError {
+        StoreError::RecordVanished { path: self.path.clone(), what: what.to_owned() }
+    }
+}
+
+impl Seen {
+    /// What became of the file; `None`: it is as it should be.
+    fn look(&mut self) -> Option<String> {
+        let what = self.what;
+        match std::fs::metadata(&self.path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Some(format!("{what} was deleted")),
+            Err(error) => Some(format!("{what} cannot be reached ({error})")),
+            Ok(file) if FileId::of(&file) != self.id => Some(format!("{what} was replaced")),
+            Ok(file) if self.is_cut(&file) => Some(format!("{what} was cut to {} bytes", file.len())),
+            Ok(file) => {
+                self.bytes = self.bytes.map(|_| file.len());
+                None
+            }
+        }
+    }
+
+    fn is_cut(&self, file: &Metadata) -> bool {
+        FileId::of(file) == self.id && self.bytes.is_some_and(|bytes| file.len() < bytes)
+    }
+}

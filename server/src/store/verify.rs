@@ -1,0 +1,110 @@
+//! The whole examination of a record: its file, its schema, its chains, every row of every table, and its anchors.
+
+use super::anchor::{self, Ends};
+use super::{Connection, StoreError, StoreResult, audit, backup, migrations, seals};
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// What is known of a whole record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Whole {
+    /// Rows of the audit trail, and the hash of the last one.
+    pub audit: (u64, String),
+    /// Seals, and the hash of the last one; `None`: an older version wrote the record, which had none.
+    pub seals: Option<(u64, String)>,
+    /// The anchors that there are, with what they have seen.
+    pub anchors: Vec<(PathBuf, Ends)>,
+}
+
+/// Examines a record that another process may own.
+///
+/// # Errors
+/// [`StoreError::Damaged`], [`StoreError::CutOff`] or [`StoreError::Rewritten`] with the first thing that is not as this
+/// program left it, or what the database reports.
+pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
+    let pool = backup::open_read_only(record).await?;
+    let found = examine(&pool, record, anchors).await;
+    pool.close().await;
+    found
+}
+
+async fn examine(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
+    let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
+    backup::check_open(pool).await?;
+    let version = migrations::check_version(pool, record).await?;
+    // One state for all that is compared.
+    let mut db = pool.begin().await?;
+    schema(&mut db, version).await?;
+    let audit = match audit::verify(&mut db).await? {
+        audit::Verdict::Whole { rows, last } => (rows, last),
+        audit::Verdict::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
+    };
+    let seals = match seals::verify(&mut db).await? {
+        seals::Verdict::Whole { seals, last } => Some((seals, last)),
+        seals::Verdict::None => None,
+        seals::Verdict::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
+        seals::Verdict::Touched { table, key } => {
+            return Err(damaged(format!("row {key} of {table} is not as this program wrote it")));
+        }
+    };
+    sequences(&mut db).await?;
+    let mut seen = Vec::new();
+    for anchor in std::iter::once(anchor::beside_record(record)).chain(anchors.iter().cloned()) {
+        match anchor::check(&mut db, record, &anchor).await? {
+            Some(ends) => seen.push((anchor, ends)),
+            None if anchors.contains(&anchor) => {
+                return Err(StoreError::Open { path: anchor, source: std::io::ErrorKind::NotFound.into() });
+            }
+            None => {}
+        }
+    }
+    Ok(Whole { audit, seals, anchors: seen })
+}
+
+/// Tables, indices, triggers and views are those that the migrations make: a trigger that is gone no longer protects.
+async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
+    let options = SqliteConnectOptions::new().filename(":memory:");
+    let mut fresh = SqliteConnection::connect_with(&options).await?;
+    migrations::up_to(version).run_direct(None, &mut fresh, false).await?;
+    let (expected, found) = (parts(&mut fresh).await?, parts(db).await?);
+    fresh.close().await?;
+    match expected.symmetric_difference(&found).next() {
+        None => Ok(()),
+        Some((kind, name, _)) => {
+            let reason = format!("{kind} {name} of the schema is not as this program made it");
+            Err(StoreError::Damaged { what: "evidence", reason })
+        }
+    }
+}
+
+/// Kind, name and text of each part of a schema; the list of migrations is made by a library.
+async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<(String, String, Option<String>)>> {
+    let sql = "select type, name, sql from sqlite_master where tbl_name not glob '_sqlx*'";
+    Ok(sqlx::query_as(sql).fetch_all(db).await?.into_iter().collect())
+}
+
+/// The database counts the rows that it ever gave a number to: no table has a later one, and a table of which nothing may be
+/// deleted has this one.
+async fn sequences(db: &mut Connection) -> StoreResult<()> {
+    for row in sqlx::query("select name, seq from sqlite_sequence").fetch_all(&mut *db).await? {
+        let (table, counted): (String, i64) = (row.try_get(0)?, row.try_get(1)?);
+        let is_known = seals::TABLES.iter().any(|sealed| sealed.table == table)
+            || seals::CHECKED.iter().any(|checked| checked.table == table)
+            || seals::NOT_SEALED.contains(&table.as_str());
+        let damaged =
+            || StoreError::Damaged { what: "evidence", reason: format!("the count of rows of {table} is wrong") };
+        if !is_known {
+            return Err(damaged());
+        }
+        let last = AssertSqlSafe(format!("select coalesce(max(seq), 0) from {table}"));
+        let last: i64 = sqlx::query_scalar(last).fetch_one(&mut *db).await?;
+        let keeps_all = "select 1 from sqlite_master where type = 'trigger' and name = ? || '_no_delete' and sql not glob '*when *'";
+        let keeps_all = sqlx::query(keeps_all).bind(&table).fetch_optional(&mut *db).await?.is_some();
+        if last > counted || (keeps_all && last < counted) {
+            return Err(damaged());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,151 @@
+//! Records that earlier versions wrote, each with a row in every table, opened by this one.
+//!
+//! `tests/records/v1.db.zst` was written by the baseline version, at the commit that added it, with
+//! `cargo run -p gaitwright-tests --example every_table -- tests/records/v1.db.zst`.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use gaitwright::store::{FORM, Store, backup, verify};
+use gaitwright_tests::cli;
+use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
+use sqlx::{AssertSqlSafe, Row};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+use tempfile::TempDir;
+
+const V1: &[u8] = include_bytes!("../records/v1.db.zst");
+
+fn unpacked() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    std::fs::write(&database, zstd::decode_all(V1).unwrap()).unwrap();
+    (folder, database)
+}
+
+async fn open(database: &Path) -> SqlitePool {
+    let options = SqliteConnectOptions::new().filename(database).read_only(true);
+    SqlitePool::connect_with(options).await.unwrap()
+}
+
+async fn versions(database: &Path) -> Vec<i64> {
+    let pool = open(database).await;
+    let found = sqlx::query_scalar("select version from _sqlx_migrations order by version").fetch_all(&pool).await;
+    pool.close().await;
+    found.unwrap()
+}
+
+/// The columns of each table.
+async fn layout(database: &Path) -> BTreeMap<String, Vec<String>> {
+    let pool = open(database).await;
+    let sql = "select m.name, c.name from sqlite_master m, pragma_table_info(m.name) c where m.type = 'table' order by 1, c.cid";
+    let mut layout = BTreeMap::<String, Vec<String>>::new();
+    for row in sqlx::query(sql).fetch_all(&pool).await.unwrap() {
+        layout.entry(row.get(0)).or_default().push(row.get(1));
+    }
+    pool.close().await;
+    layout
+}
+
+/// Every row of these columns as SQL literals.
+async fn rows(database: &Path, layout: &BTreeMap<String, Vec<String>>) -> BTreeMap<String, Vec<String>> {
+    let pool = open(database).await;
+    let mut all = BTreeMap::new();
+    for (table, columns) in layout {
+        let columns: Vec<String> = columns.iter().map(|column| format!("quote({column})")).collect();
+        let sql = format!("select {} as row from {table} order by row", columns.join(" || ',' || "));
+        let rows: Vec<String> = sqlx::query_scalar(AssertSqlSafe(sql)).fetch_all(&pool).await.unwrap();
+        all.insert(table.clone(), rows);
+    }
+    pool.close().await;
+    all
+}
+
+/// Everything that the old version wrote is there, and the record is whole.
+async fn assert_upgraded(database: &Path, old: &Path) {
+    let old_layout = layout(old).await;
+    let (before, after) = (rows(old, &old_layout).await, rows(database, &old_layout).await);
+    for (table, rows) in &before {
+        assert!(!rows.is_empty(), "{table} has rows");
+        let missing: Vec<_> = rows.iter().filter(|row| !after[table].contains(row)).collect();
+        // What the new version adds at start, and how far the database has counted.
+        assert!(missing.is_empty() || table == "sqlite_sequence", "{table}: {missing:?}");
+    }
+    assert_eq!(versions(database).await.last(), Some(&FORM));
+    verify::file(database, &[]).await.unwrap();
+}
+
+#[tokio::test]
+async fn every_row_of_a_baseline_record_survives_the_upgrade() {
+    let (folder, database) = unpacked();
+    let old = folder.path().join("old.db");
+    std::fs::copy(&database, &old).unwrap();
+    verify::file(&old, &[]).await.unwrap();
+    Store::open(&database).await.unwrap().close().await;
+    assert_upgraded(&database, &old).await;
+    let copy = folder.path().join("a.db.v1");
+    assert_eq!(versions(&copy).await, [1]);
+    backup::check(&copy).await.unwrap();
+    let layout = layout(&old).await;
+    assert_eq!(rows(&copy, &layout).await, rows(&old, &layout).await);
+
+    // The same record again: the copy that is there is the one.
+    let kept = std::fs::read(&copy).unwrap();
+    for name in ["a.db-wal", "a.db-shm", "a.db.anchor"] {
+        let _ = std::fs::remove_file(folder.path().join(name));
+    }
+    std::fs::copy(&old, &database).unwrap();
+    Store::open(&database).await.unwrap().close().await;
+    assert_eq!(std::fs::read(&copy).unwrap(), kept);
+    assert!(!cli::files(folder.path()).iter().any(|name| name.contains("v1-2") || name.contains("copying")));
+}
+
+#[tokio::test]
+async fn an_upgrade_that_is_killed_is_made_by_the_next_start() {
+    let old_folder = tempfile::tempdir().unwrap();
+    let old = old_folder.path().join("old.db");
+    std::fs::write(&old, zstd::decode_all(V1).unwrap()).unwrap();
+    let (mut in_time, mut late) = (0, 0);
+    for kill in 0..15 {
+        let (folder, database) = unpacked();
+        let mut process = Command::new(env!("CARGO_BIN_EXE_serve-analytic"))
+            .arg(&database)
+            .arg("127.0.0.1:0")
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(4 * kill));
+        process.kill().unwrap();
+        process.wait().unwrap();
+        if versions(&database).await == [1] {
+            in_time += 1
+        } else {
+            late += 1
+        }
+        Store::open(&database).await.unwrap().close().await;
+        assert_upgraded(&database, &old).await;
+        assert_eq!(versions(&folder.path().join("a.db.v1")).await, [1]);
+        assert!(
+            !cli::files(folder.path()).iter().any(|name| name.contains("copying")),
+            "{:?}",
+            cli::files(folder.path())
+        );
+    }
+    println!("killed before the upgrade was durable: {in_time}, after: {late}");
+    assert!(in_time > 0);
+}
+
+#[tokio::test]
+async fn a_row_forged_in_an_old_record_is_not_sealed_by_the_upgrade() {
+    let (_folder, database) = unpacked();
+    let pool = SqlitePool::connect_with(SqliteConnectOptions::new().filename(&database)).await.unwrap();
+    sqlx::query("insert into consents (subject_id, kind, note, actor, created_at) select id, 'given', 'x', 'x', '' from subjects limit 1")
+        .execute(&pool)
+        .await
+        .unwrap();
+    pool.close().await;
+    let refused = Store::open(&database).await.unwrap_err().to_string();
+    assert!(refused.contains("of consents"), "{refused}");
+    assert_eq!(versions(&database).await, [1], "the record is as it was");
+}
