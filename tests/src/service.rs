@@ -119,7 +119,7 @@ impl Service {
     }
 
     fn over(store: Store, engine: Arc<dyn Dispatch>, after_solves: Option<AfterSolves>) -> Self {
-        let director = Director::new(store.clone(), engine, None, after_solves);
+        let director = Director::new(&store, engine, None, after_solves);
         let work = tokio::spawn({
             let director = director.clone();
             async move { Box::pin(director.run()).await.unwrap() }

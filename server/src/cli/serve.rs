@@ -84,7 +84,7 @@ impl Serve {
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
             None => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
         };
-        let director = Director::new(store.clone(), engine, None, Some(AfterSolves::by_optimizer()));
+        let director = Director::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
         let access = Arc::new(access);
         // What commands exported while no service ran.

@@ -71,7 +71,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
 /// Runs a study until it ends or somebody stops it.
 pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lines) -> Result<Run, Error> {
     let engine = InProcess::new(workers, Arc::new(GaitSolver));
-    let director = Director::new(store.clone(), Arc::new(engine), Some(study.id), None);
+    let director = Director::new(store, Arc::new(engine), Some(study.id), None);
     let work = tokio::spawn({
         let director = director.clone();
         async move { Box::pin(director.run()).await }

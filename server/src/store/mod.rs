@@ -83,6 +83,9 @@ use writing::{Outside, Writing};
 
 /// Whether the record takes changes is tried at most so often.
 const PROBED_AGAIN: Duration = Duration::from_secs(1);
+/// When it was tried whether the record takes changes, and why not.
+type Probe = (std::time::Instant, Result<(), String>);
+
 /// A change that takes longer is as good as none.
 const SLOWEST_PROBE: Duration = Duration::from_secs(5);
 
@@ -118,7 +121,7 @@ pub struct Store {
     /// What is computed from what was read.
     pool: Pool,
     /// When it was last tried whether the record takes changes, and what was found.
-    probed: Arc<Mutex<Option<(std::time::Instant, Result<(), String>)>>>,
+    probed: Arc<Mutex<Option<Probe>>>,
     /// Held as long as any clone lives: a second process that opens the file for writing is refused.
     _owner: Arc<Ownership>,
 }

@@ -127,7 +127,7 @@ impl Sealed {
             text.filter(|_| self.hex).unwrap_or_else(|| part.to_owned())
         };
         let parts = key.splitn(self.key.len(), JOINT).map(part);
-        let query = parts.fold(sqlx::query(AssertSqlSafe(sql)), |query, part| query.bind(part));
+        let query = parts.fold(sqlx::query(AssertSqlSafe(sql)), sqlx::query::Query::bind);
         query.fetch_optional(db).await?.map_or(Ok(String::new()), |row| hash_of_row(&row))
     }
 }

@@ -84,7 +84,7 @@ impl Director {
     /// A director over a record; [`Self::run`] sets it to work. Without `after_solves`, a gait is examined when somebody asks,
     /// and nothing is explained.
     pub fn new(
-        store: Store,
+        store: &Store,
         engine: Arc<dyn Dispatch>,
         only: Option<StudyId>,
         after_solves: Option<AfterSolves>,

@@ -11,7 +11,7 @@ pub const IDEMPOTENCY_KEY_DAYS: i64 = 7;
 /// audit trail keeps who signed in.
 pub const SESSION_DAYS: i64 = 90;
 /// Between two rounds.
-const EVERY: Duration = Duration::from_secs(3600);
+const EVERY: Duration = Duration::from_hours(1);
 const DAY_S: i64 = 86_400;
 
 /// What a round dropped.

@@ -259,9 +259,10 @@ pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
         }
     };
     if let Some(first) = outcomes.first() {
-        rows(&cells!["reference", "", ""], &first.reference.angles_rad);
+        let labels = |name: &str| cells![name, "", ""];
+        rows(&labels("reference"), &first.reference.angles_rad);
         if let Some(deviation) = &first.reference.standard_deviation_rad {
-            rows(&cells!["reference standard deviation", "", ""], deviation);
+            rows(&labels("reference standard deviation"), deviation);
         }
     }
     for outcome in outcomes {
