@@ -29,7 +29,7 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
 
 /// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
 /// the rows that are there, or their seals are renewed by writing them.
-pub const TABLES: [Sealed; 36] = [
+pub const TABLES: [Sealed; 39] = [
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
     sealed("subject_muscles", &["seq"]),
@@ -48,11 +48,14 @@ pub const TABLES: [Sealed; 36] = [
     sealed("presentations", &["id"]),
     sealed("presentation_answers", &["presentation_id"]),
     sealed("presentation_retractions", &["presentation_id"]),
+    sealed("presentation_allocations", &["presentation_id"]),
     sealed("unblindings", &["seq"]),
     sealed("remarks", &["id"]),
     sealed("remark_retractions", &["remark_id"]),
     sealed("safety_reviews", &["id"]),
     sealed("lab_sessions", &["id"]),
+    sealed("lab_allocations", &["session_id"]),
+    sealed("lab_device_files", &["id"]),
     sealed("lab_acts", &["session_id", "act"]),
     sealed("lab_answers", &["session_id", "number"]),
     sealed("lab_answer_retractions", &["session_id", "number"]),
