@@ -58,6 +58,10 @@ pub async fn fill(database: &Path) {
         "insert into presentation_retractions select presentation_id, created_at from presentation_answers limit 1",
         "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, actor, created_at) \
          select 'L', study_id, 1, min(id), max(id), 1, 'K', '' from trials group by study_id",
+        "insert into lab_allocations (session_id, gait_one_first, nonce, created_at) \
+         values ('L', 1, lower(hex(randomblob(32))), '')",
+        "insert into lab_device_files (id, session_id, walk, to_device, actor, created_at) \
+         values ('D', 'L', 2, 0, 'K', '')",
         "insert into lab_acts (session_id, act, actor, created_at) values ('L', 'walk_1', 'K', '')",
         "insert into lab_answers (session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
         "insert into lab_answer_retractions (session_id, number, actor, created_at) values ('L', 1, 'K', '')",

@@ -16,6 +16,7 @@ pub mod examined;
 pub mod explained;
 pub mod large;
 pub mod measured;
+pub mod orders;
 pub mod service;
 pub mod skipped;
 pub mod well_formed;

@@ -26,7 +26,7 @@ async fn everybody(service: &Service) -> Vec<(As, Vec<Right>)> {
         let rights = Right::ALL.into_iter().filter(|right| role.rights().has(*right)).collect();
         callers.push((signed_in(service, role).await, rights));
     }
-    for right in [Right::Read, Right::Run, Right::Answer, Right::Rate] {
+    for right in [Right::Read, Right::Run, Right::Answer, Right::Rate, Right::Device] {
         callers.push((token(service, &[right]).await, vec![right]));
     }
     callers

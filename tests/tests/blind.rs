@@ -2,11 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::StatusCode;
+use axum::http::{Method, StatusCode};
+use gaitwright::access::{Right, Role};
+use gaitwright::store::members::MemberKind;
 use gaitwright::store::presentations::{self, Kind, Presentation};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::{self, As, member, rater_of, send, signed_in};
+use gaitwright_tests::orders::sides;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -77,7 +81,7 @@ async fn nothing_that_a_rater_gets_says_which_gait_it_is() {
     for word in ["trial", "rmse", "bound", "converged", "\"a1\"", "0.026", "stride_", ".csv", ".json", "seed"] {
         assert!(!words.contains(word), "{word}");
     }
-    // As long, as many figures, the same start.
+    // As long, as many figures, the same place at the start.
     let motion = |side: &str| {
         let path = format!("/api/v1/blind/{token}/{side}");
         let service = &service;
@@ -90,65 +94,127 @@ async fn nothing_that_a_rater_gets_says_which_gait_it_is() {
     service.stop().await;
 }
 
-#[tokio::test]
-async fn a_study_is_rated_to_its_end_and_controls_are_not_heard() {
-    let (_folder, service, study) = waiting(40).await;
+/// Takes and answers pairs of a study until it has ended.
+async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &str) {
     for _ in 0..4000 {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
         if present.state == StudyState::Finished {
-            break;
+            return;
         }
-        let pair = next(&service, study).await;
+        let next = format!("/api/v1/studies/{study}/blind/next");
+        let pair = send(service, who, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
         if pair.is_null() {
             // The answer that was just given is being taken in.
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }
-        assert_eq!(say(&service, &pair, "first").await, StatusCode::CREATED);
-        assert_eq!(say(&service, &pair, "second").await, StatusCode::CONFLICT, "one answer per pair");
+        let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+        let body = json!({"answer": answer}).to_string();
+        let said = send(service, who, &Method::POST, &path, "application/json", &body).await;
+        assert_eq!(said.status, StatusCode::CREATED, "{}", said.text);
+        let again = send(service, who, &Method::POST, &path, "application/json", &body).await;
+        assert_eq!(again.status, StatusCode::CONFLICT, "one answer per pair");
     }
-    service.wait_for(study, &[StudyState::Finished]).await;
-    let shown = shown(&service, study).await;
-    let count = |kind| shown.iter().filter(|p| p.kind == kind).count();
-    let heard = service.feedback(study).await.iter().filter(|row| row.source.as_str() == "clinician").count();
-    assert_eq!(heard, count(Kind::New), "of {} pairs", shown.len());
-    assert!(count(Kind::Repeat) + count(Kind::Null) > 0, "controls were shown");
+    panic!("the study does not end");
+}
 
-    let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.json();
-    assert_eq!(figures[0]["first_preferred"]["share"], 1.0, "this rater always says first");
-    assert_eq!(figures[0]["nulls_without_difference"]["count"], 0);
-    if count(Kind::Repeat) > 0 {
-        assert_eq!(figures[0]["repeats_agree"]["count"], 0, "always first disagrees with itself on swapped sides");
+#[tokio::test]
+async fn every_answer_of_a_rater_is_heard_also_of_a_pair_that_is_asked_again() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 40)).await;
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    rate_to_the_end(&service, &rater, study, "first").await;
+    let shown = shown(&service, study).await;
+    let feedback = service.feedback(study).await;
+    let heard: Vec<_> = feedback.iter().filter(|row| row.by_rater).collect();
+    assert_eq!(heard.len(), shown.len());
+    assert!(heard.iter().all(|row| !row.unblinded), "a rater who may not read answers blindly");
+    let repeats = shown.iter().filter(|p| p.kind == Kind::Repeat).count();
+    assert!(repeats > 0 && shown.iter().all(|p| p.kind != Kind::Null), "{repeats} repeats of {}", shown.len());
+
+    let figures = format!("/api/v1/studies/{study}/raters");
+    let before = send(&service, &admin, &Method::GET, &figures, "", "").await.json();
+    assert_eq!(before[0]["first_preferred"], Value::Null, "before unblinding it would tell the order of pairs");
+    assert_eq!(before[0]["repeats_agree"]["of"], json!(repeats));
+    let unblind = json!({"rater": "a rater", "reason": "the study has ended"}).to_string();
+    let path = format!("/api/v1/studies/{study}/unblind");
+    let told = send(&service, &admin, &Method::POST, &path, "application/json", &unblind).await;
+    assert_eq!(told.status, StatusCode::OK, "{}", told.text);
+    let after = send(&service, &admin, &Method::GET, &figures, "", "").await.json();
+    assert_eq!(after[0]["first_preferred"]["share"], 1.0, "this rater always says first");
+    for (pair, (first, second)) in told.json().as_array().unwrap().iter().zip(sides(&service.store, study).await) {
+        assert_eq!((&pair["shown_first"], &pair["shown_second"]), (&json!(first), &json!(second)));
+        assert_eq!(pair["answer"], "first");
     }
     service.stop().await;
 }
 
 #[tokio::test]
-async fn a_watch_does_not_tell_a_control_the_next_pair_is_waited_for_as_after_a_question() {
-    let folder = tempfile::tempdir().unwrap();
-    let slow = Analytic::slow(std::time::Duration::from_millis(60));
-    let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 40)).await;
-    let (mut controls, mut held) = (0, 0);
-    for _ in 0..4000 {
-        let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
-        if present.state == StudyState::Finished {
-            break;
-        }
-        let pair = next(&service, study).await;
-        if pair.is_null() {
-            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
-            continue;
-        }
-        assert_eq!(say(&service, &pair, "second").await, StatusCode::CREATED);
-        if shown(&service, study).await.last().unwrap().kind != Kind::New {
-            controls += 1;
-            held += u32::from(next(&service, study).await.is_null());
+async fn an_answer_is_heard_of_the_gait_that_was_shown_on_that_side() {
+    let (_folder, service) = callers::service().await;
+    let rater = signed_in(&service, Role::Rater).await;
+    let mut swapped = std::collections::BTreeSet::new();
+    for answer in ["first", "second"] {
+        let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 20)).await;
+        member(&service, study, MemberKind::User, "a rater").await;
+        rate_to_the_end(&service, &rater, study, answer).await;
+        let feedback = service.feedback(study).await;
+        let heard = feedback.iter().filter(|row| row.by_rater).map(|row| row.said);
+        for (said, (first, second)) in heard.zip(sides(&service.store, study).await) {
+            let (winner, loser) = if answer == "first" { (first, second) } else { (second, first) };
+            assert_eq!(said, gaitwright::store::feedback::Said::Preference { winner, loser });
+            swapped.insert(winner > loser);
         }
     }
-    service.wait_for(study, &[StudyState::Finished]).await;
-    // Solves that were prepared make some waits as short as a request.
-    assert!(held > 0 && 2 * held >= controls, "{held} of {controls}");
+    assert_eq!(swapped.len(), 2, "both orders were drawn");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 40)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let script = callers::token(&service, &[Right::Read, Right::Rate]).await;
+    let program = callers::token(&service, &[Right::Rate]).await;
+    member(&service, study, MemberKind::Token, "[Rate]").await;
+    let next = format!("/api/v1/studies/{study}/blind/next");
+    for (who, unblinded) in [(&clinician, true), (&script, true), (&program, false)] {
+        service.wait_for(study, &[StudyState::Waiting]).await;
+        let mut pair = Value::Null;
+        while pair.is_null() {
+            pair = send(&service, who, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
+        }
+        let token = pair["token"].as_str().unwrap();
+        let page = send(&service, who, &Method::GET, &format!("/rate/pair/{token}"), "", "").await.text;
+        assert_eq!(page.contains("recorded as not blind"), unblinded, "{page}");
+        let path = format!("/api/v1/blind/{token}/answer");
+        let said = send(&service, who, &Method::POST, &path, "application/json", "{\"answer\": \"second\"}").await;
+        assert_eq!(said.status, StatusCode::CREATED, "{}", said.text);
+        let heard = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
+        assert_eq!(heard.unblinded, unblinded, "{who:?}");
+    }
+    let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
+    let marked: Vec<_> = figures.json().as_array().unwrap().iter().map(|rater| rater["unblinded"].clone()).collect();
+    assert_eq!(marked, [json!(0), json!(1), json!(1)], "by name: {}", figures.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_rater_who_may_read_by_the_time_of_the_answer_is_recorded_as_not_blind() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    let json_of = "application/json";
+    let next = format!("/api/v1/studies/{study}/blind/next");
+    let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
+    let unblind = json!({"rater": "a rater", "reason": "adverse event"}).to_string();
+    send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/unblind"), json_of, &unblind).await;
+    let path = format!("/api/v1/blind/{}/answer", pair["token"].as_str().unwrap());
+    send(&service, &rater, &Method::POST, &path, json_of, "{\"answer\": \"first\"}").await;
+    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
     service.stop().await;
 }
 
@@ -169,12 +235,12 @@ async fn skipped_pairs_are_not_asked_again_and_unsafe_gaits_are_not_shown_again(
         }
         let last = shown(&service, study).await.pop().unwrap();
         if let Some(closed) = unsafe_trial {
-            assert!(last.shown_first != closed && last.shown_second != closed, "an unsafe gait was shown again");
+            assert!(last.one != closed && last.other != closed, "an unsafe gait was shown again");
         }
         let word = if turn == 0 {
             "cannot_tell"
         } else if unsafe_trial.is_none() && last.kind == Kind::New {
-            unsafe_trial = Some(last.shown_second);
+            unsafe_trial = sides(&service.store, study).await.last().map(|(_, second)| *second);
             "unsafe_second"
         } else {
             "no_difference"
@@ -185,9 +251,9 @@ async fn skipped_pairs_are_not_asked_again_and_unsafe_gaits_are_not_shown_again(
     service.wait_for(study, &[StudyState::Finished]).await;
     assert!(unsafe_trial.is_some());
     let shown = shown(&service, study).await;
-    let skipped = (shown[0].shown_first, shown[0].shown_second);
+    let skipped = shown[0].pair();
     let again = shown[1..].iter().filter(|p| {
-        let pair = (p.shown_first, p.shown_second);
+        let pair = p.pair();
         p.kind == Kind::New && (pair == skipped || pair == (skipped.1, skipped.0))
     });
     assert_eq!(again.count(), 0);
@@ -195,25 +261,32 @@ async fn skipped_pairs_are_not_asked_again_and_unsafe_gaits_are_not_shown_again(
 }
 
 #[tokio::test]
-async fn unblinding_needs_a_reason_is_an_act_and_marks_what_follows() {
-    let (_folder, service, study) = waiting(6).await;
-    let pair = next(&service, study).await;
-    assert_eq!(say(&service, &pair, "second").await, StatusCode::CREATED);
+async fn unblinding_needs_a_reason_is_in_the_audit_trail_and_marks_what_follows() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Admin).await);
+    let post = async |who: &As, path: &str, body: Value| {
+        send(&service, who, &Method::POST, path, "application/json", &body.to_string()).await
+    };
+    let next = format!("/api/v1/studies/{study}/blind/next");
+    let pair = post(&rater, &next, json!({})).await.json()["pair"].clone();
+    let token = pair["token"].as_str().unwrap();
+    post(&rater, &format!("/api/v1/blind/{token}/answer"), json!({"answer": "second"})).await;
     let path = format!("/api/v1/studies/{study}/unblind");
-    let rater = "not signed in";
-    let refused = service.post(&path, &json!({"rater": rater, "reason": " "})).await;
+    let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
-    let unknown = service.post(&path, &json!({"rater": "nobody", "reason": "r"})).await;
+    let unknown = post(&admin, &path, json!({"rater": "nobody", "reason": "r"})).await;
     assert_eq!(unknown.json()["field"], "rater");
-    let told = service.post(&path, &json!({"rater": rater, "reason": "adverse event"})).await;
+    let told = post(&admin, &path, json!({"rater": "a rater", "reason": "adverse event"})).await;
     assert_eq!(told.status, StatusCode::OK);
-    assert_eq!(told.json()[0]["shown_first"], json!(shown(&service, study).await[0].shown_first));
-    assert!(!told.text.contains(pair["token"].as_str().unwrap()));
+    assert_eq!(told.json()[0]["shown_first"], json!(sides(&service.store, study).await[0].0));
+    assert!(!told.text.contains(token));
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
     assert_eq!((rows[0].action.as_str(), &rows[0].detail["reason"]), ("study.unblind", &json!("adverse event")));
     loop {
         service.wait_for(study, &[StudyState::Waiting]).await;
-        if !next(&service, study).await.is_null() {
+        if !post(&rater, &next, json!({})).await.json()["pair"].is_null() {
             break;
         }
     }
@@ -230,7 +303,7 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
     let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
     assert_eq!(say(&service, &pair, "first").await, StatusCode::CREATED);
     let heard = |rows: &[gaitwright::store::feedback::FeedbackRow]| {
-        rows.iter().filter(|row| row.source.as_str() == "clinician" && row.retraction.is_none()).count()
+        rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
     };
     assert_eq!(heard(&service.feedback(study).await), 1);
     let back = service.post_text(&at(&pair, "/take-back"), FORM, "").await;

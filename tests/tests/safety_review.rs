@@ -161,6 +161,6 @@ async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
     let mut standing = objections(&service, study).await;
     standing.retain(|objection| objection["stands"] == json!(true));
-    assert_eq!(standing.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().0)]);
+    assert_eq!(standing.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
 }

@@ -76,6 +76,11 @@ impl Caller {
         self.reach
     }
 
+    /// Whether it is the device in the lab: a program that can fetch controller files and nothing else.
+    pub fn is_device(&self) -> bool {
+        self.user.is_none() && self.is_known() && self.rights.is_only(Right::Device)
+    }
+
     /// Whether the name is known: then it, and not what a form says, is the author of what is said.
     pub fn is_known(&self) -> bool {
         self.role.is_some() || self.actor != Actor::anonymous()

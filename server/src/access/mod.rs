@@ -17,4 +17,4 @@ pub mod tokens;
 pub use caller::Caller;
 pub use clock::Clock;
 pub use reach::{Principal, Reach};
-pub use right::{Administer, Answer, Anything, Permission, Rate, Read, Right, Rights, Role, Run};
+pub use right::{Administer, Answer, Anything, Device, Permission, Rate, Read, Right, Rights, Role, Run};

@@ -17,13 +17,16 @@ pub enum Right {
     Answer,
     /// Compare gaits blindly.
     Rate,
+    /// Fetch the controller files of lab walks: for the device in the lab. Somebody who may read and fetches one is
+    /// recorded as knowing which gait the walk is with.
+    Device,
     /// Users, tokens, unblinding, the audit trail, backups.
     Administer,
 }
 
 impl Right {
     /// Every right.
-    pub const ALL: [Self; 5] = [Self::Read, Self::Run, Self::Answer, Self::Rate, Self::Administer];
+    pub const ALL: [Self; 6] = [Self::Read, Self::Run, Self::Answer, Self::Rate, Self::Device, Self::Administer];
 
     /// As stored and shown.
     pub fn as_str(self) -> &'static str {
@@ -32,6 +35,7 @@ impl Right {
             Self::Run => "run",
             Self::Answer => "answer",
             Self::Rate => "rate",
+            Self::Device => "device",
             Self::Administer => "administer",
         }
     }
@@ -50,6 +54,11 @@ impl Rights {
     /// These rights.
     pub fn of(rights: &[Right]) -> Self {
         Self(rights.to_vec())
+    }
+
+    /// Whether it is the only one of them.
+    pub fn is_only(&self, right: Right) -> bool {
+        self.0 == [right]
     }
 
     /// Whether it is one of them.
@@ -87,7 +96,7 @@ impl Role {
     pub fn rights(self) -> Rights {
         match self {
             Self::Admin => Rights::all(),
-            Self::Clinician => Rights::of(&[Right::Read, Right::Run, Right::Answer, Right::Rate]),
+            Self::Clinician => Rights::of(&[Right::Read, Right::Run, Right::Answer, Right::Rate, Right::Device]),
             Self::Rater => Rights::of(&[Right::Rate]),
         }
     }
@@ -133,4 +142,5 @@ permission!(Read);
 permission!(Run);
 permission!(Answer);
 permission!(Rate);
+permission!(Device);
 permission!(Administer);

@@ -22,7 +22,7 @@ pub struct NewToken {
     /// What it is for: 1 to 80 characters.
     #[schema(min_length = 1, max_length = 80)]
     pub name: String,
-    /// What it allows: at least one of `read`, `run`, `answer`, `rate`.
+    /// What it allows: at least one of `read`, `run`, `answer`, `rate`, `device`.
     #[schema(min_items = 1)]
     pub scopes: Vec<Right>,
     /// It ends by itself after so many days; never, if absent.
@@ -38,7 +38,7 @@ pub struct NewToken {
 pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<(Token, String), Error> {
     let name = printable::name("name", &new.name, 80)?;
     if new.scopes.is_empty() || new.scopes.contains(&Right::Administer) {
-        let allowed = "some of read, run, answer, rate: people administer, programs do not";
+        let allowed = "some of read, run, answer, rate, device: people administer, programs do not";
         return Err(Error::invalid("scopes", json!(new.scopes), allowed));
     }
     if new.days.is_some_and(|days| !(1..=LONGEST_DAYS).contains(&days)) {

@@ -2,7 +2,7 @@
 
 use super::row::{Cell, Row};
 use super::seals;
-use super::{Connection, StoreError, StoreResult, StudyId, consents, studies};
+use super::{Connection, StoreError, StoreResult, StudyId, archived_allocations, consents, studies};
 use futures_util::TryStreamExt;
 use sqlx::{AssertSqlSafe, Row as _};
 use std::collections::HashMap;
@@ -10,7 +10,7 @@ use tokio::sync::mpsc::Sender;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study. Certificates and
 /// explanations are made anew where the study is imported: nobody has to believe them.
-const TABLES: [(&str, &str); 25] = [
+const TABLES: [(&str, &str); 28] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
@@ -25,11 +25,14 @@ const TABLES: [(&str, &str); 25] = [
     ("presentations", "study_id = ? order by id"),
     ("presentation_answers", "presentation_id in (select id from presentations where study_id = ?)"),
     ("presentation_retractions", "presentation_id in (select id from presentations where study_id = ?)"),
+    ("presentation_allocations", archived_allocations::PAIRS),
     ("unblindings", "study_id = ? order by seq"),
     ("remarks", "study_id = ? order by id"),
     ("remark_retractions", "remark_id in (select id from remarks where study_id = ?)"),
     ("safety_reviews", "trial_id in (select id from trials where study_id = ?) order by id"),
     ("lab_sessions", "study_id = ? order by number"),
+    ("lab_allocations", archived_allocations::LAB),
+    ("lab_device_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
     ("lab_acts", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
     ("lab_answer_retractions", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),

@@ -143,6 +143,9 @@ pub enum StoreError {
         /// Why.
         reason: String,
     },
+    /// The system has no random numbers.
+    #[error("no random numbers: {0}")]
+    NoRandomNumbers(String),
     /// The subject withdrew consent.
     #[error("the subject withdrew consent: the record is kept, but nothing is added to it, shown or given out")]
     Withdrawn,

@@ -100,8 +100,10 @@ pub struct FeedbackRow {
     pub author: String,
     /// Free text.
     pub note: String,
-    /// Whether a rater said so, in a blind comparison.
+    /// Whether a rater said so, in a comparison that shows no labels.
     pub by_rater: bool,
+    /// Whether that rater could have known which gait is which: then it is no blind answer.
+    pub unblinded: bool,
     /// When it was written.
     pub created_at: Instant,
     /// Set when it was taken back.
@@ -196,8 +198,11 @@ pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reaso
 /// A row with what became of it, and whether a rater said so.
 const SELECT: &str = "select f.*, r.author as retracted_by, r.reason as retracted_because, \
                       r.created_at as retracted_at, \
-                      exists (select 1 from presentation_answers p where p.feedback_id = f.id) as by_rater \
-                      from feedback f left join retractions r on r.feedback_seq = f.seq ";
+                      p.presentation_id is not null as by_rater, \
+                      coalesce(p.could_have_known, 0) = 1 or coalesce(q.unblinded, 0) = 1 as unblinded \
+                      from feedback f left join retractions r on r.feedback_seq = f.seq \
+                      left join presentation_answers p on p.feedback_id = f.id \
+                      left join presentations q on q.id = p.presentation_id ";
 
 fn select(rest: &str) -> AssertSqlSafe<String> {
     AssertSqlSafe(format!("{SELECT} {rest}"))
@@ -384,6 +389,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         author: row.try_get("author")?,
         note: row.try_get("note")?,
         by_rater: row.try_get("by_rater")?,
+        unblinded: row.try_get("unblinded")?,
         created_at: row.try_get("created_at")?,
         retraction: Retraction::from_row(row)?,
     })

@@ -82,4 +82,5 @@ identifier!(RemarkId, "remark");
 identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
 identifier!(LabRecordingId, "recording of a lab session");
+identifier!(LabDeviceFileId, "controller file of a lab session");
 identifier!(EmgResultId, "result of electromyograms");

@@ -1,5 +1,7 @@
-//! Lab sessions: who walks with which two gaits in which order, and what happened to them.
+//! Lab sessions: who walks with which two gaits, and what happened to them. The order of the gaits is an allocation
+//! (`super::allocations`).
 
+use super::allocations::{self, OfSession};
 use super::audit::Actor;
 use super::lab_answers::{self, LabAnswer};
 use super::members::{binds, reached};
@@ -70,8 +72,8 @@ pub struct LabSession {
     pub gait_one: TrialId,
     /// The other one.
     pub gait_two: TrialId,
-    /// Whether walk 2 is with gait one.
-    pub gait_one_first: bool,
+    /// What may be known of the order of its gaits.
+    pub allocation: OfSession,
     /// Free text.
     pub notes: String,
     /// Who planned it.
@@ -95,9 +97,10 @@ impl LabSession {
         self.answers.last().filter(|answer| !answer.taken_back)
     }
 
-    /// The gaits of walks 2 and 3.
-    pub fn walked(&self) -> (TrialId, TrialId) {
-        if self.gait_one_first { (self.gait_one, self.gait_two) } else { (self.gait_two, self.gait_one) }
+    /// The gaits of walks 2 and 3; none before the session is unblinded.
+    pub fn walked(&self) -> Option<(TrialId, TrialId)> {
+        let one_first = self.allocation.gait_one_first?;
+        Some(if one_first { (self.gait_one, self.gait_two) } else { (self.gait_two, self.gait_one) })
     }
 }
 
@@ -112,8 +115,6 @@ pub struct NewLabSession<'a> {
     pub gait_one: TrialId,
     /// The other one.
     pub gait_two: TrialId,
-    /// Whether walk 2 is with gait one.
-    pub gait_one_first: bool,
     /// Free text.
     pub notes: &'a str,
 }
@@ -126,14 +127,13 @@ pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>)
     let id = LabSessionId::fresh();
     sqlx::query(
         "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, notes, actor, created_at) \
-         values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         values (?, ?, ?, ?, ?, 0, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.study_id)
     .bind(new.number)
     .bind(new.gait_one)
     .bind(new.gait_two)
-    .bind(new.gait_one_first)
     .bind(new.notes)
     .bind(actor.as_str())
     .bind(now())
@@ -225,7 +225,7 @@ async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> 
         number: row.try_get("number")?,
         gait_one: row.try_get("gait_one")?,
         gait_two: row.try_get("gait_two")?,
-        gait_one_first: row.try_get("gait_one_first")?,
+        allocation: allocations::session(&mut *db, id).await?,
         notes: row.try_get("notes")?,
         actor: row.try_get("actor")?,
         created_at: row.try_get("created_at")?,

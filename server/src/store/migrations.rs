@@ -13,6 +13,7 @@ const FILES: &[(i64, &str, &str)] = &[
     (3, "imports", include_str!("../../../migrations/0003_imports.sql")),
     (4, "sessions", include_str!("../../../migrations/0004_sessions.sql")),
     (5, "access_log", include_str!("../../../migrations/0005_access_log.sql")),
+    (6, "allocations", include_str!("../../../migrations/0006_allocations.sql")),
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
 ];
 

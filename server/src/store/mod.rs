@@ -6,8 +6,10 @@
 
 pub mod access_log;
 pub mod access_spool;
+pub mod allocations;
 pub mod anchor;
 pub mod archive;
+pub mod archived_allocations;
 pub mod audit;
 pub mod backup;
 pub mod certificates;
@@ -60,8 +62,8 @@ mod writing;
 
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use id::{
-    DeviceId, EmgResultId, FeedbackId, JobId, LabRecordingId, LabSessionId, MemberId, PresentationId, ReferenceGaitId,
-    RemarkId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
+    DeviceId, EmgResultId, FeedbackId, JobId, LabDeviceFileId, LabRecordingId, LabSessionId, MemberId, PresentationId,
+    ReferenceGaitId, RemarkId, SafetyReviewId, SessionId, StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use migrations::FORM;

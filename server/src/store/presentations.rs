@@ -1,4 +1,7 @@
-//! Presentations: which two gaits a rater was shown, and what the rater said.
+//! Presentations: which two gaits a rater was shown, and what the rater said of them.
+//!
+//! Which of the two was on which side is an allocation (`super::allocations`): rows and answers here are about the pair, the
+//! newer gait first.
 
 use super::{
     Connection, FeedbackId, Instant, PresentationId, StoreError, StoreResult, StudyId, TrialId, feedback, now,
@@ -15,9 +18,9 @@ use utoipa::ToSchema;
 pub enum Kind {
     /// The study asks for it.
     New,
-    /// An earlier pair, sides swapped: does the rater agree with itself?
+    /// An earlier pair again: does the rater agree with itself?
     Repeat,
-    /// The same gait twice: how often does the rater see a difference where none is?
+    /// The same gait twice. Only earlier versions showed these; the learner heard nothing of them.
     Null,
 }
 
@@ -88,6 +91,18 @@ impl Said {
         }
     }
 
+    /// The same of a pair with its two gaits exchanged.
+    #[must_use]
+    pub fn swapped(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+            Self::UnsafeFirst => Self::UnsafeSecond,
+            Self::UnsafeSecond => Self::UnsafeFirst,
+            Self::NoDifference | Self::CannotTell | Self::UnsafeBoth | Self::Withdrawn => self,
+        }
+    }
+
     /// Whether it says that a gait must not be walked.
     pub fn is_about_safety(self) -> bool {
         matches!(self, Self::UnsafeFirst | Self::UnsafeSecond | Self::UnsafeBoth)
@@ -133,13 +148,12 @@ impl FromStr for Said {
     }
 }
 
-/// A presentation of the record. What of it a rater may see is decided in `studies::blind`.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+/// A presentation of the record, without its sides.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Presentation {
     /// Identifier.
     pub id: PresentationId,
     /// What the rater knows it by.
-    #[serde(skip)]
     pub token: String,
     /// The study.
     pub study_id: StudyId,
@@ -149,26 +163,31 @@ pub struct Presentation {
     pub number: u32,
     /// Why it was shown.
     pub kind: Kind,
-    /// The trial shown first.
-    pub shown_first: TrialId,
-    /// The trial shown second.
-    pub shown_second: TrialId,
+    /// One of the two gaits: the newer one, whichever side it was on.
+    pub one: TrialId,
+    /// The other one.
+    pub other: TrialId,
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// Whether the rater had been told which is which before.
+    /// Whether the rater could have known which gait is which, when it was drawn or when it was answered.
     pub unblinded: bool,
     /// When it was drawn.
     pub created_at: Instant,
-    /// What the rater said; none: nothing yet.
+    /// What the rater said of the pair: `First` is `one`. None: nothing yet.
     pub answer: Option<Said>,
     /// When.
     pub answered_at: Option<Instant>,
 }
 
 impl Presentation {
-    /// The gaits, in the order in which they were shown.
+    /// The two gaits; in which order they were shown is not said.
     pub fn pair(&self) -> (TrialId, TrialId) {
-        (self.shown_first, self.shown_second)
+        (self.one, self.other)
+    }
+
+    /// Whether one of its gaits is among these.
+    pub fn has_one_of(&self, trials: &[TrialId]) -> bool {
+        trials.contains(&self.one) || trials.contains(&self.other)
     }
 }
 
@@ -185,13 +204,11 @@ pub struct NewPresentation {
     pub number: u32,
     /// Why it is shown.
     pub kind: Kind,
-    /// The trial shown first.
-    pub shown_first: TrialId,
-    /// The trial shown second.
-    pub shown_second: TrialId,
+    /// The two gaits, the newer one first.
+    pub pair: (TrialId, TrialId),
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// Whether the rater has been told which is which.
+    /// Whether the rater could know which is which.
     pub unblinded: bool,
 }
 
@@ -211,8 +228,8 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
     .bind(&new.rater)
     .bind(new.number)
     .bind(new.kind.as_str())
-    .bind(new.shown_first)
-    .bind(new.shown_second)
+    .bind(new.pair.0)
+    .bind(new.pair.1)
     .bind(new.repeats)
     .bind(new.unblinded)
     .bind(now())
@@ -224,7 +241,7 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
 /// An answer to write.
 #[derive(Debug, Clone, Copy)]
 pub struct NewAnswer<'a> {
-    /// What the rater says.
+    /// What the rater says of the pair.
     pub said: Said,
     /// How long it took by the rater's clock, ms.
     pub response_ms: Option<i64>,
@@ -232,6 +249,8 @@ pub struct NewAnswer<'a> {
     pub note: &'a str,
     /// What the learner hears of it.
     pub feedback: Option<FeedbackId>,
+    /// Whether the rater could have known which gait is which.
+    pub could_have_known: bool,
 }
 
 /// Writes the answer of a presentation. `false`: it has one already.
@@ -240,14 +259,15 @@ pub struct NewAnswer<'a> {
 /// What the database reports.
 pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into presentation_answers (presentation_id, answer, response_ms, note, feedback_id, created_at) \
-         values (?, ?, ?, ?, ?, ?) on conflict (presentation_id) do nothing",
+        "insert into presentation_answers (presentation_id, answer, response_ms, note, feedback_id, could_have_known, \
+         created_at) values (?, ?, ?, ?, ?, ?, ?) on conflict (presentation_id) do nothing",
     )
     .bind(id)
     .bind(new.said.as_str())
     .bind(new.response_ms)
     .bind(new.note)
     .bind(new.feedback)
+    .bind(new.could_have_known)
     .bind(now())
     .execute(db)
     .await?;
@@ -283,21 +303,11 @@ pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Op
 }
 
 /// An answer that was taken back reads as withdrawn: asked, and not counted.
-const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.answer, 'withdrawn') as answer, \
-                      a.created_at as answered_at from presentations p \
+pub(super) const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.answer, 'withdrawn') as answer, \
+                      a.created_at as answered_at, \
+                      p.unblinded = 1 or coalesce(a.could_have_known, 0) = 1 as could_have_known from presentations p \
                       left join presentation_answers a on a.presentation_id = p.id \
                       left join presentation_retractions r on r.presentation_id = p.id ";
-
-/// The presentation with this token.
-///
-/// # Errors
-/// [`StoreError::Missing`], or what the database reports.
-pub async fn by_token(db: &mut Connection, token: &str) -> StoreResult<Presentation> {
-    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where p.token = ?"));
-    let row = sqlx::query(sql).bind(token).fetch_optional(db).await?;
-    let missing = || StoreError::Missing { what: "comparison", id: "with this token".to_owned() };
-    row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
-}
 
 /// Every presentation of a study, in the order in which they were drawn.
 ///
@@ -306,10 +316,10 @@ pub async fn by_token(db: &mut Connection, token: &str) -> StoreResult<Presentat
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where p.study_id = ? order by p.id"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
-    rows.iter().map(from_row).collect()
+    rows.iter().map(Presentation::from_row).collect()
 }
 
-/// Notes that a rater was told which gait is which.
+/// Notes that a rater was unblinded.
 ///
 /// # Errors
 /// What the database reports.
@@ -325,7 +335,7 @@ pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &s
     Ok(())
 }
 
-/// Whether a rater was told which gait is which in a study.
+/// Whether a rater was unblinded in a study.
 ///
 /// # Errors
 /// What the database reports.
@@ -338,20 +348,22 @@ pub async fn is_unblinded(db: &mut Connection, study: StudyId, rater: &str) -> S
     Ok(row.is_some())
 }
 
-fn from_row(row: &SqliteRow) -> StoreResult<Presentation> {
-    Ok(Presentation {
-        id: row.try_get("id")?,
-        token: row.try_get("token")?,
-        study_id: row.try_get("study_id")?,
-        rater: row.try_get("rater")?,
-        number: row.try_get("number")?,
-        kind: row.try_get::<&str, _>("kind")?.parse()?,
-        shown_first: row.try_get("shown_first")?,
-        shown_second: row.try_get("shown_second")?,
-        repeats: row.try_get("repeats")?,
-        unblinded: row.try_get("unblinded")?,
-        created_at: row.try_get("created_at")?,
-        answer: row.try_get::<Option<&str>, _>("answer")?.map(str::parse).transpose()?,
-        answered_at: row.try_get("answered_at")?,
-    })
+impl Presentation {
+    pub(super) fn from_row(row: &SqliteRow) -> StoreResult<Self> {
+        Ok(Self {
+            id: row.try_get("id")?,
+            token: row.try_get("token")?,
+            study_id: row.try_get("study_id")?,
+            rater: row.try_get("rater")?,
+            number: row.try_get("number")?,
+            kind: row.try_get::<&str, _>("kind")?.parse()?,
+            one: row.try_get("shown_first")?,
+            other: row.try_get("shown_second")?,
+            repeats: row.try_get("repeats")?,
+            unblinded: row.try_get("could_have_known")?,
+            created_at: row.try_get("created_at")?,
+            answer: row.try_get::<Option<&str>, _>("answer")?.map(str::parse).transpose()?,
+            answered_at: row.try_get("answered_at")?,
+        })
+    }
 }

@@ -6,7 +6,6 @@
 
 pub mod answer;
 pub mod archive;
-mod balance;
 pub mod belief;
 pub mod blind;
 pub mod catalogue;

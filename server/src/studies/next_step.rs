@@ -88,6 +88,7 @@ pub(super) fn likely_next(pool: &OnPool, standing: &Standing) -> Result<Vec<NewT
             author: String::new(),
             note: String::new(),
             by_rater: false,
+            unblinded: false,
             created_at: now(),
             retraction: None,
         });

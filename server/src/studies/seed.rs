@@ -1,4 +1,5 @@
-//! Random draws: every one derives from (study seed, purpose, counter), never from time or order of arrival.
+//! Random draws of the learner: every one derives from (study seed, purpose, counter), never from time or order of arrival.
+//! What blinds people is drawn by the operating system instead (`store::allocations`).
 
 use sha2::{Digest, Sha256};
 
@@ -7,10 +8,6 @@ use sha2::{Digest, Sha256};
 pub enum Purpose {
     /// Proposing the trial with this number.
     Proposal,
-    /// Order and sides of the presentation with this number.
-    Presentation,
-    /// Order of the gaits in the lab sessions of this block of four.
-    LabSession,
     /// Draws behind what is shown of the learner's belief.
     Belief,
 }
@@ -19,8 +16,6 @@ pub enum Purpose {
 pub fn derive(study_seed: u64, purpose: Purpose, counter: u64) -> u64 {
     let name = match purpose {
         Purpose::Proposal => "proposal",
-        Purpose::Presentation => "presentation",
-        Purpose::LabSession => "lab session",
         Purpose::Belief => "belief",
     };
     let mut hash = Sha256::new();
@@ -42,7 +37,7 @@ mod tests {
         let seeds = [
             derive(1, Purpose::Proposal, 1),
             derive(2, Purpose::Proposal, 1),
-            derive(1, Purpose::Presentation, 1),
+            derive(1, Purpose::Belief, 1),
             derive(1, Purpose::Proposal, 2),
         ];
         for (i, a) in seeds.iter().enumerate() {

@@ -68,7 +68,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     page.wait_until("document.querySelector('.notice.good')?.textContent.includes('walk 3 was better') ?? false").await;
     page.reload().await;
     assert!(page.text(".notice.good").await.contains("walk 3 was better"));
-    assert!(heard(&site, study).await.is_empty(), "the order was not told yet");
+    assert!(heard(&site, study).await.is_empty(), "the session is still blind");
     page.is_clean(&site.origin).await;
 
     let page = browser.open(&site.at(&format!("/lab-sessions/{session}"))).await;
@@ -76,7 +76,7 @@ async fn browser_in_the_lab_records_walks_and_asks_which_was_better() {
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
     page.fill("#reason", "every walk was recorded").await;
     page.click("form[action$='/unblind'] button").await;
-    page.wait_until("document.querySelector('main').innerText.includes('The order was told')").await;
+    page.wait_until("document.querySelector('main').innerText.includes('Unblinded by')").await;
     assert_eq!(heard(&site, study).await.len(), 1);
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     assert!(page.text(".answers").await.contains("the subject, "));

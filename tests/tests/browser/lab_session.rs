@@ -64,7 +64,7 @@ async fn browser_clicks_through_a_lab_session_from_the_plan_to_the_order() {
     }
     let main = page.text("main").await;
     assert!(
-        main.contains("softer at the heel") && main.contains("The study hears it when the order is told"),
+        main.contains("softer at the heel") && main.contains("The study hears it when the session is unblinded"),
         "{main}"
     );
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
@@ -76,13 +76,13 @@ async fn browser_clicks_through_a_lab_session_from_the_plan_to_the_order() {
     page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
     page.fill("#reason", "every walk was recorded").await;
     page.click("form[action$='/unblind'] button").await;
-    page.wait_until("document.querySelector('main').innerText.includes('The order was told')").await;
+    page.wait_until("document.querySelector('main').innerText.includes('Unblinded by')").await;
     assert!(!page.text("main table").await.contains("blinded"));
     is_for_everybody(axe, &page, "told").await;
 
     // The study has heard that the gait of walk 3 was better, and its page says so.
     let session = lab_sessions::of_study(&mut site.service.store.read().await.unwrap(), study).await.unwrap().remove(0);
-    let (second, third) = session.walked();
+    let (second, third) = session.walked().unwrap();
     let trials = site.service.trials(study).await;
     let number = |id| trials.iter().find(|trial| trial.id == id).unwrap().number;
     page.click(".crumbs a[href^='/studies/']").await;

@@ -3,14 +3,13 @@
 use crate::access::{Administer, Rate, Read};
 use crate::error::Error;
 use crate::http::AppState;
-use crate::http::blind_motion::{Figure, blind_motion};
+use crate::http::blind_motion::{Figure, blind_motion, phase};
 use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
 use crate::http::reached::Id;
 use crate::http::shown::Shown;
-use crate::store::presentations::{self, Presentation};
-use crate::store::{StudyId, gaits, studies};
-use crate::studies::blind::{self, Answered, RaterAnswer, RaterFigures};
+use crate::store::{StudyId, TrialId, allocations, gaits, presentations, studies};
+use crate::studies::blind::{self, Answered, RaterAnswer, RaterFigures, UnblindedPair};
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
@@ -59,16 +58,17 @@ pub(super) async fn next(
     let answering = app.clone();
     let (writer, shown) = blind::next(app.store_mut(), &once.caller, id).await?;
     let pair = shown.map(|shown| Pair {
-        first: format!("/api/v1/blind/{}/first", shown.token),
-        second: format!("/api/v1/blind/{}/second", shown.token),
-        token: shown.token,
-        number: shown.number,
+        first: format!("/api/v1/blind/{}/first", shown.presentation.token),
+        second: format!("/api/v1/blind/{}/second", shown.presentation.token),
+        token: shown.presentation.token,
+        number: shown.presentation.number,
     });
     once.finish(&answering, writer, StatusCode::OK, None, &NextPair { pair }).await
 }
 
 /// `GET /blind/{token}/first`: 101 figures over one stride, each ten places: hip, shoulder, then knee, ankle, heel, toe
-/// of the left and of the right leg; forward and up, m.
+/// of the left and of the right leg; forward and up, m. Where in the stride they begin differs from pair to pair, and is the
+/// same for both motions of a pair.
 #[utoipa::path(
     get,
     path = "/blind/{token}/first",
@@ -82,7 +82,7 @@ pub(super) async fn first(
     State(app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Json<Vec<Figure>>, Error> {
-    motion(&app, &may, &token, |shown| shown.shown_first).await
+    motion(&app, &may, &token, |(first, _)| first).await
 }
 
 /// `GET /blind/{token}/second`: as the first one.
@@ -99,20 +99,20 @@ pub(super) async fn second(
     State(app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Json<Vec<Figure>>, Error> {
-    motion(&app, &may, &token, |shown| shown.shown_second).await
+    motion(&app, &may, &token, |(_, second)| second).await
 }
 
 async fn motion(
     app: &AppState,
     may: &May<Rate>,
     token: &str,
-    side: impl Fn(&Presentation) -> crate::store::TrialId,
+    side: impl Fn((TrialId, TrialId)) -> TrialId,
 ) -> Result<Json<Vec<Figure>>, Error> {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, &may.caller, token).await?;
-    let gait = gaits::get(&mut reader, side(&shown)).await;
+    let gait = gaits::get(&mut reader, side(shown.shown())).await;
     drop(reader);
-    let motion = gait.map_err(Error::from).and_then(|gait| blind_motion(&gait));
+    let motion = gait.map_err(Error::from).and_then(|gait| blind_motion(&gait, phase(token)));
     // An error here must not say which trial it was, nor of which person or device.
     motion.map(Json).map_err(|error| {
         tracing::error!(%error, "a gait cannot be shown to a rater");
@@ -143,7 +143,8 @@ pub(super) async fn answer(
     once.finish(&app, writer, StatusCode::CREATED, None, &answered).await
 }
 
-/// `GET /studies/{id}/raters`: agreement with themselves, position bias, differences seen where there is none.
+/// `GET /studies/{id}/raters`: agreement with themselves, position bias of those who were unblinded, answers that were not
+/// blind.
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",
@@ -159,10 +160,12 @@ pub(super) async fn raters(
 ) -> Result<Json<Vec<RaterFigures>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(blind::figures(&presentations::of_study(&mut reader, id).await?)))
+    let shown = presentations::of_study(&mut reader, id).await?;
+    let sides = allocations::of_unblinded_raters(&mut reader, id).await?;
+    Ok(Json(blind::figures(&shown, &sides)))
 }
 
-/// Whose blindness ends, and why.
+/// Who is unblinded, and why.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Unblind {
@@ -173,15 +176,15 @@ pub(super) struct Unblind {
     reason: String,
 }
 
-/// `POST /studies/{id}/unblind`: what a rater was shown. An act: it is in the audit trail, and what the rater is shown
-/// from now on is marked.
+/// `POST /studies/{id}/unblind`: shows which gait a rater saw on which side. It is in the audit trail, and what the rater is
+/// shown from now on is marked.
 #[utoipa::path(
     post,
     path = "/studies/{id}/unblind",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Unblind,
-    responses((status = 200, description = "Every pair of the rater, in order", body = Vec<Presentation>)),
+    responses((status = 200, description = "Every pair of the rater, in order", body = Vec<UnblindedPair>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(

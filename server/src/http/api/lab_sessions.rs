@@ -1,7 +1,7 @@
 //! Lab sessions: planned here, walked in the lab, closed, unblinded.
 
 use super::exports;
-use crate::access::{Administer, Rate, Read, Run};
+use crate::access::{Administer, Device, Rate, Read, Run};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -9,8 +9,8 @@ use crate::http::may::May;
 use crate::http::once::{Once, OnceWith};
 use crate::http::reached::Id;
 use crate::http::shown::Shown;
-use crate::store::{LabSessionId, StudyId, lab_sessions, studies};
-use crate::studies::lab::{self, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
+use crate::store::{LabSessionId, StudyId, commit, lab_sessions, studies};
+use crate::studies::lab::{self, GaitOfWalk, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -87,8 +87,11 @@ pub(super) struct OfWalk {
     rate_hz: f64,
 }
 
-/// `GET /lab-sessions/{id}/controller.json`: what the device's controller needs for a walk. It names no trial; whoever
-/// holds it against the controller files of the two gaits learns the order.
+/// `GET /lab-sessions/{id}/controller.json`: what the device's controller needs for a walk.
+///
+/// It names no trial, but whoever holds it against the controller files of the two gaits learns the order. So it is for the
+/// device: a token with the scope `device` and no other. Of everybody else who fetches it, that is recorded, in the session and
+/// in the audit trail, and their later answers are not blind.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/controller.json",
@@ -99,20 +102,30 @@ pub(super) struct OfWalk {
         ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")
     ),
     responses((status = 200, description = "Controller file", body = Object)),
-    security(("token" = ["run"]), ("session" = ["run"])),
+    security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(
-    _: May<Run>,
+    may: May<Device>,
     State(app): State<AppState>,
-    Shown(id, _): Shown<LabSessionId, Run>,
+    Shown(id, _): Shown<LabSessionId, Device>,
     Params(of): Params<OfWalk>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let session = lab_sessions::get(&mut reader, id).await?;
-    let gait = lab::gait_to_walk_with(&mut reader, &session, of.walk).await?;
-    let trajectory = gait.trajectory(&mut reader).await?;
+    // Both files are made, whichever is given out: a refusal of one of them, or the time it takes, would tell the order.
+    let (one, two) = lab::gaits_to_walk_with(&mut reader, &session, of.walk).await?;
+    let of_one = one.trajectory(&mut reader).await?;
+    let of_two = two.trajectory(&mut reader).await?;
     drop(reader);
-    let text = gait.blinded_controller_file(&trajectory, of.rate_hz)?;
+    let one = one.blinded_controller_file(&of_one, of.rate_hz)?;
+    let two = two.blinded_controller_file(&of_two, of.rate_hz)?;
+    let mut writer = app.write().await?;
+    let gait = lab::for_device(&mut writer, &may.caller, id, of.walk).await?;
+    commit(writer).await?;
+    let text = match gait {
+        GaitOfWalk::One => one,
+        GaitOfWalk::Two => two,
+    };
     Ok(exports::file("application/json", &format!("controller-walk-{}.json", of.walk), text))
 }
 
@@ -149,7 +162,7 @@ pub(super) async fn close(
     once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
 }
 
-/// Why blindness ends.
+/// Why the session is unblinded.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Told {
@@ -158,9 +171,9 @@ pub(super) struct Told {
     reason: String,
 }
 
-/// `POST /lab-sessions/{id}/unblind`: which walk is with which gait, from now on for everybody who may read. An act: it
-/// is in the audit trail, what is walked from now on is marked, and what the person who walked said of the gaits becomes
-/// a preference of the study.
+/// `POST /lab-sessions/{id}/unblind`: shows which walk is with which gait, from now on to everybody who may read. It is in
+/// the audit trail, what is walked from now on is marked, and what the person who walked said becomes a preference of the
+/// study.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/unblind",

@@ -119,8 +119,12 @@ pub(super) fn walks_in_words(said: Said) -> &'static str {
 
 /// Where an answer comes from.
 pub(super) fn source(row: &FeedbackRow) -> &'static str {
-    // Raters may be anybody: what is known is that they did not know which gait is which.
-    if row.by_rater { "a rater" } else { person(row.source) }
+    // Raters may be anybody: what is known is whether they could know which gait is which.
+    match (row.by_rater, row.unblinded) {
+        (true, false) => "a rater",
+        (true, true) => "a rater, not blind",
+        (false, _) => person(row.source),
+    }
 }
 
 /// The same of what no rater said.

@@ -24,11 +24,12 @@ use serde_json::Value;
 use std::str::FromStr;
 
 /// What a token may be allowed: people administer, programs do not.
-const SCOPES: [(Right, &str); 4] = [
+const SCOPES: [(Right, &str); 5] = [
     (Right::Read, "see studies, trials and gaits"),
     (Right::Run, "make, start and end studies; ask for trials and tell what they gave"),
     (Right::Answer, "say which gait is better, and decide about unsafe ones"),
     (Right::Rate, "compare gaits blindly"),
+    (Right::Device, "the device in the lab: fetch the controller files of walks (give it nothing else)"),
 ];
 
 /// Networks with failed sign-ins that are shown.
@@ -43,7 +44,7 @@ struct PeoplePage {
     /// Networks with failed sign-ins.
     failures: Vec<Source>,
     roles: [Role; 3],
-    scopes: [(Right, &'static str); 4],
+    scopes: [(Right, &'static str); 5],
     outcome: Outcome,
     refused: Option<Refused>,
     /// A refused form as it was typed. There is no secret in it.

@@ -2,14 +2,16 @@
 
 use super::error::{Page, PageError, page};
 use super::format::words;
-use crate::access::{Caller, Rate, sign_in};
+use crate::access::{Caller, Rate, Right, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
+use crate::http::blind_motion::{blind_stride, phase};
 use crate::http::extract::{Form, Params};
 use crate::http::may::May;
 use crate::http::problem::Problem;
 use crate::http::reached::Id;
 use crate::plots::gait_tiles;
+use crate::store::allocations::Sided;
 use crate::store::presentations::{self, Presentation, Said};
 use crate::store::studies::FeedbackMode;
 use crate::store::{Connection, StudyId, commit, consents, gaits, members, studies};
@@ -18,7 +20,7 @@ use askama::Template;
 use axum::extract::{Path, State};
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::Gait;
-use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
+use gait_optimizer::walking::stick_figure::StickFigure;
 use serde::Deserialize;
 
 /// So many of the newest studies are searched for a rater's newest answer.
@@ -33,6 +35,8 @@ struct RatePage {
     nothing: bool,
     /// What was just answered or, without that, the newest answer as long as it can be taken back.
     saved: Option<Saved>,
+    /// Whether whoever asks may read, and so could know which gait is which.
+    not_blind: bool,
     /// Whoever asks came by a link that works once, and has no other way in.
     no_password: bool,
 }
@@ -58,6 +62,8 @@ impl Saved {
 struct PairPage {
     token: String,
     number: u32,
+    /// Whether whoever asks may read, and so could know which gait is which.
+    not_blind: bool,
     /// The answer, if it was given.
     saved: Option<Saved>,
     /// Why what was sent now was not taken.
@@ -116,7 +122,8 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         .collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
-    page(&RatePage { studies, assigned, nothing: before.nothing, saved, no_password })
+    let not_blind = may.caller.may(Right::Read);
+    page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
 }
 
 /// A rater's newest answer, if it can be taken back.
@@ -129,19 +136,22 @@ async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, E
         let own = presentations::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);
         newest = newest.into_iter().chain(own).max_by_key(|shown| shown.answered_at);
     }
-    match newest {
-        Some(shown) => Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_taken_back)),
-        None => Ok(None),
-    }
+    let Some(shown) = newest else { return Ok(None) };
+    let shown = match blind::own(db, caller, &shown.token).await {
+        // Its sides are not in this record.
+        Err(Error::NotFound { .. }) => return Ok(None),
+        shown => shown?,
+    };
+    Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_taken_back))
 }
 
-async fn read_back(db: &mut Connection, shown: Presentation) -> Result<Option<Saved>, Error> {
-    let can_be_taken_back = blind::can_be_taken_back(db, &shown).await?;
-    Ok(shown.answer.zip(shown.answered_at).map(|(said, at)| Saved {
+async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
+    let can_be_taken_back = blind::can_be_taken_back(db, &shown.presentation).await?;
+    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(said, at)| Saved {
         words: words(said.as_str()),
         at: at.minute(),
-        number: shown.number,
-        token: shown.token,
+        number: shown.presentation.number,
+        token: shown.presentation.token,
         can_be_taken_back,
     }))
 }
@@ -155,7 +165,7 @@ pub(super) async fn next(
     let (writer, shown) = blind::next(app.store_mut(), &may.caller, id).await?;
     commit(writer).await?;
     Ok(match shown {
-        Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.token)),
+        Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.presentation.token)),
         None => Redirect::to("/rate?nothing=true"),
     })
 }
@@ -168,26 +178,29 @@ pub(super) async fn pair(may: May<Rate>, State(mut app): State<AppState>, Path(t
 async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
-    let (token, number) = (shown.token.clone(), shown.number);
-    if shown.answer.is_some() {
+    let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
+    let not_blind = caller.may(Right::Read);
+    if shown.presentation.answer.is_some() {
         let saved = read_back(&mut reader, shown).await?;
-        return page(&PairPage { token, number, saved, refused, strides: None });
+        return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
     }
     let mut pair = Vec::new();
-    for trial in [shown.shown_first, shown.shown_second] {
+    let (first, second) = shown.shown();
+    for trial in [first, second] {
         // What is missing here is said by the animation, without a word that could tell which gait it was.
         pair.extend(gaits::get(&mut reader, trial).await.ok());
     }
     drop(reader);
+    let phase = phase(&token);
     let strides = app.compute(move |_| {
-        let stride = |gait: &Gait| stick_figures(gait).ok().and_then(|figures| Stride::of(&figures));
+        let stride = |gait: &Gait| blind_stride(gait, phase).ok().and_then(|figures| Stride::of(&figures));
         match &pair[..] {
             [first, second] => stride(first).zip(stride(second)).map(|(first, second)| [first, second]),
             _ => None,
         }
     });
     let strides = strides.await.map_err(Error::from)?;
-    page(&PairPage { token, number, saved: None, refused, strides })
+    page(&PairPage { token, number, not_blind, saved: None, refused, strides })
 }
 
 /// The form of a pair.
@@ -211,7 +224,7 @@ pub(super) async fn answer(
     let answered = async {
         let mut writer = app.write().await?;
         // The same form sent twice, by a double click or after a lost answer, is one answer.
-        let before = blind::own(&mut writer, &may.caller, &token).await?.answer;
+        let before = blind::own(&mut writer, &may.caller, &token).await?.answer();
         if before != Some(given.answer) {
             blind::answer(&mut writer, &may.caller, &token, &given).await?;
             commit(writer).await?;

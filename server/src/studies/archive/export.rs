@@ -4,6 +4,7 @@ use super::file::Packer;
 use super::signature::SigningKey;
 use crate::error::Error;
 use crate::store::archive::{self, Read};
+use crate::store::archived_allocations::masked;
 use crate::store::{StoreError, StudyId, backup};
 use std::io::Write;
 use std::path::Path;
@@ -37,7 +38,7 @@ pub async fn export<W: Write + Send + 'static>(
                 let reason = format!("a row of {table} was changed outside the program: see `gaitwright audit verify`");
                 return Err(Error::conflict(format!("the study cannot be exported: {reason}")));
             }
-            packer.add(table, &row).map_err(Error::Output)?;
+            packer.add(table, &masked(table, row)).map_err(Error::Output)?;
         }
         Ok(None)
     });

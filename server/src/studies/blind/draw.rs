@@ -1,92 +1,56 @@
-//! The draw: a pure function of the seed, the rater, and what the rater was shown before.
+//! The draw: which pair a rater is shown next. A pure function of what the study asks, what the rater was shown before and
+//! a lot of the operating system. On which side a gait is shown is drawn apart, in `store::allocations`.
 
 use crate::store::presentations::{Kind, Presentation, Said};
 use crate::store::{PresentationId, TrialId};
-use crate::studies::balance::comes_first;
-use crate::studies::seed::{Purpose, derive};
-use sha2::{Digest, Sha256};
 
 /// One in so many presentations repeats an earlier pair.
 const REPEAT_ONE_IN: u64 = 10;
-/// One in so many shows the same gait twice.
-const NULL_ONE_IN: u64 = 20;
 
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Drawn {
     /// Why.
     pub kind: Kind,
-    /// The trial shown first.
-    pub first: TrialId,
-    /// The trial shown second.
-    pub second: TrialId,
+    /// The two gaits, the newer one first.
+    pub pair: (TrialId, TrialId),
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
+    /// The presentation whose answer was taken back: it comes again, with the same sides.
+    pub again: Option<PresentationId>,
 }
 
 /// Draws what a rater is shown next. `question`: the newer and the older trial of the pair that the study asks for;
-/// `before`: what this rater was shown, in order; `closed`: trials that nobody may be shown; `controls`: whether a control
-/// may be drawn.
-pub fn draw(
-    study_seed: u64,
-    rater: &str,
-    question: (TrialId, TrialId),
-    before: &[Presentation],
-    (closed, controls): (&[TrialId], bool),
-) -> Drawn {
-    let (newer, older) = question;
-    let taken_back = before.last().filter(|last| last.answer == Some(Said::Withdrawn));
-    // What was taken back comes again, control or not: else taking back would tell which it was.
-    if let Some(last) = taken_back.filter(|last| last.kind != Kind::New)
-        && !closed.contains(&last.shown_first)
-        && !closed.contains(&last.shown_second)
-    {
-        let (first, second) = last.pair();
-        return Drawn { kind: last.kind, first, second, repeats: last.repeats };
+/// `before`: what this rater was shown, in order; `closed`: trials that nobody may be shown.
+pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
+    let taken_back = before.last().filter(|last| last.answer == Some(Said::Withdrawn) && last.kind != Kind::Null);
+    if let Some(last) = taken_back.filter(|last| !last.has_one_of(closed)) {
+        // Whoever mistook one side for the other must not find them exchanged.
+        let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
+        let is_question = is_same_pair(last.pair(), question);
+        if last.kind == Kind::Repeat || is_question {
+            return again;
+        }
     }
-    let again = taken_back.is_some_and(|last| [(newer, older), (older, newer)].contains(&last.pair()));
-    if controls
-        && !again
-        && let Some(control) = control(lot(study_seed, rater, before), older, before, closed)
-    {
-        return control;
+    let new = Drawn { kind: Kind::New, pair: question, repeats: None, again: None };
+    if !lot.is_multiple_of(REPEAT_ONE_IN) {
+        return new;
     }
-    // Only pairs of the study count for the balance: it is their order that must not matter.
-    let counts = |shown: &&Presentation| shown.kind == Kind::New && shown.answer != Some(Said::Withdrawn);
-    let asked = before.iter().filter(counts).count();
-    let seed = study_seed ^ number_of(rater);
-    let newer_first = comes_first(derive(seed, Purpose::Presentation, 2 * (asked as u64 / 4) + 1), asked);
-    let (first, second) = if newer_first { (newer, older) } else { (older, newer) };
-    Drawn { kind: Kind::New, first, second, repeats: None }
-}
-
-/// What decides whether the next presentation is a control, and how long it is waited for.
-pub(super) fn lot(study_seed: u64, rater: &str, before: &[Presentation]) -> u64 {
-    derive(study_seed ^ number_of(rater), Purpose::Presentation, 2 * before.len() as u64)
-}
-
-fn control(lot: u64, older: TrialId, before: &[Presentation], closed: &[TrialId]) -> Option<Drawn> {
-    if lot.is_multiple_of(REPEAT_ONE_IN)
-        && let Some(earlier) = repeatable(before, closed, lot / REPEAT_ONE_IN)
-    {
-        return Some(Drawn {
-            kind: Kind::Repeat,
-            first: earlier.shown_second,
-            second: earlier.shown_first,
-            repeats: Some(earlier.id),
-        });
-    }
-    let null = Drawn { kind: Kind::Null, first: older, second: older, repeats: None };
-    (lot % NULL_ONE_IN == 1).then_some(null)
+    let repeat = |earlier: &Presentation| Drawn {
+        kind: Kind::Repeat,
+        pair: earlier.pair(),
+        repeats: Some(earlier.id),
+        again: None,
+    };
+    repeatable(before, closed, lot / REPEAT_ONE_IN).map_or(new, repeat)
 }
 
 /// An earlier pair with a plain answer that was not repeated yet.
 fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> Option<&'a Presentation> {
     let plain = |shown: &&Presentation| {
         shown.kind == Kind::New
-            && matches!(shown.answer, Some(Said::First | Said::Second | Said::NoDifference))
-            && !closed.contains(&shown.shown_first)
-            && !closed.contains(&shown.shown_second)
+            && shown.answer.is_some_and(is_plain)
+            && !shown.has_one_of(closed)
             && !before.iter().any(|other| other.repeats == Some(shown.id))
     };
     let candidates: Vec<&Presentation> = before.iter().filter(plain).collect();
@@ -94,9 +58,14 @@ fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> O
     candidates.get(usize::try_from(index).ok()?).copied()
 }
 
-fn number_of(rater: &str) -> u64 {
-    let digest = Sha256::digest(rater.as_bytes());
-    digest.iter().take(8).fold(0, |number, byte| (number << 8) | u64::from(*byte))
+/// Whether an answer compares the two gaits.
+pub(super) fn is_plain(said: Said) -> bool {
+    matches!(said, Said::First | Said::Second | Said::NoDifference)
+}
+
+/// Whether two pairs are of the same gaits.
+pub(super) fn is_same_pair((a, b): (TrialId, TrialId), other: (TrialId, TrialId)) -> bool {
+    other == (a, b) || other == (b, a)
 }
 
 #[cfg(test)]
@@ -112,8 +81,8 @@ mod tests {
             rater: "R".to_owned(),
             number,
             kind: drawn.kind,
-            shown_first: drawn.first,
-            shown_second: drawn.second,
+            one: drawn.pair.0,
+            other: drawn.pair.1,
             repeats: drawn.repeats,
             unblinded: false,
             created_at: now(),
@@ -122,87 +91,53 @@ mod tests {
         }
     }
 
-    #[test]
-    fn orders_are_balanced_in_every_block_and_controls_appear_as_often_as_meant() {
-        for seed in 0..20 {
-            let mut before = Vec::new();
-            let mut newer_first = Vec::new();
-            for number in 1..=400 {
-                let (newer, older) = (TrialId::fresh(), TrialId::fresh());
-                let drawn = draw(seed, "R", (newer, older), &before, (&[], true));
-                if drawn.kind == Kind::New {
-                    newer_first.push(drawn.first == newer);
-                }
-                before.push(shown(number, drawn));
-            }
-            for block in newer_first.chunks_exact(4) {
-                assert_eq!(block.iter().filter(|first| **first).count(), 2);
-            }
-            let count = |kind| before.iter().filter(|shown| shown.kind == kind).count();
-            assert!((15..=70).contains(&count(Kind::Repeat)), "{}", count(Kind::Repeat));
-            assert!((5..=45).contains(&count(Kind::Null)), "{}", count(Kind::Null));
-        }
+    fn question() -> (TrialId, TrialId) {
+        (TrialId::fresh(), TrialId::fresh())
     }
 
     #[test]
-    fn a_repeat_shows_an_earlier_pair_once_with_sides_swapped() {
+    fn one_presentation_in_ten_repeats_an_earlier_pair_and_each_pair_once() {
         let mut before: Vec<Presentation> = Vec::new();
-        for number in 1..=300 {
-            let drawn = draw(7, "R", (TrialId::fresh(), TrialId::fresh()), &before, (&[], true));
+        for number in 1..=400 {
+            let drawn = draw(u64::from(number) * 7, question(), &before, &[]);
             if let Some(repeats) = drawn.repeats {
                 let earlier = before.iter().find(|shown| shown.id == repeats).unwrap();
-                assert_eq!((drawn.first, drawn.second), (earlier.shown_second, earlier.shown_first));
+                assert_eq!((drawn.kind, drawn.pair), (Kind::Repeat, earlier.pair()));
                 assert!(!before.iter().any(|shown| shown.repeats == Some(repeats)));
             }
             before.push(shown(number, drawn));
         }
+        let repeats = before.iter().filter(|shown| shown.kind == Kind::Repeat).count();
+        assert_eq!(repeats, 40);
+        assert!(before.iter().all(|shown| shown.kind != Kind::Null));
     }
 
     #[test]
-    fn what_was_taken_back_comes_again_on_the_same_sides() {
-        let mut controls = 0;
-        for seed in 0..60 {
-            let mut before: Vec<Presentation> = Vec::new();
-            for number in 1..=20 {
-                let question = (TrialId::fresh(), TrialId::fresh());
-                let drawn = draw(seed, "R", question, &before, (&[], true));
-                controls += u32::from(drawn.kind != Kind::New);
-                before.push(Presentation { answer: Some(Said::Withdrawn), ..shown(number, drawn) });
-                let again = draw(seed, "R", question, &before, (&[], true));
-                assert_eq!(again, drawn);
-                before.push(shown(number, again));
-            }
-        }
-        assert!(controls > 50, "{controls}");
-    }
-
-    #[test]
-    fn without_a_measured_wait_there_is_no_control() {
-        let mut before: Vec<Presentation> = Vec::new();
-        for number in 1..=200 {
-            let drawn = draw(7, "R", (TrialId::fresh(), TrialId::fresh()), &before, (&[], false));
-            assert_eq!(drawn.kind, Kind::New);
-            before.push(shown(number, drawn));
+    fn a_pair_whose_answer_was_taken_back_comes_again_with_its_sides() {
+        for lot in [1, 10] {
+            let asked = question();
+            let earlier = shown(1, draw(1, question(), &[], &[]));
+            let drawn = draw(lot, asked, std::slice::from_ref(&earlier), &[]);
+            let taken_back = Presentation { answer: Some(Said::Withdrawn), ..shown(2, drawn) };
+            let id = taken_back.id;
+            let again = draw(3, asked, &[earlier, taken_back], &[]);
+            assert_eq!(again, Drawn { again: Some(id), ..drawn });
         }
     }
 
     #[test]
-    fn the_same_record_gives_the_same_draw_and_raters_differ() {
-        let question = (TrialId::fresh(), TrialId::fresh());
-        assert_eq!(draw(3, "R", question, &[], (&[], true)), draw(3, "R", question, &[], (&[], true)));
-        let firsts: Vec<bool> = (0..40)
-            .map(|rater| draw(3, &format!("R{rater}"), question, &[], (&[], true)).first == question.0)
-            .collect();
-        assert!(firsts.contains(&true) && firsts.contains(&false));
+    fn a_question_that_the_study_asks_no_more_does_not_come_again() {
+        let taken_back = Presentation { answer: Some(Said::Withdrawn), ..shown(1, draw(1, question(), &[], &[])) };
+        let asked = question();
+        assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);
     }
 
     #[test]
-    fn what_was_called_unsafe_is_not_repeated() {
-        let drawn = Drawn { kind: Kind::New, first: TrialId::fresh(), second: TrialId::fresh(), repeats: None };
+    fn unsafe_gaits_are_not_repeated() {
+        let drawn = draw(1, question(), &[], &[]);
         let before: Vec<Presentation> = (1..=50).map(|number| shown(number, drawn)).collect();
-        for seed in 0..50 {
-            let drawn = draw(seed, "R", (TrialId::fresh(), TrialId::fresh()), &before, (&[drawn.second], true));
-            assert_ne!(drawn.kind, Kind::Repeat);
+        for lot in 0..50 {
+            assert_eq!(draw(10 * lot, question(), &before, &[drawn.pair.1]).kind, Kind::New);
         }
     }
 }

@@ -1,5 +1,7 @@
-//! How far a rater can be relied on: agreement with itself, position bias, differences seen where there is none.
+//! How far a rater can be relied on: agreement with itself, position bias, and how many answers were not blind.
 
+use super::draw::{is_plain, is_same_pair};
+use crate::store::allocations::Sided;
 use crate::store::presentations::{Kind, Presentation, Said};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -42,66 +44,69 @@ pub struct RaterFigures {
     pub shown: u32,
     /// How many were answered.
     pub answered: u32,
-    /// Of the pairs with a preference, those where the first was preferred: far from a half is position bias.
-    pub first_preferred: Share,
-    /// Of the repeated pairs, those answered as the first time.
+    /// Of the blind answers with a preference, those that preferred the gait shown first: far from a half is position bias.
+    /// None until the rater is unblinded, because it would tell the order of pairs.
+    pub first_preferred: Option<Share>,
+    /// Of the pairs that were answered blindly once more, those answered as the time before.
     pub repeats_agree: Share,
-    /// Of the pairs of the same gait twice, those answered with no difference.
-    pub nulls_without_difference: Share,
     /// Answers "cannot tell".
     pub cannot_tell: u32,
     /// Answers that called a gait unsafe.
     pub unsafe_gaits: u32,
-    /// Presentations drawn after the rater was told which is which.
+    /// Presentations of which the rater could have known which gait is which. The shares leave them out.
     pub unblinded: u32,
 }
 
-/// The figures of every rater of a study, by name.
-pub fn figures(presentations: &[Presentation]) -> Vec<RaterFigures> {
+/// The figures of every rater of a study, by name. `sides`: the pairs of the raters who were unblinded.
+pub fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterFigures> {
     let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();
-    raters.into_iter().map(|rater| of_rater(rater, presentations)).collect()
+    raters.into_iter().map(|rater| of_rater(rater, presentations, sides)).collect()
 }
 
-fn of_rater(rater: &str, all: &[Presentation]) -> RaterFigures {
+fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterFigures {
     let own: Vec<&Presentation> = all.iter().filter(|shown| shown.rater == rater).collect();
     let count = |wanted: &dyn Fn(&Presentation) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
-    };
-    let preferred = |shown: &Presentation| matches!(shown.answer, Some(Said::First | Said::Second));
-    let plain = |shown: &Presentation| preferred(shown) || shown.answer == Some(Said::NoDifference);
-    let agrees = |shown: &Presentation| {
-        let earlier = own.iter().find(|other| Some(other.id) == shown.repeats);
-        earlier.is_some_and(|earlier| swapped(earlier.answer) == shown.answer)
     };
     let is_unsafe = |shown: &Presentation| shown.answer.is_some_and(Said::is_about_safety);
     RaterFigures {
         rater: rater.to_owned(),
         shown: count(&|_| true),
         answered: count(&|shown| shown.answer.is_some_and(|said| said != Said::Withdrawn)),
-        first_preferred: Share::new(count(&|s| s.answer == Some(Said::First)), count(&preferred)),
-        repeats_agree: Share::new(
-            count(&|s| s.kind == Kind::Repeat && plain(s) && agrees(s)),
-            count(&|s| s.kind == Kind::Repeat && plain(s)),
-        ),
-        nulls_without_difference: Share::new(
-            count(&|s| s.kind == Kind::Null && s.answer == Some(Said::NoDifference)),
-            count(&|s| s.kind == Kind::Null && plain(s)),
-        ),
+        first_preferred: first_preferred(rater, sides),
+        repeats_agree: repeats_agree(&own),
         cannot_tell: count(&|s| s.answer == Some(Said::CannotTell)),
         unsafe_gaits: count(&is_unsafe),
         unblinded: count(&|s| s.unblinded),
     }
 }
 
-/// The same answer about a pair with its sides swapped.
-fn swapped(answer: Option<Said>) -> Option<Said> {
-    match answer {
-        Some(Said::First) => Some(Said::Second),
-        Some(Said::Second) => Some(Said::First),
-        other => other,
+fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
+    let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
+    own.peek()?;
+    let blind = own.filter(|sided| !sided.presentation.unblinded && sided.presentation.kind != Kind::Null);
+    let answers: Vec<Said> = blind.filter_map(Sided::answer).collect();
+    let count = |said| u32::try_from(answers.iter().filter(|answer| **answer == said).count()).unwrap_or(u32::MAX);
+    let (first, second) = (count(Said::First), count(Said::Second));
+    Some(Share::new(first, first.saturating_add(second)))
+}
+
+/// Each plain answer beside the one before to the same two gaits.
+fn repeats_agree(own: &[&Presentation]) -> Share {
+    let plain =
+        |shown: &&Presentation| !shown.unblinded && shown.kind != Kind::Null && shown.answer.is_some_and(is_plain);
+    let answered: Vec<&Presentation> = own.iter().copied().filter(plain).collect();
+    let (mut agree, mut of) = (0_u32, 0_u32);
+    for (place, shown) in answered.iter().enumerate() {
+        let before = answered[..place].iter().rfind(|other| is_same_pair(other.pair(), shown.pair()));
+        let Some(before) = before else { continue };
+        let turned = if before.pair() == shown.pair() { before.answer } else { before.answer.map(Said::swapped) };
+        of += 1;
+        agree += u32::from(turned == shown.answer);
     }
+    Share::new(agree, of)
 }
 
 #[cfg(test)]

@@ -1,14 +1,16 @@
-//! Blind comparisons: the server draws who is shown what in which order, stores it, and keeps it to itself.
+//! Blind comparisons: the server draws who is shown what on which side, stores it, and keeps it to itself.
 //!
-//! A rater sees a token and two motions. Order is balanced by permuted blocks of four; some pairs are repeats with
-//! sides swapped, some show the same gait twice, and neither is heard by the learner.
+//! A rater sees a token and two motions. The side of a gait is a fair coin for each pair. Every answer is heard by the
+//! learner, also of a pair that is asked again: no presentation is a secret control that something served could tell from
+//! the others. Answers of somebody who could have known which gait is which are recorded as such.
 
 mod draw;
 mod figures;
-mod hold;
+mod knowledge;
 mod rater;
 
 pub use draw::{Drawn, draw};
 pub use figures::{RaterFigures, Share, figures};
-pub use rater::{Answered, RaterAnswer, answer, next, take_back, unblind};
+pub(crate) use knowledge::could_have_known;
+pub use rater::{Answered, RaterAnswer, UnblindedPair, answer, next, take_back, unblind};
 pub(crate) use rater::{can_be_taken_back, own};

@@ -1,17 +1,18 @@
-//! What a rater does: takes the next pair, answers it. And the act that ends blindness.
+//! What a rater does: takes the next pair, answers it. And the act that unblinds a rater.
 
-use super::draw::{self, draw};
-use super::hold;
+use super::could_have_known;
+use super::draw::draw;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
+use crate::store::allocations::{self, Lot, Sided};
 use crate::store::audit;
 use crate::store::feedback::{self, Source, Voice};
 use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
 use crate::store::studies::{FeedbackMode, StudyState};
-use crate::store::trials::TrialState;
 use crate::store::{
-    Connection, Instant, LentWriter, Store, StudyId, TrialId, Writer, consents, events, members, now, studies,
+    Connection, Instant, LentWriter, PresentationId, Store, StudyId, TrialId, Writer, consents, events, members,
+    studies,
 };
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
@@ -39,41 +40,29 @@ pub struct RaterAnswer {
     pub note: String,
 }
 
-/// An answer as read back to the rater: nothing in it says which gaits they were, nor whether the pair was a control.
+/// An answer as read back to the rater: nothing in it says which gaits they were. The answer itself is left out, because the
+/// copy that is kept for a repeated request would tell the sides to whoever knows what the study heard.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Answered {
     /// Number of the pair for this rater.
     pub number: u32,
-    /// What was recorded.
-    pub answer: Said,
 }
 
-/// What a study asks, computed outside any transaction.
-struct Question {
-    seed: u64,
-    /// The newer and the older gait; none: it asks for nothing.
-    pair: Option<(TrialId, TrialId)>,
-    /// When its gaits were found.
-    converged: Vec<Instant>,
-}
-
-async fn question(store: &mut Store, study: StudyId) -> Result<Question, Error> {
+/// What a study asks, computed outside any transaction: the newer and the older gait.
+async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
     consents::may_be_shown(&mut db, study.id).await?;
-    let (study_id, seed) = (study.id, study.plan.seed);
+    let study_id = study.id;
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
-        return Ok(Question { seed, pair: None, converged: Vec::new() });
+        return Ok(None);
     }
     let standing = Standing::read(&mut db, study).await?;
     drop(db);
-    let found = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged);
-    let converged = found.filter_map(|trial| trial.finished_at).collect();
     let found = store.compute(move |pool| open_question(pool, &standing)).await?;
     // What the learner says names bounds: it is logged, and the rater hears that the program failed.
     let found = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
-    let pair = found.trials();
-    Ok(Question { seed, pair, converged })
+    Ok(found.trials())
 }
 
 /// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
@@ -84,31 +73,30 @@ pub async fn next<'a>(
     store: &'a mut Store,
     caller: &Caller,
     study: StudyId,
-) -> Result<(LentWriter<'a>, Option<Presentation>), Error> {
+) -> Result<(LentWriter<'a>, Option<Sided>), Error> {
     let question = question(store, study).await?;
     let mut writer = store.write().await?;
-    let all = presentations::of_study(&mut writer, study).await?;
     let objections = Objections::read(&mut writer, study).await?;
     let closed: Vec<TrialId> = objections.closed.iter().map(|closed| closed.trial).collect();
-    let own: Vec<Presentation> = all.iter().filter(|shown| shown.rater == caller.name).cloned().collect();
+    let mut own = presentations::of_study(&mut writer, study).await?;
+    own.retain(|shown| shown.rater == caller.name);
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
-        if walkable::are_walkable(&mut writer, open.pair()).await? {
+        // A study that came here from elsewhere has no sides of the pairs that were blind there.
+        if walkable::are_walkable(&mut writer, open.pair()).await?
+            && allocations::is_included(&mut writer, open.id).await?
+        {
             note(&mut writer, caller, open, "presentation.show").await?;
-            return Ok((writer, Some(open.clone())));
+            let open = own_pair(&mut writer, caller, &open.token).await?;
+            return Ok((writer, Some(open)));
         }
-        let withdrawn = NewAnswer { said: Said::Withdrawn, response_ms: None, note: "", feedback: None };
-        presentations::answer(&mut writer, open.id, withdrawn).await?;
+        withdraw(&mut writer, open).await?;
     }
     let is_closed = |pair: &(TrialId, TrialId)| {
         closed.contains(&pair.0) || closed.contains(&pair.1) || objections.is_skipped(*pair)
     };
-    let Some(pair) = question.pair.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
-    let waits = hold::waits(&all, &question.converged);
-    let lot = draw::lot(question.seed, &caller.name, &own);
-    if hold::until(own.last(), &waits, lot).is_some_and(|until| now() < until) {
-        return Ok((writer, None));
-    }
-    let drawn = draw(question.seed, &caller.name, pair, &own, (&closed, !waits.is_empty()));
+    let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
+    let lot = Lot::draw()?;
+    let drawn = draw(lot.number(), pair, &own, &closed);
     let token = secret::fresh()?;
     let new = NewPresentation {
         token: token.clone(),
@@ -116,15 +104,27 @@ pub async fn next<'a>(
         rater: caller.name.clone(),
         number: u32::try_from(own.len()).unwrap_or(u32::MAX).saturating_add(1),
         kind: drawn.kind,
-        shown_first: drawn.first,
-        shown_second: drawn.second,
+        pair: drawn.pair,
         repeats: drawn.repeats,
-        unblinded: presentations::is_unblinded(&mut writer, study, &caller.name).await?,
+        unblinded: could_have_known(&mut writer, caller, study).await?,
     };
-    presentations::insert(&mut writer, &new).await?;
-    let shown = presentations::by_token(&mut writer, &token).await?;
-    note(&mut writer, caller, &shown, "presentation.draw").await?;
+    let id = presentations::insert(&mut writer, &new).await?;
+    allocations::of_pair(&mut writer, id, drawn.again, Lot::draw()?).await?;
+    let shown = own_pair(&mut writer, caller, &token).await?;
+    note(&mut writer, caller, &shown.presentation, "presentation.draw").await?;
     Ok((writer, Some(shown)))
+}
+
+async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
+    let withdrawn = NewAnswer {
+        said: Said::Withdrawn,
+        response_ms: None,
+        note: "",
+        feedback: None,
+        could_have_known: open.unblinded,
+    };
+    presentations::answer(writer, open.id, withdrawn).await?;
+    Ok(())
 }
 
 async fn note(writer: &mut Writer, caller: &Caller, shown: &Presentation, action: &str) -> Result<(), Error> {
@@ -142,7 +142,8 @@ pub async fn answer(
     token: &str,
     given: &RaterAnswer,
 ) -> Result<(StudyId, Answered), Error> {
-    let shown = own(writer, caller, token).await?;
+    let sided = own(writer, caller, token).await?;
+    let shown = &sided.presentation;
     if given.answer == Said::Withdrawn {
         return Err(Error::invalid("answer", "withdrawn", "what a rater can say"));
     }
@@ -152,25 +153,29 @@ pub async fn answer(
     }
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let voice = Voice { source, author: &caller.name, note: &given.note };
-    // What is shown twice, or beside itself, says how the rater judges, and nothing of gaits.
-    let heard = if shown.kind == Kind::New {
+    // From here on it is about the pair and not about its sides.
+    let said = sided.turned(given.answer);
+    // An earlier version showed the same gait twice, of which there is nothing to hear.
+    let heard = if shown.kind == Kind::Null {
+        None
+    } else {
         let fields = ("first", "second");
-        let (study, pair, said) = (shown.study_id, shown.pair(), given.answer);
+        let (study, pair) = (shown.study_id, shown.pair());
         // The server drew the pair; that this rater is asked again is meant.
         let statement = Statement { study, pair, fields, said, voice, again: Again::Meant };
         preference::hear(writer, statement).await.map_err(without_gaits)?
-    } else {
-        None
     };
-    let row = NewAnswer { said: given.answer, response_ms: given.response_ms, note: &given.note, feedback: heard };
+    let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
+    let row = NewAnswer { said, response_ms: given.response_ms, note: &given.note, feedback: heard, could_have_known };
     if !presentations::answer(writer, shown.id, row).await? {
-        return Err(Error::conflict(answered_already(shown.answer)));
+        return Err(Error::conflict(answered_already(sided.answer())));
     }
     let payload = json!({ "feedback_id": heard, "presentation_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
-    let detail = json!({ "study": shown.study_id, "number": shown.number, "answer": given.answer });
+    // What the rater said of the sides stays out of the trail: it would tell the order.
+    let detail = json!({ "study": shown.study_id, "number": shown.number, "could_have_known": could_have_known });
     audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
-    Ok((shown.study_id, Answered { number: shown.number, answer: given.answer }))
+    Ok((shown.study_id, Answered { number: shown.number }))
 }
 
 /// A refusal that names no gait.
@@ -200,21 +205,21 @@ fn answered_already(before: Option<Said>) -> String {
 /// # Errors
 /// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it cannot be taken back.
 pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
-    let shown = own(writer, caller, token).await?;
+    let shown = own(writer, caller, token).await?.presentation;
     if !can_be_taken_back(writer, &shown).await? {
         let why = "only the last answer can be taken back, once; and a gait that was called unsafe stays closed: tell \
                    whoever runs the study";
         return Err(Error::conflict(why));
     }
     if let Some(heard) = presentations::heard_of(writer, shown.id).await?
-        // Somebody else may have: a refusal would tell that the pair was no control.
+        // Somebody else may have.
         && feedback::get(writer, heard).await?.retraction.is_none()
     {
         answering::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back").await?;
     }
     presentations::take_back(writer, shown.id).await?;
     note(writer, caller, &shown, "presentation.take_back").await?;
-    Ok(Answered { number: shown.number, answer: Said::Withdrawn })
+    Ok(Answered { number: shown.number })
 }
 
 /// Whether an answer stands that may go: the rater's last one, and not about safety.
@@ -225,37 +230,103 @@ pub(crate) async fn can_be_taken_back(db: &mut Connection, shown: &Presentation)
     Ok(last && stands)
 }
 
-/// The presentation of a token, if it is this rater's and the rater reaches its study.
-pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Presentation, Error> {
-    let shown = presentations::by_token(db, token).await?;
-    if shown.rater != caller.name || !members::reaches(db, caller.reach(), shown.study_id).await? {
-        return Err(Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() });
+/// The pair of a token with its sides, if it is this rater's and the rater reaches its study.
+pub(crate) async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+    let shown = own_pair(db, caller, token).await?;
+    if !members::reaches(db, caller.reach(), shown.presentation.study_id).await? {
+        return Err(unknown_pair());
     }
-    consents::may_be_shown(db, shown.study_id).await?;
+    consents::may_be_shown(db, shown.presentation.study_id).await?;
     Ok(shown)
 }
 
-/// Tells which gaits a rater was shown; from now on the rater's pairs are marked.
+async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+    allocations::own_pair(db, token, &caller.name).await?.ok_or_else(unknown_pair)
+}
+
+fn unknown_pair() -> Error {
+    Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() }
+}
+
+/// A pair of a rater who was unblinded, with its sides.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = Presentation)]
+pub struct UnblindedPair {
+    /// Identifier.
+    pub id: PresentationId,
+    /// The study.
+    pub study_id: StudyId,
+    /// Who was shown it.
+    pub rater: String,
+    /// 1, 2, ... of this rater in this study.
+    pub number: u32,
+    /// Why it was shown.
+    pub kind: Kind,
+    /// The trial shown first.
+    pub shown_first: TrialId,
+    /// The trial shown second.
+    pub shown_second: TrialId,
+    /// The presentation that it repeats.
+    pub repeats: Option<PresentationId>,
+    /// Whether the rater could have known which gait is which, when it was drawn or when it was answered.
+    pub unblinded: bool,
+    /// When it was drawn.
+    pub created_at: Instant,
+    /// What the rater said of what was shown; none: nothing yet.
+    pub answer: Option<Said>,
+    /// When.
+    pub answered_at: Option<Instant>,
+}
+
+impl From<&Sided> for UnblindedPair {
+    fn from(sided: &Sided) -> Self {
+        let row = &sided.presentation;
+        let (shown_first, shown_second) = sided.shown();
+        Self {
+            id: row.id,
+            study_id: row.study_id,
+            rater: row.rater.clone(),
+            number: row.number,
+            kind: row.kind,
+            shown_first,
+            shown_second,
+            repeats: row.repeats,
+            unblinded: row.unblinded,
+            created_at: row.created_at,
+            answer: sided.answer(),
+            answered_at: row.answered_at,
+        }
+    }
+}
+
+/// Unblinds a rater: says which gaits the rater was shown on which side. From now on the rater's pairs are marked.
 ///
 /// # Errors
-/// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`].
+/// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`], [`Error::Conflict`] when the sides are
+/// not in this record.
 pub async fn unblind(
     writer: &mut Writer,
     caller: &Caller,
     study: StudyId,
     rater: &str,
     reason: &str,
-) -> Result<Vec<Presentation>, Error> {
+) -> Result<Vec<UnblindedPair>, Error> {
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
-    let reason = printable::reason("reason", reason, ": why blindness ends")?;
-    let mut shown = presentations::of_study(writer, study).await?;
-    shown.retain(|shown| shown.rater == rater);
-    if shown.is_empty() {
+    let reason = printable::reason("reason", reason, ": why the rater is unblinded")?;
+    if !presentations::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
         return Err(Error::invalid("rater", rater, "somebody who was shown a pair of this study"));
     }
     presentations::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
+    let mut pairs = allocations::of_unblinded_raters(writer, study).await?;
+    pairs.retain(|sided| sided.presentation.rater == rater);
+    if pairs.is_empty() {
+        return Err(Error::conflict(
+            "the archive that this study came from left the sides of this rater's pairs out: unblind the rater where the \
+             study was made",
+        ));
+    }
     let detail = json!({ "rater": rater, "reason": reason });
     audit::append(writer, &caller.actor, "study.unblind", &format!("study {study}"), &detail).await?;
-    Ok(shown)
+    Ok(pairs.iter().map(UnblindedPair::from).collect())
 }

@@ -3,7 +3,7 @@
 //! It becomes a preference, or a remark, when the order is told: what the learner hears is shown to everybody who may
 //! read, and whoever was in the lab would know the order from it.
 
-use super::session::{InTheLab, in_the_lab, next_walk, still_open};
+use super::session::{InTheLab, has_file, in_the_lab, next_walk, still_open};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -36,11 +36,22 @@ pub struct AnswerView {
     pub actor: String,
     /// When.
     pub at: Instant,
+    /// Whether it was written after the session was unblinded, or by somebody who had fetched a controller file: then it is
+    /// no blind answer.
+    pub could_have_known: bool,
 }
 
-impl From<&LabAnswer> for AnswerView {
-    fn from(row: &LabAnswer) -> Self {
-        Self { number: row.number, answer: row.said, note: row.note.clone(), actor: row.actor.clone(), at: row.at }
+impl AnswerView {
+    pub(super) fn of(session: &LabSession, row: &LabAnswer) -> Self {
+        let unblinded = session.done(Act::Unblinded).is_some_and(|done| done.at <= row.at);
+        Self {
+            number: row.number,
+            answer: row.said,
+            note: row.note.clone(),
+            actor: row.actor.clone(),
+            at: row.at,
+            could_have_known: unblinded || has_file(session, &row.actor, row.at),
+        }
     }
 }
 
@@ -133,12 +144,12 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId) -
 /// Tells the learner the answer that stands, if one does, as said by the subject. An answer about a gait that was reported
 /// unsafe since then stays in the record of the session, and the learner does not hear it.
 pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
-    let Some(given) = session.answer() else { return Ok(()) };
+    let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
     let statement = Statement {
         study: study.id,
-        pair: session.walked(),
+        pair: walked,
         fields: ("walk 2", "walk 3"),
         said: given.said,
         voice: Voice { source: Source::Subject, author: &author, note: &given.note },

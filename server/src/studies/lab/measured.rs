@@ -2,12 +2,12 @@
 //! walk may be known.
 
 use super::recording::{EmgReading, MotionReading, WHAT};
-use super::session::{still_shown, trial_of};
+use super::session::{gait_of, still_shown};
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
-use crate::store::lab_sessions::{self, Act};
+use crate::store::lab_sessions;
 use crate::store::{Connection, LabRecordingId, LabSessionId, Store, StoreError, Writer, gaits};
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
@@ -168,10 +168,8 @@ fn view(result: EmgResult, gaits: &[(u8, Gait)]) -> EmgView {
 /// What the database reports.
 pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Result<Option<Gait>, Error> {
     let session = lab_sessions::get(db, id).await?;
-    if walk == 1 || session.done(Act::Unblinded).is_none() {
-        return Ok(None);
-    }
-    match gaits::get(db, trial_of(&session, walk)?).await {
+    let Some(gait) = gait_of(&session, walk) else { return Ok(None) };
+    match gaits::get(db, gait).await {
         Ok(gait) => Ok(Some(gait)),
         Err(StoreError::Missing { .. }) => Ok(None),
         Err(error) => Err(error.into()),

@@ -1,9 +1,9 @@
 //! The paper's experiment: a person walks without the device and with two gaits, blind to which is which.
 //!
-//! Walk 1 is the one without the device, which nobody can be blind to. The order of the two gaits is drawn from the
-//! study's seed in balanced blocks and kept; it is given out by an act of an administrator alone, as in blind
-//! comparisons. What is measured is known by the number of its walk until then, and so is what the person says of it: the
-//! learner hears that when the order is told.
+//! Walk 1 is the one without the device, which nobody can be blind to. The order of the two gaits is an allocation
+//! (`store::allocations`), drawn by the operating system in balanced blocks; an administrator unblinds the session. Until
+//! then the device alone gets the controller files, or a person of whom that is recorded. What is measured is known by the
+//! number of its walk, and so is what the person says of it: the learner hears that when the session is unblinded.
 
 mod answer;
 mod measured;
@@ -19,6 +19,7 @@ pub use recording::{
     Brought, Checked, EmgReading, FileForm, MotionReading, NewEmg, NewMotion, brought, check_kept, keep,
 };
 pub use session::{
-    Condition, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView, checked_walk, close,
-    gait_to_walk_with, in_the_lab, plan, record_walk, still_open, unblind, was_recorded,
+    Condition, GaitOfWalk, InTheLab, NewSession, RecordedWalk, SessionState, SessionView, WALKS, WalkView,
+    checked_walk, close, for_device, gaits_to_walk_with, in_the_lab, plan, record_walk, still_open, unblind,
+    was_recorded,
 };

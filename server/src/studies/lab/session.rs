@@ -1,13 +1,13 @@
 //! The life of a session: planned, walk after walk recorded, closed; and who may see what of it.
 
 use super::answer::{self, AnswerView};
+use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
+use crate::store::allocations::{self, DeviceFile, Lot};
 use crate::store::audit::{self, Actor};
 use crate::store::lab_sessions::{self, Act, Done, LabSession, NewLabSession};
 use crate::store::{Connection, Instant, LabSessionId, StudyId, TrialId, Writer, consents, studies};
-use crate::studies::balance::comes_first;
-use crate::studies::seed::{Purpose, derive};
 use crate::studies::walkable::{self, NotWalkable, WalkableGait};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -86,7 +86,7 @@ pub struct WalkView {
     pub condition: Option<Condition>,
     /// That it was recorded.
     pub recorded: Option<Done>,
-    /// Whether it was recorded after somebody had been told which gait is which.
+    /// Whether it was recorded after the session was unblinded, or by somebody who had fetched a controller file.
     pub after_unblinding: bool,
 }
 
@@ -111,8 +111,12 @@ pub struct SessionView {
     pub walks: Vec<WalkView>,
     /// What the person who walked said of the two gaits; none: nothing that stands.
     pub answer: Option<AnswerView>,
-    /// Who was told the order and why; none: nobody was.
+    /// Who unblinded it and why; none: it is blind.
     pub unblinded: Option<Done>,
+    /// Whether the order is in this record. A study that came here while the session was blind has none.
+    pub order_included: bool,
+    /// Who got the controller files of its walks.
+    pub device_files: Vec<DeviceFile>,
     /// That it was closed.
     pub closed: Option<Done>,
     /// Who planned it.
@@ -123,15 +127,18 @@ pub struct SessionView {
 
 impl From<&LabSession> for SessionView {
     fn from(session: &LabSession) -> Self {
-        let unblinded = session.done(Act::Unblinded).cloned();
         let walk = |number| {
             let place = |act| session.acts.iter().position(|(known, _)| *known == act);
-            let recorded = place(Act::Walk(number));
+            let recorded = session.done(Act::Walk(number));
+            let unblinded_before = place(Act::Unblinded)
+                .zip(place(Act::Walk(number)))
+                .is_some_and(|(unblinded, walked)| unblinded < walked);
             WalkView {
                 number,
-                condition: (number == 1 || unblinded.is_some()).then(|| condition(session, number)),
-                recorded: session.done(Act::Walk(number)).cloned(),
-                after_unblinding: place(Act::Unblinded).zip(recorded).is_some_and(|(told, walked)| told < walked),
+                condition: condition(session, number),
+                recorded: recorded.cloned(),
+                after_unblinding: unblinded_before
+                    || recorded.is_some_and(|done| has_file(session, &done.actor, done.at)),
             }
         };
         Self {
@@ -143,46 +150,101 @@ impl From<&LabSession> for SessionView {
             gait_two: session.gait_two,
             notes: session.notes.clone(),
             walks: (1..=WALKS).map(walk).collect(),
-            answer: session.answer().map(AnswerView::from),
+            answer: session.answer().map(|answer| AnswerView::of(session, answer)),
+            unblinded: session.done(Act::Unblinded).cloned(),
+            order_included: session.allocation.included,
+            device_files: session.allocation.files.clone(),
             closed: session.done(Act::Closed).cloned(),
             planned_by: session.actor.clone(),
             created_at: session.created_at,
-            unblinded,
         }
     }
 }
 
-fn condition(session: &LabSession, walk: u8) -> Condition {
-    match (walk, session.gait_one_first) {
-        (1, _) => Condition::Normal,
-        (2, true) | (3, false) => Condition::GaitOne,
-        _ => Condition::GaitTwo,
+/// What a walk is done with; none as long as that is blinded.
+fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
+    if walk == 1 {
+        return Some(Condition::Normal);
+    }
+    let one_first = session.allocation.gait_one_first?;
+    Some(if one_first == (walk == 2) { Condition::GaitOne } else { Condition::GaitTwo })
+}
+
+/// The gait of a walk; none without the device, and as long as the session is blinded.
+pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
+    match condition(session, walk)? {
+        Condition::Normal => None,
+        Condition::GaitOne => Some(session.gait_one),
+        Condition::GaitTwo => Some(session.gait_two),
     }
 }
 
-/// The trial of a walk, whoever may know it.
+/// Whether somebody had fetched a controller file of this session before an instant.
+pub(super) fn has_file(session: &LabSession, actor: &str, at: Instant) -> bool {
+    session.allocation.files.iter().any(|file| !file.to_device && file.actor == actor && file.at <= at)
+}
+
+/// Which of a session's two gaits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GaitOfWalk {
+    /// Gait one.
+    One,
+    /// Gait two.
+    Two,
+}
+
+/// Gives out the controller file of a walk: tells which gait it is with, and records who was told. Only the device's own
+/// token leaves the session blind to its caller.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a walk without the device and for one that there is not.
-pub(super) fn trial_of(session: &LabSession, walk: u8) -> Result<TrialId, Error> {
-    match condition(session, checked_walk(walk)?) {
-        Condition::Normal => Err(Error::invalid("walk", walk, "2 or 3: walk 1 is without the device")),
-        Condition::GaitOne => Ok(session.gait_one),
-        Condition::GaitTwo => Ok(session.gait_two),
+/// [`Error::Invalid`] for a walk without the device and for one that there is not, [`Error::Conflict`] when the order is not
+/// in this record or the subject withdrew.
+pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, walk: u8) -> Result<GaitOfWalk, Error> {
+    let walk = checked_device_walk(walk)?;
+    let session = still_shown(writer, id).await?;
+    if !session.allocation.included {
+        return Err(not_included());
+    }
+    let to_device = caller.is_device();
+    let is_one = allocations::for_device(writer, id, walk, (&caller.actor, to_device)).await?;
+    let detail = json!({ "walk": walk, "to_device": to_device });
+    audit::append(writer, &caller.actor, "lab_session.device_file", &format!("lab session {id}"), &detail).await?;
+    Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::One } else { GaitOfWalk::Two })
+}
+
+/// The number of a walk, if it is one with the device.
+///
+/// # Errors
+/// [`Error::Invalid`].
+fn checked_device_walk(walk: u8) -> Result<u8, Error> {
+    match checked_walk(walk)? {
+        1 => Err(Error::invalid("walk", walk, "2 or 3: walk 1 is without the device")),
+        with_device => Ok(with_device),
     }
 }
 
-/// The gait that the subject is about to walk with.
+fn not_included() -> Error {
+    Error::conflict(
+        "the archive that this session came from left its order out, because the session was blind: unblind it where it was \
+         planned",
+    )
+}
+
+/// The two gaits of a session in which the subject is about to walk: gait one and gait two.
 ///
 /// # Errors
-/// As [`trial_of`], and [`Error::Conflict`] when the session is closed or one of its two gaits may not be walked with.
-pub async fn gait_to_walk_with(db: &mut Connection, session: &LabSession, walk: u8) -> Result<WalkableGait, Error> {
-    let trial = trial_of(session, walk)?;
+/// [`Error::Invalid`] for a walk without the device and for one that there is not, [`Error::Conflict`] when the session is
+/// closed or one of its two gaits may not be walked with.
+pub async fn gaits_to_walk_with(
+    db: &mut Connection,
+    session: &LabSession,
+    walk: u8,
+) -> Result<(WalkableGait, WalkableGait), Error> {
+    checked_device_walk(walk)?;
     if session.done(Act::Closed).is_some() {
         return Err(Error::conflict("the session is closed: nobody walks in it any more"));
     }
-    let (one, two) = both_walkable(db, session).await?;
-    Ok(if trial == one.trial() { one } else { two })
+    both_walkable(db, session).await
 }
 
 /// Both gaits of a session. The refusal does not say which of them may not be walked with: that would tell the order to
@@ -211,20 +273,19 @@ pub fn checked_walk(walk: u8) -> Result<u8, Error> {
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`], or what the database reports.
 pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewSession) -> Result<LabSession, Error> {
-    let seed = studies::get(writer, study).await?.plan.seed;
+    studies::get(writer, study).await?;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
     walkable::admit_pair(writer, study, ("gait_one", "gait_two"), (new.gait_one, new.gait_two)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
-    let lot = derive(seed, Purpose::LabSession, before as u64 / 4);
     let row = NewLabSession {
         study_id: study,
         number: u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1),
         gait_one: new.gait_one,
         gait_two: new.gait_two,
-        gait_one_first: comes_first(lot, before),
         notes: &new.notes,
     };
     let id = lab_sessions::insert(writer, actor, &row).await?;
+    allocations::of_session(writer, id, row.number, Lot::draw()?).await?;
     let detail = json!({ "study": study, "number": row.number, "gait_one": row.gait_one, "gait_two": row.gait_two });
     audit::append(writer, actor, "lab_session.plan", &format!("lab session {id}"), &detail).await?;
     Ok(lab_sessions::get(writer, id).await?)
@@ -264,7 +325,7 @@ pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLa
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(Act::Walk(walk))).map(|done| done.at),
         asks: answer::asks(&session),
-        answer: session.answer().map(AnswerView::from),
+        answer: session.answer().map(|answer| AnswerView::of(&session, answer)),
         can_be_taken_back: answer::can_be_taken_back(&session),
         closed,
     })
@@ -358,16 +419,18 @@ pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &
     Ok(lab_sessions::get(writer, id).await?)
 }
 
-/// Tells which walk is with which gait, from now on everybody who may read. The learner then hears what the person who
-/// walked said.
+/// Unblinds a session: everybody who may read sees which walk is with which gait from now on. The learner then hears what the
+/// person who walked said.
 ///
 /// # Errors
-/// [`Error::Invalid`] without a reason, [`Error::Conflict`] when that was told before.
+/// [`Error::Invalid`] without a reason, [`Error::Conflict`] when it is unblinded, or its order is not in this record.
 pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
-    let reason = printable::reason("reason", reason, ": why blindness ends")?;
-    still_shown(writer, id).await?;
+    let reason = printable::reason("reason", reason, ": why the session is unblinded")?;
+    if !still_shown(writer, id).await?.allocation.included {
+        return Err(not_included());
+    }
     if !lab_sessions::act(writer, actor, id, Act::Unblinded, reason).await? {
-        return Err(Error::conflict("the order of this session was told before"));
+        return Err(Error::conflict("this session was unblinded before"));
     }
     let detail = json!({ "reason": reason });
     audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;

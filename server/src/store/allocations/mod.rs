@@ -1,0 +1,260 @@
+//! Allocations: which gait comes first, in a lab session and in a rater's pair.
+//!
+//! No other module reads these tables, and every statement here that gives an order out names in its own `where` why it may
+//! be known: the session or the rater was unblinded, the pair is the asking rater's own, or the device fetches its file and
+//! that is written down. The state of a block is read by the draw alone.
+
+mod lot;
+
+pub use lot::Lot;
+
+use super::audit::Actor;
+use super::presentations::{Presentation, SELECT, Said};
+use super::{Connection, Instant, LabDeviceFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now};
+use lot::Place;
+use serde::Serialize;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
+use utoipa::ToSchema;
+
+/// That an order was revealed, for `l.id` in a statement: the session was unblinded, or somebody who reads has its file.
+const REVEALED: &str = "(exists (select 1 from lab_acts t where t.session_id = l.id and t.act = 'unblinded') \
+                        or exists (select 1 from lab_device_files f where f.session_id = l.id and f.to_device = 0))";
+/// A session belongs to a block of at most so many.
+const LARGEST_BLOCK: u32 = 4;
+
+/// Draws which gait walk 2 of a session is with. Sessions with the same number balance each other, subject by subject.
+///
+/// # Errors
+/// A violated constraint when the session has an allocation, or what the database reports.
+pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32, lot: Lot) -> StoreResult<()> {
+    let drawn = lot.place(&open_block(db, number).await?);
+    sqlx::query(
+        "insert into lab_allocations (session_id, gait_one_first, stratum, block_size, place, nonce, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(session)
+    .bind(drawn.one_first)
+    .bind(number)
+    .bind(drawn.size)
+    .bind(drawn.place)
+    .bind(lot.nonce())
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// The places that are taken in the block that is open, in order. A block also ends when an order in it was revealed: what
+/// is drawn next must not follow from it.
+async fn open_block(db: &mut Connection, number: u32) -> StoreResult<Vec<Place>> {
+    let sql = format!(
+        "select a.gait_one_first, a.block_size, a.place, {REVEALED} as revealed \
+         from lab_allocations a join lab_sessions l on l.id = a.session_id \
+         where a.stratum = ? order by a.rowid desc limit {LARGEST_BLOCK}"
+    );
+    let rows = sqlx::query(AssertSqlSafe(sql)).bind(number).fetch_all(db).await?;
+    let mut taken = Vec::new();
+    for row in &rows {
+        let place = Place {
+            one_first: row.try_get("gait_one_first")?,
+            size: row.try_get("block_size")?,
+            place: row.try_get("place")?,
+        };
+        if row.try_get("revealed")? {
+            return Ok(Vec::new());
+        }
+        taken.push(place);
+        if place.place == 1 {
+            break;
+        }
+    }
+    taken.reverse();
+    Ok(if taken.last().is_some_and(|last| last.place == last.size) { Vec::new() } else { taken })
+}
+
+/// What may be known of the order of a session.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OfSession {
+    /// Whether the order is in this record. A study that came here while it was blinded has none.
+    pub included: bool,
+    /// Whether walk 2 is with gait one; none before the session is unblinded.
+    pub gait_one_first: Option<bool>,
+    /// Who got a controller file of its walks, in order.
+    pub files: Vec<DeviceFile>,
+}
+
+/// That a controller file of a walk was given out.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct DeviceFile {
+    /// 2 or 3.
+    pub walk: u8,
+    /// Whether the device itself fetched it. Otherwise whoever fetched it could know which gait the walk is with.
+    pub to_device: bool,
+    /// Who.
+    pub actor: String,
+    /// When.
+    pub at: Instant,
+}
+
+/// What may be known of the order of a session.
+///
+/// # Errors
+/// What the database reports.
+pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<OfSession> {
+    let order = sqlx::query(
+        "select iif(exists (select 1 from lab_acts t where t.session_id = a.session_id and t.act = 'unblinded'), \
+         a.gait_one_first, null) from lab_allocations a where a.session_id = ?",
+    );
+    let order = order.bind(id).fetch_optional(&mut *db).await?;
+    let included = order.is_some();
+    let gait_one_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
+    let files = sqlx::query("select * from lab_device_files where session_id = ? order by id").bind(id);
+    let files = files.fetch_all(db).await?.iter().map(device_file).collect::<StoreResult<_>>()?;
+    Ok(OfSession { included, gait_one_first, files })
+}
+
+fn device_file(row: &SqliteRow) -> StoreResult<DeviceFile> {
+    Ok(DeviceFile {
+        walk: row.try_get("walk")?,
+        to_device: row.try_get("to_device")?,
+        actor: row.try_get("actor")?,
+        at: row.try_get("created_at")?,
+    })
+}
+
+/// Writes down that the controller file of a walk is given out, and tells whether it is that of gait one; none when the order
+/// is not in this record.
+///
+/// # Errors
+/// A violated constraint or trigger, or what the database reports.
+pub async fn for_device(
+    db: &mut Connection,
+    session: LabSessionId,
+    walk: u8,
+    (actor, to_device): (&Actor, bool),
+) -> StoreResult<Option<bool>> {
+    let id = LabDeviceFileId::fresh();
+    sqlx::query(
+        "insert into lab_device_files (id, session_id, walk, to_device, actor, created_at) values (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(session)
+    .bind(walk)
+    .bind(to_device)
+    .bind(actor.as_str())
+    .bind(now())
+    .execute(&mut *db)
+    .await?;
+    let row = sqlx::query(
+        "select a.gait_one_first = (f.walk = 2) from lab_allocations a \
+         join lab_device_files f on f.session_id = a.session_id where f.id = ?",
+    );
+    Ok(row.bind(id).fetch_optional(db).await?.map(|row| row.try_get(0)).transpose()?)
+}
+
+/// Whether somebody who reads has a controller file of a lab session of this study.
+///
+/// # Errors
+/// What the database reports.
+pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> StoreResult<bool> {
+    let row = sqlx::query(
+        "select 1 from lab_device_files f join lab_sessions l on l.id = f.session_id \
+         where l.study_id = ? and f.actor = ? and f.to_device = 0 limit 1",
+    );
+    Ok(row.bind(study).bind(actor.as_str()).fetch_optional(db).await?.is_some())
+}
+
+/// Draws which gait of a pair is shown first: a fair coin each time, because the answers that the study hears tell the orders
+/// of earlier pairs to whoever knows what the rater said. A pair that comes `again` after its answer was taken back keeps its
+/// sides.
+///
+/// # Errors
+/// A violated constraint when the pair has an allocation, or what the database reports.
+pub async fn of_pair(
+    db: &mut Connection,
+    id: PresentationId,
+    again: Option<PresentationId>,
+    lot: Lot,
+) -> StoreResult<()> {
+    sqlx::query(
+        "insert into presentation_allocations (presentation_id, swapped, nonce, created_at) \
+         values (?1, coalesce((select swapped from presentation_allocations where presentation_id = ?2), ?3), ?4, ?5)",
+    )
+    .bind(id)
+    .bind(again)
+    .bind(lot.coin())
+    .bind(lot.nonce())
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// A pair with its sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sided {
+    /// The pair.
+    pub presentation: Presentation,
+    swapped: bool,
+}
+
+impl Sided {
+    /// The gaits, in the order in which they are shown.
+    pub fn shown(&self) -> (TrialId, TrialId) {
+        let (one, other) = self.presentation.pair();
+        if self.swapped { (other, one) } else { (one, other) }
+    }
+
+    /// What was said of the sides, about the pair; and the other way round.
+    pub fn turned(&self, said: Said) -> Said {
+        if self.swapped { said.swapped() } else { said }
+    }
+
+    /// The answer, about the sides.
+    pub fn answer(&self) -> Option<Said> {
+        self.presentation.answer.map(|said| self.turned(said))
+    }
+}
+
+/// The rater's own pair with this token.
+///
+/// # Errors
+/// What the database reports.
+pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreResult<Option<Sided>> {
+    let found = sided("where p.token = ? and p.rater = ?", &[token, rater], db).await?;
+    Ok(found.into_iter().next())
+}
+
+/// The pairs of the raters who were unblinded in a study, in the order in which they were drawn.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Sided>> {
+    let rest = "where p.study_id = ? and exists \
+                (select 1 from unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
+    sided(rest, &[&study.to_string()], db).await
+}
+
+/// The pairs of which `rest` says why their sides may be known.
+async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> StoreResult<Vec<Sided>> {
+    let columns = SELECT.replacen("select p.*", "select p.*, s.swapped", 1);
+    let sql = format!("{columns} join presentation_allocations s on s.presentation_id = p.id {rest}");
+    let mut query = sqlx::query(AssertSqlSafe(sql));
+    for value in values {
+        query = query.bind((*value).to_owned());
+    }
+    let row = |row: &SqliteRow| -> StoreResult<Sided> {
+        Ok(Sided { presentation: Presentation::from_row(row)?, swapped: row.try_get("swapped")? })
+    };
+    query.fetch_all(db).await?.iter().map(row).collect()
+}
+
+/// Whether the sides of a pair are in this record.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_included(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
+    let row = sqlx::query("select 1 from presentation_allocations where presentation_id = ?").bind(id);
+    Ok(row.fetch_optional(db).await?.is_some())
+}

@@ -1,0 +1,25 @@
+//! What an archive holds of orders: only those that were unblinded.
+
+use super::row::{Cell, Row};
+
+/// Allocations of sessions that were unblinded; the place of `?` is the study.
+pub(super) const LAB: &str = "session_id in (select l.id from lab_sessions l join lab_acts t on t.session_id = l.id \
+                              where l.study_id = ? and t.act = 'unblinded')";
+/// Allocations of pairs of raters who were unblinded.
+pub(super) const PAIRS: &str = "presentation_id in (select p.id from presentations p join unblindings u \
+                                on u.study_id = p.study_id and u.rater = p.rater where p.study_id = ?)";
+
+/// A row without what else says an order: the column of the baseline, and the place in a block that others of it share.
+#[must_use]
+pub fn masked(table: &str, mut row: Row) -> Row {
+    match table {
+        "lab_sessions" => row.set("gait_one_first", Cell::Integer(0)),
+        "lab_allocations" => {
+            for column in ["stratum", "block_size", "place"] {
+                row.set(column, Cell::Null);
+            }
+        }
+        _ => {}
+    }
+    row
+}

@@ -1,0 +1,740 @@
+//! Allocations: balanced, drawn by the operating system, and concealed from everything but the device until somebody unblinds.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::{Method, StatusCode};
+use gaitwright::access::{Right, Role};
+use gaitwright::store::allocations::{self, Lot};
+use gaitwright::store::audit::Actor;
+use gaitwright::store::presentations::{self, Kind, NewPresentation};
+use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright::store::trials::{Trial, TrialState};
+use gaitwright::store::{Connection, LabSessionId, Store, StudyId, TokenId, TrialId, commit, lab_sessions};
+use gaitwright::studies::lab::{self, NewSession};
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::archives::{exported, import};
+use gaitwright_tests::callers::{self, As, FORM, rater_of, send, signed_in, token};
+use gaitwright_tests::consistent::Consistent;
+use gaitwright_tests::orders::{gait_one_first, sides};
+use gaitwright_tests::service::{Answer, Service};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
+use std::collections::BTreeMap;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Of a chi-squared distribution with one degree of freedom, exceeded once in a million: these draws are truly random.
+const CRITICAL: f64 = 23.93;
+const JSON: &str = "application/json";
+
+fn chi_squared(count: usize, of: usize) -> f64 {
+    let half = of as f64 / 2.0;
+    2.0 * (count as f64 - half).powi(2) / half
+}
+
+/// Whether so many right guesses of so many are chance: within five standard deviations of one half, which chance leaves
+/// less than once in a million.
+fn is_chance(right: usize, of: usize) -> bool {
+    (right as f64 - of as f64 / 2.0).abs() <= 2.5 * (of as f64).sqrt()
+}
+
+async fn finished(service: &Service) -> (StudyId, Vec<Trial>) {
+    let study = service.study(|new| new.trial_budget = 6).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let mut trials = service.trials(study).await;
+    trials.retain(|trial| trial.state == TrialState::Converged);
+    (study, trials)
+}
+
+/// A study that ended, so often as there are `studies`, with gaits of the first one's kind: rows alone.
+async fn copies(writer: &mut Connection, study: StudyId, studies: u32) -> Vec<(StudyId, TrialId, TrialId)> {
+    let columns = async |writer: &mut Connection, table: &str| -> Vec<String> {
+        let rows =
+            sqlx::query("select name from pragma_table_info(?) where name not in ('id', 'study_id', 'trial_id')")
+                .bind(table);
+        rows.fetch_all(&mut *writer).await.unwrap().iter().map(|row| row.get(0)).collect()
+    };
+    let (of_study, of_trial) =
+        (columns(writer, "studies").await.join(", "), columns(writer, "trials").await.join(", "));
+    let (of_gait, of_certificate) =
+        (columns(writer, "gaits").await.join(", "), columns(writer, "certificates").await.join(", "));
+    let mut made = Vec::new();
+    for _ in 0..studies {
+        let copy = StudyId::fresh();
+        let sql = format!("insert into studies (id, {of_study}) select ?, {of_study} from studies where id = ?");
+        sqlx::query(AssertSqlSafe(sql)).bind(copy).bind(study).execute(&mut *writer).await.unwrap();
+        let gaits = [TrialId::fresh(), TrialId::fresh()];
+        let numbers = "select number from trials where study_id = ? and state = 'converged' order by number limit 2";
+        let numbers = sqlx::query(numbers).bind(study).fetch_all(&mut *writer).await.unwrap();
+        for (gait, number) in gaits.iter().zip(&numbers) {
+            let sql = format!(
+                "insert into trials (id, study_id, {of_trial}) select ?, ?, {of_trial} from trials \
+                 where study_id = ? and number = ?"
+            );
+            let query = sqlx::query(AssertSqlSafe(sql)).bind(gait).bind(copy).bind(study);
+            query.bind(number.get::<i64, _>(0)).execute(&mut *writer).await.unwrap();
+            // What makes a gait walkable.
+            for (table, columns) in [("gaits", &of_gait), ("certificates", &of_certificate)] {
+                let sql = format!(
+                    "insert into {table} (trial_id, {columns}) select ?, {columns} from {table} where trial_id = \
+                     (select id from trials where study_id = ? and number = ?)"
+                );
+                let query = sqlx::query(AssertSqlSafe(sql)).bind(gait).bind(study).bind(number.get::<i64, _>(0));
+                query.execute(&mut *writer).await.unwrap();
+            }
+        }
+        made.push((copy, gaits[0], gaits[1]));
+    }
+    made
+}
+
+async fn one_service() -> (TempDir, Service) {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    (folder, service)
+}
+
+fn session_of((study, one, two): (StudyId, TrialId, TrialId)) -> (StudyId, NewSession) {
+    (study, NewSession { gait_one: one, gait_two: two, notes: String::new() })
+}
+
+#[tokio::test]
+async fn orders_of_10_000_lab_sessions_of_many_subjects_are_balanced() {
+    let (_folder, service) = one_service().await;
+    let (study, _) = finished(&service).await;
+    let mut writer = service.store.write().await.unwrap();
+    let studies = copies(&mut writer, study, 2500).await;
+    for number in 1..=4 {
+        for &(study, gait_one, gait_two) in &studies {
+            let new = lab_sessions::NewLabSession { study_id: study, number, gait_one, gait_two, notes: "" };
+            let id = lab_sessions::insert(&mut writer, &Actor::program(), &new).await.unwrap();
+            allocations::of_session(&mut writer, id, number, Lot::draw().unwrap()).await.unwrap();
+        }
+    }
+    let rows = "select a.gait_one_first, a.stratum, a.block_size, a.place from lab_allocations a order by a.rowid";
+    let rows = sqlx::query(rows).fetch_all(&mut **writer).await.unwrap();
+    drop(writer);
+    assert_eq!(rows.len(), 10_000);
+    let mut of_number = BTreeMap::<i64, Vec<bool>>::new();
+    let mut of_place = BTreeMap::<(i64, i64), Vec<bool>>::new();
+    for row in &rows {
+        let first: bool = row.get(0);
+        of_number.entry(row.get(1)).or_default().push(first);
+        of_place.entry((row.get(2), row.get(3))).or_default().push(first);
+    }
+    for (number, orders) in &of_number {
+        // Session by session the orders of all subjects balance each other: no more than half a block is ever open.
+        let mut lead = 0_i32;
+        for first in orders {
+            lead += if *first { 1 } else { -1 };
+            assert!(lead.abs() <= 2, "session {number}");
+        }
+    }
+    for (place, orders) in &of_place {
+        let ones = orders.iter().filter(|first| **first).count();
+        let chi = chi_squared(ones, orders.len());
+        assert!(chi < CRITICAL, "place {place:?}: {ones} of {}: {chi}", orders.len());
+    }
+    // Sessions of the same study say nothing about each other.
+    let of_study = |number: i64| &of_number[&number];
+    let same = of_study(1).iter().zip(of_study(2)).filter(|(a, b)| a == b).count();
+    assert!(chi_squared(same, 2500) < CRITICAL, "{same}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn sides_of_10_000_pairs_are_balanced_and_follow_from_no_earlier_pair() {
+    let (_folder, service) = one_service().await;
+    let (study, trials) = finished(&service).await;
+    let mut writer = service.store.write().await.unwrap();
+    for number in 1..=10_000 {
+        let new = NewPresentation {
+            token: format!("{number:064}"),
+            study_id: study,
+            rater: "R".to_owned(),
+            number,
+            kind: Kind::New,
+            pair: (trials[1].id, trials[0].id),
+            repeats: None,
+            unblinded: false,
+        };
+        let id = presentations::insert(&mut writer, &new).await.unwrap();
+        allocations::of_pair(&mut writer, id, None, Lot::draw().unwrap()).await.unwrap();
+    }
+    let rows = "select swapped from presentation_allocations order by rowid";
+    let rows = sqlx::query(rows).fetch_all(&mut **writer).await.unwrap();
+    drop(writer);
+    let swapped: Vec<bool> = rows.iter().map(|row| row.get(0)).collect();
+    let ones = swapped.iter().filter(|one| **one).count();
+    assert!(chi_squared(ones, 10_000) < CRITICAL, "{ones}");
+    for distance in 1..=4 {
+        let same = swapped.iter().zip(&swapped[distance..]).filter(|(a, b)| a == b).count();
+        assert!(chi_squared(same, 10_000 - distance) < CRITICAL, "{same} at distance {distance}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn the_same_seed_gives_different_orders() {
+    let (_folder, service) = one_service().await;
+    let mut first_sessions = Vec::new();
+    for _ in 0..24 {
+        // Seed 1, as every study by default.
+        let (study, trials) = finished(&service).await;
+        let body = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+        let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await.json();
+        first_sessions.push(gait_one_first(&service.store, planned["id"].as_str().unwrap().parse().unwrap()).await);
+    }
+    let ones = first_sessions.iter().filter(|first| **first).count();
+    assert!((10..=14).contains(&ones), "first sessions of 24 subjects are balanced: {first_sessions:?}");
+    service.stop().await;
+}
+
+/// What a program can guess from: everything that is written or served but the allocations themselves.
+struct Seen {
+    /// Rows of every other table, as text.
+    tables: BTreeMap<String, Vec<Vec<String>>>,
+}
+
+impl Seen {
+    async fn of(store: &Store) -> Self {
+        let mut reader = store.read().await.unwrap();
+        let names = "select name from sqlite_master where type = 'table' \
+                     and name not in ('lab_allocations', 'presentation_allocations')";
+        let mut tables = BTreeMap::new();
+        for name in sqlx::query(names).fetch_all(&mut **reader).await.unwrap() {
+            let name: String = name.get(0);
+            let rows =
+                sqlx::query(AssertSqlSafe(format!("select * from {name}"))).fetch_all(&mut **reader).await.unwrap();
+            let text = |row: &sqlx::sqlite::SqliteRow| -> Vec<String> {
+                row.columns().iter().map(|column| cell(row, column.ordinal())).collect()
+            };
+            tables.insert(name, rows.iter().map(text).collect());
+        }
+        Self { tables }
+    }
+
+    /// The columns of a table that hold one of two values, as guesses of the orders of its rows.
+    fn column(&self, table: &str, column: usize) -> Vec<&str> {
+        self.tables[table].iter().map(|row| row[column].as_str()).collect()
+    }
+}
+
+fn cell(row: &sqlx::sqlite::SqliteRow, place: usize) -> String {
+    let raw = row.try_get_raw(place).unwrap();
+    match raw.type_info().name() {
+        _ if raw.is_null() => String::new(),
+        "INTEGER" | "BOOLEAN" => row.get::<i64, _>(place).to_string(),
+        "REAL" => row.get::<f64, _>(place).to_string(),
+        "BLOB" => format!("{:?}", row.get::<Vec<u8>, _>(place)),
+        _ => row.get(place),
+    }
+}
+
+/// One bit of a text: a program that knows no better guesses by such.
+fn bit(text: &str) -> bool {
+    Sha256::digest(text.as_bytes())[0] & 1 == 1
+}
+
+/// Every rule by which a guess can follow from the rows of a table that has one row per order: each column as it is, each bit of
+/// the sum of its bytes, and whether it grew since the row before.
+fn guesses(seen: &Seen, table: &str) -> Vec<(String, Vec<bool>)> {
+    let width = seen.tables[table].first().map_or(0, Vec::len);
+    let mut all = Vec::new();
+    for column in 0..width {
+        let values = seen.column(table, column);
+        let sum = |text: &&str| text.bytes().map(u64::from).sum::<u64>();
+        for place in 0..4 {
+            all.push((
+                format!("{table}.{column} bit {place}"),
+                values.iter().map(|v| sum(v) >> place & 1 == 1).collect(),
+            ));
+        }
+        all.push((format!("{table}.{column} hash"), values.iter().map(|v| bit(v)).collect()));
+        all.push((
+            format!("{table}.{column} last"),
+            values.iter().map(|v| v.ends_with(['1', '3', '5', '7', '9'])).collect(),
+        ));
+    }
+    all
+}
+
+#[tokio::test]
+async fn a_program_that_reads_everything_but_allocations_guesses_1_000_orders_no_better_than_chance() {
+    let (_folder, service) = one_service().await;
+    let (study, _) = finished(&service).await;
+    let mut writer = service.store.write().await.unwrap();
+    let studies = copies(&mut writer, study, 250).await;
+    commit(writer).await.unwrap();
+    let mut ids = Vec::new();
+    for _ in 0..4 {
+        for &of in &studies {
+            let (study, new) = session_of(of);
+            // Sealed in a change of its own, as by a request.
+            let mut writer = service.store.write().await.unwrap();
+            ids.push(lab::plan(&mut writer, &Actor::program(), study, &new).await.unwrap().id);
+            commit(writer).await.unwrap();
+        }
+    }
+    let mut truth = Vec::new();
+    for id in &ids {
+        truth.push(gait_one_first(&service.store, *id).await);
+    }
+    let seen = Seen::of(&service.store).await;
+    assert_eq!(seen.tables["lab_sessions"].len(), 1000);
+    let mut tried = 0;
+    for (rule, guess) in guesses(&seen, "lab_sessions") {
+        let right = guess.iter().zip(&truth).filter(|(a, b)| a == b).count();
+        assert!(is_chance(right, 1000), "{rule}: {right} of 1000");
+        tried += 1;
+    }
+    // The seed of the study and the number of the session, by which earlier versions drew.
+    let by_seed = |k: usize| bit(&format!("1 lab session {}", k / 250));
+    assert!(is_chance((0..1000).filter(|k| by_seed(*k) == truth[*k]).count(), 1000));
+
+    // The seal of an allocation is a hash of its row. Without the nonce it would tell: all but the order is known or can be
+    // tried.
+    let seals = &seen.tables["seals"];
+    let mut right = 0;
+    for (id, order) in ids.iter().zip(&truth) {
+        let seal = seals.iter().find(|row| row[1] == "lab_allocations" && row[2] == id.to_string()).unwrap();
+        let planned = seen.tables["lab_sessions"].iter().find(|row| row[0] == id.to_string()).unwrap();
+        let tried = by_hash(&seal[3], &id.to_string(), planned.last().unwrap());
+        right += usize::from(tried.unwrap_or_else(|| bit(&seal[3])) == *order);
+        assert_eq!(tried, None, "the hash of a row tells the order");
+    }
+    assert!(is_chance(right, 1000), "{right}");
+    assert!(tried > 40, "{tried}");
+    service.stop().await;
+}
+
+/// Tries every row that could have this hash but for its nonce.
+fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
+    for (size, place) in [(2, 1), (2, 2), (4, 1), (4, 2), (4, 3), (4, 4)] {
+        for stratum in 1..=4_i64 {
+            for first in [false, true] {
+                let mut hash = Sha256::new();
+                let mut column = |name: &str, kind: &str, bytes: &[u8]| {
+                    hash.update(format!("{name}\n{kind}\n{}\n", bytes.len()));
+                    hash.update(bytes);
+                };
+                column("block_size", "INTEGER", &i64::to_be_bytes(size));
+                column("created_at", "TEXT", created_at.as_bytes());
+                column("gait_one_first", "INTEGER", &i64::from(first).to_be_bytes());
+                column("place", "INTEGER", &i64::to_be_bytes(place));
+                column("session_id", "TEXT", session.as_bytes());
+                column("stratum", "INTEGER", &stratum.to_be_bytes());
+                if hex::encode(hash.finalize()) == sha256 {
+                    return Some(first);
+                }
+            }
+        }
+    }
+    None
+}
+
+#[tokio::test]
+async fn an_order_follows_from_no_order_that_was_unblinded_before_it_was_drawn() {
+    let (_folder, service) = one_service().await;
+    let (study, _) = finished(&service).await;
+    let mut writer = service.store.write().await.unwrap();
+    let studies = copies(&mut writer, study, 500).await;
+    let mut known: Vec<bool> = Vec::new();
+    let (mut right, mut of) = (0, 0);
+    // Subject after subject: planned, walked, unblinded. Whoever reads knows every order but the next.
+    for &planned in &studies {
+        for _ in 0..2 {
+            let (study, new) = session_of(planned);
+            let session = lab::plan(&mut writer, &Actor::program(), study, &new).await.unwrap();
+            // The orders so far want to be evened out; what is drawn must not.
+            let lead: i32 = known.iter().map(|first| if *first { 1 } else { -1 }).sum();
+            let guess = if lead == 0 { !known.last().copied().unwrap_or_default() } else { lead < 0 };
+            let unblinded = lab::unblind(&mut writer, &Actor::program(), session.id, "walked").await.unwrap();
+            let first = unblinded.allocation.gait_one_first.unwrap();
+            (right, of) = (right + usize::from(guess == first), of + 1);
+            known.push(first);
+        }
+    }
+    drop(writer);
+    assert_eq!(of, 1000);
+    assert!(is_chance(right, of), "{right} of {of}");
+    service.stop().await;
+}
+
+async fn get(service: &Service, who: &As, path: &str) -> Answer {
+    send(service, who, &Method::GET, path, "", "").await
+}
+
+async fn post(service: &Service, who: &As, path: &str, body: &Value) -> Answer {
+    send(service, who, &Method::POST, path, JSON, &body.to_string()).await
+}
+
+/// Exchanges every order of the record, and nothing else.
+async fn exchange_orders(database: &Path) {
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(database);
+    let pool = sqlx::sqlite::SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
+    for sql in [
+        "drop trigger lab_allocations_no_update",
+        "drop trigger presentation_allocations_no_update",
+        "update lab_allocations set gait_one_first = 1 - gait_one_first",
+        "update presentation_allocations set swapped = 1 - swapped",
+        "create trigger lab_allocations_no_update before update on lab_allocations \
+         begin select raise(abort, 'allocations are append-only'); end",
+        "create trigger presentation_allocations_no_update before update on presentation_allocations \
+         begin select raise(abort, 'allocations are append-only'); end",
+    ] {
+        sqlx::query(sql).execute(&pool).await.unwrap();
+    }
+    pool.close().await;
+}
+
+/// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a side.
+async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str) -> Vec<(String, String)> {
+    let document: Value = serde_json::from_str(&gaitwright::http::openapi::text().unwrap()).unwrap();
+    let mut paths: Vec<String> = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        if item["get"].is_object() {
+            paths.push(path.clone());
+        }
+    }
+    for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains("get(")) {
+        paths.extend(line.split('"').nth(1).map(str::to_owned));
+    }
+    // These differ from one call to the next, or are the sides as the rater sees them.
+    let left_out = [
+        "/metrics",
+        "/system",
+        "/api/v1/events",
+        "/api/v1/studies/{id}/events",
+        "/api/v1/backups",
+        "/api/v1/access-log",
+        "/access-log",
+        "/api/v1/studies/{id}/archive",
+    ];
+    let mut all = Vec::new();
+    for path in paths.iter().filter(|path| !left_out.contains(&path.as_str())) {
+        let sides = ["/rate/pair/", "/blind/"].iter().any(|part| path.contains(part));
+        for id in if path.contains("{id}") { ids } else { &ids[..1] } {
+            for (place, who) in callers.iter().enumerate() {
+                if path.contains("controller.json") || sides && place == 0 {
+                    continue;
+                }
+                let address = path.replace("{id}", id).replace("{token}", own).replace("{file}", "rmse.csv");
+                let answer = get(service, who, &address).await;
+                let text =
+                    answer.text.lines().filter(|line| !is_about_the_request(line)).collect::<Vec<_>>().join("\n");
+                all.push((format!("{place} {address}"), format!("{} {}", answer.status, without_request(&text))));
+            }
+        }
+    }
+    all
+}
+
+fn is_about_the_request(line: &str) -> bool {
+    // Each form has a key of its own.
+    line.contains("name=\"key\"") || line.contains("request_id")
+}
+
+/// Problem documents carry the identifier of their request.
+fn without_request(text: &str) -> String {
+    match serde_json::from_str::<Value>(text) {
+        Ok(Value::Object(mut document)) => {
+            for field in ["request_id", "instance", "seen_at", "uptime_s"] {
+                document.remove(field);
+            }
+            Value::Object(document).to_string()
+        }
+        _ => text
+            .split_inclusive(|c: char| !c.is_ascii_hexdigit())
+            .map(
+                |part| {
+                    if part.trim_end_matches(|c: char| !c.is_ascii_hexdigit()).len() == 32 { "REQUEST" } else { part }
+                },
+            )
+            .collect(),
+    }
+}
+
+#[tokio::test]
+async fn exchanging_every_order_changes_no_byte_that_is_served_before_unblinding() {
+    let (folder, service) = callers::service().await;
+    let (study, trials) = finished(&service).await;
+    let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
+    service.wait_for(human, &[StudyState::Waiting]).await;
+    let rater = rater_of(&service, &[study, human]).await;
+    let callers = [rater.clone(), signed_in(&service, Role::Admin).await, token(&service, &[Right::Read]).await];
+    // Answered pairs and an open one; sessions that are walked and answered, also with a walk that was unsafe.
+    let mut own = String::new();
+    for answer in ["first", "second", "no_difference", ""] {
+        service.wait_for(human, &[StudyState::Waiting]).await;
+        let mut pair = Value::Null;
+        while pair.is_null() {
+            let next = format!("/api/v1/studies/{human}/blind/next");
+            pair = post(&service, &rater, &next, &json!({})).await.json()["pair"].clone();
+        }
+        own = pair["token"].as_str().unwrap().to_owned();
+        if !answer.is_empty() {
+            post(&service, &rater, &format!("/api/v1/blind/{own}/answer"), &json!({"answer": answer})).await;
+        }
+    }
+    let mut sessions = Vec::new();
+    for answer in ["first", "unsafe_second"] {
+        let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+        let path = format!("/api/v1/studies/{study}/lab-sessions");
+        let planned = post(&service, &callers[1], &path, &plan).await;
+        let id = planned.json()["id"].as_str().unwrap().to_owned();
+        for walk in 1..=3 {
+            post(&service, &rater, &format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
+        }
+        post(&service, &rater, &format!("/api/v1/lab/{id}/answers"), &json!({"number": 1, "answer": answer})).await;
+        sessions.push(id);
+    }
+    // Nothing is being solved or said any more.
+    post(&service, &callers[1], &format!("/api/v1/studies/{human}/pause"), &json!({})).await;
+    let mut ids = vec![study.to_string(), human.to_string(), trials[0].id.to_string(), trials[1].id.to_string()];
+    ids.extend(sessions);
+    ids.push(service.subject().await.to_string());
+    let archive = async |store: &Store| [exported(store, study).await, exported(store, human).await];
+    let archives = archive(&service.store).await;
+    let before = everything(&service, &callers, &ids, &own).await;
+    let access = std::sync::Arc::clone(&service.access);
+    let drawn = sides(&service.store, human).await;
+    service.stop().await;
+
+    let database = folder.path().join("a.db");
+    let exchanged = folder.path().join("b.db");
+    std::fs::copy(&database, &exchanged).unwrap();
+    exchange_orders(&exchanged).await;
+    let mut service = Service::start_as_is(&exchanged, Analytic::default(), 1).await;
+    service.access = access;
+    let exchanged: Vec<_> = drawn.iter().map(|(first, second)| (*second, *first)).collect();
+    assert_eq!(sides(&service.store, human).await, exchanged);
+    assert!(archive(&service.store).await == archives, "archives differ");
+    let after = everything(&service, &callers, &ids, &own).await;
+    assert!(before.len() > 250, "{}", before.len());
+    let statuses = before.iter().filter(|(_, text)| text.starts_with("200")).count();
+    assert!(statuses > 100, "{statuses} of {}", before.len());
+    let pairs = before.iter().zip(&after).filter(|(before, after)| before != after);
+    let differing: Vec<&str> = pairs.map(|((what, _), _)| what.as_str()).collect();
+    assert!(differing.is_empty() && before.len() == after.len(), "{differing:?}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn an_archive_leaves_out_orders_that_are_blind_and_a_session_without_one_cannot_be_unblinded() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
+    let (study, trials) = finished(&service).await;
+    let body = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let mut ids: Vec<LabSessionId> = Vec::new();
+    for _ in 0..2 {
+        let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &body).await.json();
+        ids.push(planned["id"].as_str().unwrap().parse().unwrap());
+    }
+    let unblind = format!("/api/v1/lab-sessions/{}/unblind", ids[0]);
+    assert_eq!(service.post(&unblind, &json!({"reason": "walked"})).await.status, StatusCode::OK);
+    let file = exported(&service.store, study).await;
+    let first = gait_one_first(&service.store, ids[0]).await;
+    service.stop().await;
+
+    let other = folder.path().join("b.db");
+    let store = Store::open(&other).await.unwrap();
+    import(&store, &file).await.unwrap();
+    let mut reader = store.read().await.unwrap();
+    let of = async |reader: &mut Connection, id| lab_sessions::get(reader, id).await.unwrap().allocation;
+    assert_eq!(of(&mut reader, ids[0]).await.gait_one_first, Some(first));
+    let blind = of(&mut reader, ids[1]).await;
+    assert_eq!((blind.included, blind.gait_one_first), (false, None));
+    drop(reader);
+    let device = gaitwright::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
+    let mut writer = store.write().await.unwrap();
+    let refused = lab::for_device(&mut writer, &device, ids[1], 2).await.unwrap_err();
+    assert!(refused.to_string().contains("left its order out"), "{refused}");
+    drop(writer);
+    store.close().await;
+    drop(store);
+    let there = Service::start_as_is(&other, Analytic::default(), 1).await;
+    let unblind = format!("/api/v1/lab-sessions/{}/unblind", ids[1]);
+    let refused = there.post(&unblind, &json!({"reason": "walked"})).await;
+    assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
+    let page = there.fetch(&format!("/lab-sessions/{}", ids[1])).await.text;
+    assert!(page.contains("its archive left the order out") && !page.contains("Unblind this session"), "{page}");
+    there.stop().await;
+}
+
+#[tokio::test]
+async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_device_is_not() {
+    let (_folder, service) = callers::service().await;
+    let (study, trials) = finished(&service).await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let (device, reader) =
+        (token(&service, &[Right::Device]).await, token(&service, &[Right::Device, Right::Rate]).await);
+    let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let path = format!("/api/v1/studies/{study}/lab-sessions");
+    let id = post(&service, &clinician, &path, &plan).await.json()["id"].as_str().unwrap().to_owned();
+    let mut writer = service.store.write().await.unwrap();
+    let row: LabSessionId = id.parse().unwrap();
+    // An analytic gait has no controller file: what is recorded of one is what counts here.
+    let device_caller = gaitwright::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
+    let reading_caller = gaitwright::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Rate]);
+    let gait = lab::for_device(&mut writer, &device_caller, row, 2).await.unwrap();
+    let other = lab::for_device(&mut writer, &reading_caller, row, 3).await.unwrap();
+    commit(writer).await.unwrap();
+    assert_eq!(gait == lab::GaitOfWalk::One, gait_one_first(&service.store, row).await);
+    assert_ne!(gait, other, "walk 3 is with the other gait");
+
+    let session = get(&service, &clinician, &format!("/api/v1/lab-sessions/{id}")).await.json();
+    let files: Vec<_> = session["device_files"].as_array().unwrap().iter().map(|f| f["to_device"].clone()).collect();
+    assert_eq!(files, [json!(true), json!(false)]);
+    let mut writer = service.store.write().await.unwrap();
+    for walk in 1..=3 {
+        let walked = lab::RecordedWalk { walk, note: String::new() };
+        lab::record_walk(&mut writer, &reading_caller.actor, row, &walked).await.unwrap();
+    }
+    let answer = lab::NewAnswer { number: 1, answer: presentations::Said::First, note: String::new() };
+    let seen = lab::answer(&mut writer, &reading_caller, row, &answer).await.unwrap();
+    assert!(seen.answer.unwrap().could_have_known);
+    commit(writer).await.unwrap();
+    let session = get(&service, &clinician, &format!("/api/v1/lab-sessions/{id}")).await.json();
+    assert_eq!(session["walks"][1]["after_unblinding"], true);
+
+    // Nobody else: neither who runs studies with a token, nor a rater.
+    let file = format!("/api/v1/lab-sessions/{id}/controller.json?walk=2");
+    for (who, may) in [
+        (&device, true),
+        (&reader, true),
+        (&clinician, true),
+        (&token(&service, &[Right::Read, Right::Run]).await, false),
+        (&signed_in(&service, Role::Rater).await, false),
+    ] {
+        let answer = get(&service, who, &file).await;
+        assert_eq!(answer.status != StatusCode::FORBIDDEN, may, "{who:?}: {}", answer.text);
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn whoever_took_a_controller_file_of_a_study_rates_it_no_longer_blindly() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
+    service.wait_for(study, &[StudyState::Waiting]).await;
+    let program = token(&service, &[Right::Rate, Right::Device]).await;
+    let next = format!("/api/v1/studies/{study}/blind/next");
+    let pair = post(&service, &program, &next, &json!({})).await.json()["pair"].clone();
+    let drawn = sides(&service.store, study).await;
+    let plan = NewSession { gait_one: drawn[0].0, gait_two: drawn[0].1, notes: String::new() };
+    let mut writer = service.store.write().await.unwrap();
+    let session = lab::plan(&mut writer, &Actor::program(), study, &plan).await.unwrap();
+    let caller = gaitwright::access::Caller::token(TokenId::fresh(), "[Rate, Device]", &[Right::Rate, Right::Device]);
+    lab::for_device(&mut writer, &caller, session.id, 2).await.unwrap();
+    commit(writer).await.unwrap();
+    let path = format!("/rate/pair/{}", pair["token"].as_str().unwrap());
+    let said = send(&service, &program, &Method::POST, &path, FORM, "answer=first").await;
+    assert!(said.status.is_redirection(), "{}", said.text);
+    assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.unblinded));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn a_controller_file_is_refused_alike_for_both_walks_whichever_gait_is_refused() {
+    let (_folder, service) = one_service().await;
+    let (study, trials) = finished(&service).await;
+    let plan = json!({"gait_one": trials[0].id, "gait_two": trials[1].id});
+    let planned = service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &plan).await.json();
+    let file = |walk| format!("/api/v1/lab-sessions/{}/controller.json?walk={walk}", planned["id"].as_str().unwrap());
+    let (two, three) = (service.fetch(&file(2)).await, service.fetch(&file(3)).await);
+    assert_eq!((two.status, without_request(&two.text)), (three.status, without_request(&three.text)));
+    let none = service.fetch(&file(1)).await;
+    assert!(
+        none.status == StatusCode::UNPROCESSABLE_ENTITY && none.text.contains("without the device"),
+        "{}",
+        none.text
+    );
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn no_motion_of_a_rater_has_the_bytes_of_an_earlier_one() {
+    let (_folder, service) = callers::service().await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 14)).await;
+    let rater = rater_of(&service, &[study]).await;
+    let mut motions: BTreeMap<TrialId, Vec<String>> = BTreeMap::new();
+    let mut pictures: BTreeMap<TrialId, Vec<String>> = BTreeMap::new();
+    for _ in 0..4000 {
+        let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
+        if present.state == StudyState::Finished {
+            break;
+        }
+        let next = format!("/api/v1/studies/{study}/blind/next");
+        let pair = post(&service, &rater, &next, &json!({})).await.json()["pair"].clone();
+        let Some(token) = pair["token"].as_str() else {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+            continue;
+        };
+        let (first, second) = *sides(&service.store, study).await.last().unwrap();
+        let page = get(&service, &rater, &format!("/rate/pair/{token}")).await.text;
+        let drawn: Vec<&str> = page.split("<svg class=\"tiles\"").skip(1).collect();
+        assert_eq!(drawn.len(), 2, "{page}");
+        for (place, trial) in [first, second].into_iter().enumerate() {
+            let side = ["first", "second"][place];
+            let motion = get(&service, &rater, &format!("/api/v1/blind/{token}/{side}")).await.text;
+            assert_eq!(motion, get(&service, &rater, &format!("/api/v1/blind/{token}/{side}")).await.text);
+            motions.entry(trial).or_default().push(motion);
+            let picture = drawn[place].split_once("</svg>").unwrap().0;
+            pictures.entry(trial).or_default().push(picture.to_owned());
+        }
+        post(&service, &rater, &format!("/api/v1/blind/{token}/answer"), &json!({"answer": "second"})).await;
+    }
+    let mut again = 0;
+    for shown in motions.values().chain(pictures.values()) {
+        let mut distinct = shown.clone();
+        distinct.sort();
+        distinct.dedup();
+        assert_eq!(distinct.len(), shown.len());
+        again += shown.len() - 1;
+    }
+    assert!(again > 4, "gaits were shown again: {again}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn nobody_who_is_not_signed_in_learns_what_is_solved() {
+    let (_folder, service) = callers::service().await;
+    let health = get(&service, &As::Nobody, "/health").await.json();
+    let fields: Vec<_> = health.as_object().unwrap().keys().collect();
+    assert_eq!(fields, ["status", "version"]);
+    let rater = signed_in(&service, Role::Rater).await;
+    for path in ["/metrics", "/system"] {
+        for who in [&As::Nobody, &rater] {
+            assert!(!get(&service, who, path).await.status.is_success(), "{path} as {who:?}");
+        }
+    }
+    service.stop().await;
+}
+
+#[test]
+fn only_the_modules_of_allocations_name_their_tables() {
+    let allowed = ["store/allocations/mod.rs", "store/archived_allocations.rs", "store/archive.rs", "store/seals.rs"];
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/src")];
+    let mut read = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let name = path.to_string_lossy().replace('\\', "/");
+            if allowed.iter().any(|end| name.ends_with(end)) {
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap();
+            read += 1;
+            for table in ["lab_allocations", "presentation_allocations"] {
+                assert!(!text.contains(table), "{name} names {table}");
+            }
+        }
+    }
+    assert!(read > 150, "{read}");
+}
