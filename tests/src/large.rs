@@ -4,8 +4,7 @@ use crate::analytic::Analytic;
 use crate::service::Service;
 use axum::http::StatusCode;
 use gaitwright::store::studies::StudyState;
-use gaitwright::store::{StudyId, TrialId};
-use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
+use gaitwright::store::{Store, StudyId, TrialId, commit};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -30,9 +29,8 @@ pub async fn fill(database: &Path, study: StudyId) {
 
 /// Fills a finished study with so many trials like its first one.
 pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
-    let options = SqliteConnectOptions::new().filename(database).foreign_keys(true);
-    let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
-    let mut writer = pool.begin().await.unwrap();
+    let store = Store::open(database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
     sqlx::query(
         "with recursive n(i) as (select 4 union all select i + 1 from n where i < ?1)
          insert into trials (id, study_id, number, action_index, action, reason, best_before, state, status,
@@ -45,7 +43,7 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     )
     .bind(trials)
     .bind(study.to_string())
-    .execute(&mut *writer)
+    .execute(&mut **writer)
     .await
     .unwrap();
     sqlx::query(
@@ -54,7 +52,7 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
          where study_id = ?1 and number > 3",
     )
     .bind(study.to_string())
-    .execute(&mut *writer)
+    .execute(&mut **writer)
     .await
     .unwrap();
     sqlx::query(
@@ -64,23 +62,23 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
          where t.study_id = ?1 and t.number > 3",
     )
     .bind(study.to_string())
-    .execute(&mut *writer)
+    .execute(&mut **writer)
     .await
     .unwrap();
     sqlx::query("update studies set trial_budget = ?1 where id = ?2")
         .bind(trials)
         .bind(study.to_string())
-        .execute(&mut *writer)
+        .execute(&mut **writer)
         .await
         .unwrap();
-    writer.commit().await.unwrap();
-    pool.close().await;
+    commit(writer).await.unwrap();
+    store.close().await;
 }
 
 /// Adds so many answers of a person to a study with two trials.
 pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
-    let options = SqliteConnectOptions::new().filename(database).foreign_keys(true);
-    let pool = SqlitePoolOptions::new().max_connections(1).connect_with(options).await.unwrap();
+    let store = Store::open(database).await.unwrap();
+    let mut writer = store.write().await.unwrap();
     sqlx::query(
         "with recursive n(i) as (select 1 union all select i + 1 from n where i < ?1)
          insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
@@ -89,10 +87,11 @@ pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
     )
     .bind(answers)
     .bind(study.to_string())
-    .execute(&pool)
+    .execute(&mut **writer)
     .await
     .unwrap();
-    pool.close().await;
+    commit(writer).await.unwrap();
+    store.close().await;
 }
 
 /// Each page and list, with the fastest of three answers.

@@ -144,6 +144,16 @@ impl Service {
         self
     }
 
+    /// Passes no further gaits.
+    pub async fn stop_passing_gaits(&self) {
+        if let Some(certifier) = &self.certifier {
+            certifier.abort();
+            while !certifier.is_finished() {
+                tokio::task::yield_now().await;
+            }
+        }
+    }
+
     /// Stops it and closes the record.
     pub async fn stop(self) {
         self.director.stop();

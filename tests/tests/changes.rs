@@ -6,6 +6,7 @@
 
 use axum::body::Body;
 use axum::http::{Request, header};
+use gaitwright::access::Role;
 use gaitwright::http::openapi;
 use gaitwright::store::audit::{self, Verdict};
 use gaitwright::store::feedback::FeedbackRow;
@@ -14,6 +15,7 @@ use gaitwright::store::trials::Trial;
 use gaitwright::store::{StudyId, feedback};
 use gaitwright::studies::search;
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::signed_in;
 use gaitwright_tests::explained::without_gaits;
 use gaitwright_tests::measured::{electromyogram, motion};
 use gaitwright_tests::service::Service;
@@ -89,6 +91,8 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     scene.one(done, "post /subjects/{id}/consents", &format!("{of_subject}/consents"), form).await;
     let stronger = json!({"sol": {"max_force_n": 4200.0}});
     scene.one(done, "post /subjects/{id}/muscles", &format!("{of_subject}/muscles"), stronger).await;
+    let taller = json!({"height_m": 1.81, "body_mass_kg": 70, "reason": "measured again"});
+    scene.one(done, "post /subjects/{id}/corrections", &format!("{of_subject}/corrections"), taller).await;
     let why = json!({"reason": "no time"});
     scene.one(done, "post /subjects/{id}/withdraw", &format!("{of_subject}/withdraw"), why).await;
     let study = json!({"subject_id": service.subject().await, "start": false});
@@ -153,6 +157,12 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
         let path = format!("{api}/users/{}/{act}", text(&user["id"]));
         scene.one(done, &format!("post /users/{{id}}/{act}"), &path, json!({})).await;
     }
+    let role = format!("{api}/users/{}/role", text(&user["id"]));
+    scene.one(done, "post /users/{id}/role", &role, json!({"role": "rater"})).await;
+    signed_in(service, Role::Clinician).await;
+    let sessions = service.fetch(&format!("{api}/sessions")).await.json();
+    let end = format!("{api}/sessions/{}/end", text(&sessions[0]["id"]));
+    scene.one(done, "post /sessions/{id}/end", &end, json!({})).await;
     let of_finished = format!("{api}/studies/{finished}");
     let ada = json!({"kind": "user", "name": "Ada"});
     let member = scene.one(done, "post /studies/{id}/members", &format!("{of_finished}/members"), ada).await;

@@ -213,6 +213,7 @@ impl Scene {
                 (first, second)
             }
             Rule::Certificate => {
+                self.service.stop_passing_gaits().await;
                 self.by_hand("drop trigger certificates_no_delete").await;
                 self.by_hand(&format!("delete from certificates where trial_id = '{first}'")).await;
                 (first, second)

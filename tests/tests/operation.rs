@@ -37,7 +37,7 @@ async fn posterior(service: &Service, study: gaitwright::store::StudyId) -> Vec<
 #[tokio::test]
 async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
+    let service = Service::start_without_certificates(&folder.path().join("a.db"), Consistent::default()).await;
     let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
@@ -100,7 +100,8 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
 #[tokio::test]
 async fn old_trajectories_are_dropped_and_the_best_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let database = folder.path().join("a.db");
+    let service = Service::start_without_certificates(&database, Analytic::default()).await;
     let study = service.study(|new| new.trial_budget = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     assert_eq!(prune(&mut service.store.clone(), 1).await.unwrap(), 0, "it ended just now");

@@ -95,16 +95,16 @@ async fn every_change_leaves_exactly_one_row_in_the_audit_trail() {
         (format!("/api/v1/studies/{held}/pause"), "application/json", String::new()),
         (format!("/api/v1/studies/{held}/resume"), "application/json", String::new()),
         (format!("/studies/{held}/do"), form, "act=stop".to_owned()),
-        (format!("/api/v1/studies/{study}/preferences"), "application/json", answer.to_string()),
         (
             format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap()),
             "application/json",
             json!({"reason": "r"}).to_string(),
         ),
+        (format!("/api/v1/studies/{study}/preferences"), "application/json", answer.to_string()),
         (
             format!("/studies/{study}/compare"),
             form,
-            format!("a={}&b={}&answer=b&source=subject&author=K&key={}", trials[0].id, trials[1].id, trials[0].id),
+            format!("a={}&b={}&answer=b&source=subject&author=K&key={}", trials[0].id, trials[2].id, trials[0].id),
         ),
     ]
     .into_iter()

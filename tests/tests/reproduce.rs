@@ -82,10 +82,8 @@ async fn the_report_draws_the_band_of_a_reference_that_has_one_and_says_where_th
         assert_eq!(report.matches("</i>one standard deviation").count(), if id.is_some() { 0 } else { 5 });
         assert_eq!(report.contains("there is no band to draw"), id.is_some());
         assert!(report.contains("measured by the reference gait Falisse 2019, subject 1"), "{report}");
-        // What the analytic solver gives is no gait of the walker: nobody can examine it, and the report says so.
-        assert!(
-            report.contains("0 of 2 best gaits pass their certificate") && report.contains("<td>not examined</td>")
-        );
+        // The service of this test passed them.
+        assert!(report.contains("2 of 2 best gaits pass their certificate"), "{report}");
         assert!(
             report.contains("Subject 1: Gait RMSE of the best action is lower with muscles")
                 && report.contains("1.58 against 1.80")

@@ -99,6 +99,7 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
             format!("{column} + 1000")
         }
         (_, column) if column == last && ["feedback_seq", "number"].contains(&last) => format!("{column} + 1000"),
+        ("clock", "id") => "2".to_owned(),
         ("lab_acts", "act") => "'closed'".to_owned(),
         ("presentations", "number") | ("trials", "number") | ("lab_sessions", "number") => format!("{column} + 1000"),
         (_, "hash") | (_, "token") => "hex(randomblob(32))".to_owned(),

@@ -95,7 +95,7 @@ impl Closed {
 }
 
 /// What the whole service shares: no study is told by it.
-const SHARED: [&str; 5] = ["subjects", "devices", "reference-gaits", "users", "tokens"];
+const SHARED: [&str; 6] = ["subjects", "devices", "reference-gaits", "users", "tokens", "sessions"];
 /// The same of pages.
 const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "references"];
 

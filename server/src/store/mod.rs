@@ -124,8 +124,9 @@ pub struct Store {
     pool: Pool,
     /// When it was last tried whether the record takes changes, and what was found.
     probed: Arc<Mutex<Option<Probe>>>,
-    /// Held as long as any clone lives: a second process that opens the file for writing is refused.
-    _owner: Arc<Ownership>,
+    /// Held until the record is closed or the last clone is dropped: a second process that opens the file for writing is
+    /// refused.
+    owner: Arc<Mutex<Option<Ownership>>>,
 }
 
 impl Store {
@@ -161,10 +162,17 @@ impl Store {
             }
             return Err(error);
         }
-        Self::open_owned(path, anchors, owner).await.map_err(|error| file_kind::named(path, error))
+        let opened = Self::open_owned(path, anchors).await.map_err(|error| file_kind::named(path, error));
+        match &opened {
+            Ok(store) => *store.owner.lock().await = Some(owner),
+            Err(error) if error.is_wrong_file() => owner.withdraw(),
+            Err(_) => {}
+        }
+        opened
     }
 
-    async fn open_owned(path: &Path, anchors: Vec<PathBuf>, owner: Ownership) -> StoreResult<Self> {
+    /// Opens a file that this process owns.
+    async fn open_owned(path: &Path, anchors: Vec<PathBuf>) -> StoreResult<Self> {
         let options = SqliteConnectOptions::new()
             .filename(path)
             .create_if_missing(true)
@@ -206,7 +214,7 @@ impl Store {
             copying: Arc::default(),
             pool: Pool::default(),
             probed: Arc::default(),
-            _owner: Arc::new(owner),
+            owner: Arc::default(),
         };
         commit(store.write().await?).await?;
         Ok(store)
@@ -293,10 +301,11 @@ impl Store {
         &self.path
     }
 
-    /// Closes every connection, folding the write-ahead log into the file.
+    /// Closes every connection, folding the write-ahead log into the file, and gives up the ownership of it.
     pub async fn close(&self) {
         self.readers.close().await;
         self.writing.close().await;
+        drop(self.owner.lock().await.take());
     }
 }
 
