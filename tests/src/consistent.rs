@@ -23,7 +23,7 @@ impl Evaluate for Consistent {
         for (trajectory, domain) in gait.domains.iter_mut().zip(CYCLE) {
             let (rows, outputs) = (domain.contact_rows(), domain.outputs());
             let named = rows.iter().map(|row| ContactRowName { point: row.point, side: row.side, axis: row.axis });
-            trajectory.name = domain.name().to_owned();
+            domain.name().clone_into(&mut trajectory.name);
             trajectory.contact_rows = named.collect();
             trajectory.contact_forces = vec![vec![100.0; rows.len()]; trajectory.q.len()];
             trajectory.bezier = vec![vec![0.0; BEZIER_COEFFICIENTS]; outputs.len()];

@@ -119,9 +119,9 @@ async fn an_upgrade_that_is_killed_is_made_by_the_next_start() {
         process.kill().unwrap();
         process.wait().unwrap();
         if versions(&database).await == [1] {
-            in_time += 1
+            in_time += 1;
         } else {
-            late += 1
+            late += 1;
         }
         Store::open(&database).await.unwrap().close().await;
         assert_upgraded(&database, &old).await;

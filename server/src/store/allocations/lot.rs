@@ -17,7 +17,7 @@ pub(super) struct Place {
     /// So many places in the block: 2 or 4.
     pub(super) size: u8,
     /// 1, 2, ...
-    pub(super) place: u8,
+    pub(super) position: u8,
 }
 
 impl Lot {
@@ -58,7 +58,7 @@ impl Lot {
         let left = u64::from(size).saturating_sub(used).max(1);
         // The bit of the coin is not used twice.
         let one_first = (self.number >> 1) % left < half.saturating_sub(ones);
-        Place { one_first, size, place: u8::try_from(used + 1).unwrap_or(size) }
+        Place { one_first, size, position: u8::try_from(used + 1).unwrap_or(size) }
     }
 }
 
@@ -87,7 +87,7 @@ mod tests {
             let place = lot(counter).place(&open);
             open.push(place);
             all.push(place);
-            if place.place == place.size {
+            if place.position == place.size {
                 open.clear();
             }
         }
@@ -112,7 +112,7 @@ mod tests {
     fn orders_of_10_000_sessions_are_balanced_at_every_place_of_a_block() {
         let all = drawn(10_000);
         for (size, place) in [(2, 1), (2, 2), (4, 1), (4, 2), (4, 3), (4, 4)] {
-            let here: Vec<_> = all.iter().filter(|drawn| (drawn.size, drawn.place) == (size, place)).collect();
+            let here: Vec<_> = all.iter().filter(|drawn| (drawn.size, drawn.position) == (size, place)).collect();
             let ones = here.iter().filter(|drawn| drawn.one_first).count();
             assert!(chi_squared(ones, here.len()) < CRITICAL, "place {place} of {size}: {ones} of {}", here.len());
         }
@@ -125,7 +125,7 @@ mod tests {
     fn every_order_of_a_block_of_four_is_equally_likely() {
         let mut counts = std::collections::BTreeMap::<Vec<bool>, u32>::new();
         for block in 0..6000 {
-            let mut open = vec![Place { one_first: lot(4 * block).coin(), size: 4, place: 1 }];
+            let mut open = vec![Place { one_first: lot(4 * block).coin(), size: 4, position: 1 }];
             for step in 1..4 {
                 open.push(lot(4 * block + step).place(&open));
             }

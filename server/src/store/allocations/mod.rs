@@ -37,7 +37,7 @@ pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32,
     .bind(drawn.one_first)
     .bind(number)
     .bind(drawn.size)
-    .bind(drawn.place)
+    .bind(drawn.position)
     .bind(lot.nonce())
     .bind(now())
     .execute(db)
@@ -59,18 +59,18 @@ async fn open_block(db: &mut Connection, number: u32) -> StoreResult<Vec<Place>>
         let place = Place {
             one_first: row.try_get("gait_one_first")?,
             size: row.try_get("block_size")?,
-            place: row.try_get("place")?,
+            position: row.try_get("place")?,
         };
         if row.try_get("revealed")? {
             return Ok(Vec::new());
         }
         taken.push(place);
-        if place.place == 1 {
+        if place.position == 1 {
             break;
         }
     }
     taken.reverse();
-    Ok(if taken.last().is_some_and(|last| last.place == last.size) { Vec::new() } else { taken })
+    Ok(if taken.last().is_some_and(|last| last.position == last.size) { Vec::new() } else { taken })
 }
 
 /// What may be known of the order of a session.
