@@ -209,17 +209,13 @@ fn view(study: StudyId, object: &str) -> Access {
 #[tokio::test]
 async fn command_line_export_and_backup_leave_rows_also_while_the_service_runs() {
     let (folder, service, study) = with_study().await;
-    let run = |arguments: Vec<String>| {
-        let folder = folder.path().to_owned();
-        tokio::task::spawn_blocking(move || {
-            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-            let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), &folder, &arguments);
-            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        })
+    let run = |words: &str| {
+        let arguments: Vec<&str> = words.split(' ').collect();
+        let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     };
-    let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
-    run(words(&format!("export {study} s.gait --database a.db"))).await.unwrap();
-    run(words("backup copy.db --database a.db")).await.unwrap();
+    run(&format!("export {study} s.gait --database a.db"));
+    run("backup copy.db --database a.db");
     let rows = rows(&service).await;
     let of = |command: &str| rows.iter().find(|row| row.route == command).unwrap();
     let export = of("gaitwright export");
@@ -266,10 +262,10 @@ async fn corrected_height_and_mass_reach_new_studies_only() {
     let after = problem(service.trials(new).await[0].id).await;
     assert_eq!((&after["height_m"], &after["body_mass_kg"]), (&1.75.into(), &71.5.into()));
 
-    let form = format!("height_m=1.76&body_mass_kg=71.5&reason=measured+again&before=1");
+    let form = "height_m=1.76&body_mass_kg=71.5&reason=measured+again&before=1";
     let page = format!("/subjects/{subject}/correct");
-    assert_eq!(send(&service, &admin, &Method::POST, &page, FORM, &form).await.status, StatusCode::SEE_OTHER);
-    let twice = send(&service, &admin, &Method::POST, &page, FORM, &form).await;
+    assert_eq!(send(&service, &admin, &Method::POST, &page, FORM, form).await.status, StatusCode::SEE_OTHER);
+    let twice = send(&service, &admin, &Method::POST, &page, FORM, form).await;
     assert!(twice.status == StatusCode::CONFLICT && twice.text.contains("corrected since"), "{}", twice.text);
     let page = fetch(format!("/subjects/{subject}")).await.text;
     assert!(page.contains("misread the scale") && page.contains("1.76 m"), "{page}");

@@ -67,7 +67,8 @@ impl Rows {
         for (table, row) in &self.0 {
             let known: Result<Row, _> = serde_json::from_value(row.clone());
             let sha256 = known.map_or_else(|_| "0".repeat(64), |row| row.sha256());
-            lines += &format!("{}\n", json!({"table": table, "sha256": sha256, "row": row}));
+            lines += &json!({"table": table, "sha256": sha256, "row": row}).to_string();
+            lines.push('\n');
         }
         let end = json!({"end": {"rows": self.0.len(), "sha256": hex::encode(Sha256::digest(&lines))}});
         framed(&format!("{lines}{end}\n"))
@@ -247,7 +248,7 @@ const FORGERIES: [Forgery; 56] = [
             r.copy("subjects", |s| {
                 s["id"] = "01900000-0000-7000-8000-000000000001".into();
                 s["pseudonym"] = "S77".into();
-            })
+            });
         },
         "not of its study",
     ),
@@ -257,7 +258,7 @@ const FORGERIES: [Forgery; 56] = [
             r.copy("devices", |d| {
                 d["id"] = "01900000-0000-7000-8000-000000000001".into();
                 definition(d, |d| d["name"] = "X".into());
-            })
+            });
         },
         "2 rows of devices",
     ),
@@ -329,7 +330,7 @@ const FORGERIES: [Forgery; 56] = [
                 f["source"] = "clinician".into();
                 f["category"] = Value::Null;
                 f["suggested"] = 99_999_999.into();
-            })
+            });
         },
         "not in the search space",
     ),
@@ -367,7 +368,7 @@ const MORE: [Forgery; 8] =
         "id": "01900000-0000-7000-8000-000000000001", "trial_id": "01900000-0000-7000-8000-000000000002",
         "said_until": "2026-01-01T00:00:00.000Z", "verdict": "walkable", "author": "K", "reason": "r",
         "created_at": "2026-01-01T00:00:00.000Z"
-    })))
+    })));
             },
             "FOREIGN KEY",
         ),

@@ -145,7 +145,7 @@ async fn settings_at_the_ends_of_their_described_ranges_are_accepted() {
             let ends = [&field["minimum"], &field["maximum"]].into_iter().filter(|end| end.is_number());
             for end in ends.cloned().chain(field["enum"].as_array().cloned().into_iter().flatten()) {
                 let integer = field["type"] == "integer";
-                let end = if integer { json!(end.as_f64().unwrap() as i64) } else { end };
+                let end = if integer { end.as_f64().unwrap().to_string().parse().unwrap() } else { end };
                 let body = json!({"subject_id": subject, "start": false, group: {name: end}});
                 let answer = service.post("/api/v1/studies", &body).await;
                 // Where settings depend on each other, the refusal names another one.

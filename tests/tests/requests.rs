@@ -145,7 +145,7 @@ async fn timeouts_panics_and_bare_statuses_are_problem_documents() {
     let (_folder, service) = service().await;
     let mut state = service.state();
     state.slowest_answer = Duration::from_millis(50);
-    let slow = async || tokio::time::sleep(Duration::from_secs(600)).await;
+    let slow = async || tokio::time::sleep(Duration::from_mins(10)).await;
     let panics = async || -> () { panic!("a handler that fails") };
     let routes = Router::new()
         .route("/api/slow", get(slow))

@@ -19,7 +19,7 @@ async fn verify(database: &Path) -> Verdict {
     seals::verify(&mut pool.acquire().await.unwrap()).await.unwrap()
 }
 
-/// A copy of the record in which somebody who knows SQLite did this, and left no other trace.
+/// A copy of the record in which somebody who knows `SQLite` did this, and left no other trace.
 async fn touched(database: &Path, sql: &str) -> PathBuf {
     let copy = database.with_file_name("touched.db");
     std::fs::copy(database, &copy).unwrap();
@@ -110,11 +110,10 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
         }
         (_, column) if column == last && ["feedback_seq", "number"].contains(&last) => format!("{column} + 1000"),
         ("lab_acts", "act") => "'closed'".to_owned(),
-        ("presentations", "number") | ("trials", "number") | ("lab_sessions", "number") => format!("{column} + 1000"),
-        (_, "hash") | (_, "token") => "hex(randomblob(32))".to_owned(),
-        (_, "sha256") | (_, "pseudonym") | (_, "name") => "hex(randomblob(8))".to_owned(),
+        ("presentations" | "trials" | "lab_sessions", "number") => format!("{column} + 1000"),
+        (_, "hash" | "token") => "hex(randomblob(32))".to_owned(),
         ("feedback", "kind") => "'tie'".to_owned(),
-        (_, "id") | ("jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
+        (_, "id" | "sha256" | "pseudonym" | "name") | ("jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
         (_, column) if column == last => "hex(randomblob(8))".to_owned(),
         (_, column) => column.to_owned(),
     };
