@@ -68,7 +68,7 @@ async fn every_role_and_scope_reaches_exactly_what_the_description_says() {
 }
 
 /// The pages, as the router lists them: a page that is added and not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 69] = [
+const PAGES: [(&str, Option<Right>); 71] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -127,7 +127,9 @@ const PAGES: [(&str, Option<Right>); 69] = [
     ("get /access-log", Some(Right::Administer)),
     ("get /system", Some(Right::Read)),
     ("post /system/backup", Some(Right::Administer)),
-    ("get /glossary", None),
+    ("get /help", None),
+    ("get /help/{name}", None),
+    ("get /help/images/{name}", None),
     ("get /problems", None),
     ("get /problems/{name}", None),
     ("get /api", None),

@@ -343,3 +343,18 @@ async fn what_is_answered_has_the_properties_that_the_description_names() {
     }
     service.stop().await;
 }
+
+/// Generators make a method of each: `list_studies`, `withdraw_consent`.
+#[test]
+fn every_operation_has_an_identifier_of_its_own() {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut known = BTreeSet::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let identifier = operation["operationId"].as_str().unwrap();
+            let reads_well = identifier.contains('_') && identifier.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+            assert!(reads_well && known.insert(identifier.to_owned()), "{method} {path}: {identifier}");
+        }
+    }
+    assert!(known.len() > 100, "{}", known.len());
+}

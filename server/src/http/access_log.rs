@@ -21,12 +21,14 @@ use std::time::{Duration, Instant};
 use uuid::Uuid;
 
 /// Routes that show nothing of a subject.
-pub const NO_SUBJECT_DATA: [&str; 26] = [
+pub const NO_SUBJECT_DATA: [&str; 28] = [
     "/static/{*path}",
     "/health",
     "/ready",
     "/metrics",
-    "/glossary",
+    "/help",
+    "/help/{name}",
+    "/help/images/{name}",
     "/problems",
     "/problems/{name}",
     "/system",

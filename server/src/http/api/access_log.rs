@@ -28,6 +28,7 @@ pub(super) struct Choice {
 #[utoipa::path(
     get,
     path = "/access-log",
+    operation_id = "list_access_log",
     tag = "operation",
     params(
         ("contains" = Option<String>, Query, max_length = 200, description = "Rows with these characters in kind, actor, address, object, study or pseudonym"),

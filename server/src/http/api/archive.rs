@@ -27,6 +27,7 @@ const CHUNK_BYTES: usize = 1 << 16;
 #[utoipa::path(
     get,
     path = "/studies/{id}/archive",
+    operation_id = "get_study_archive",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "An archive for `gaitwright import`, not signed", body = Vec<u8>, content_type = "application/octet-stream")),
@@ -98,6 +99,7 @@ impl Write for Chunks {
 #[utoipa::path(
     get,
     path = "/studies/{id}/imports",
+    operation_id = "list_study_imports",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "One import for each record that it came through, the last one into this record; empty: the study was made here", body = Vec<Import>)),

@@ -14,6 +14,7 @@ use axum::response::Response;
 #[utoipa::path(
     get,
     path = "/audit",
+    operation_id = "list_audit_trail",
     tag = "operation",
     params(
         ("before" = Option<i64>, Query, description = "Older than this `seq`"),

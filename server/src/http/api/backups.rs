@@ -73,6 +73,7 @@ async fn to_its_end<T: Send + 'static>(
 #[utoipa::path(
     post,
     path = "/backups",
+    operation_id = "create_backup",
     tag = "operation",
     responses((status = 201, description = "Copied and checked", body = Copy)),
     security(("token" = ["administer"]), ("session" = ["administer"])),

@@ -42,6 +42,7 @@ pub(super) struct NextPair {
 #[utoipa::path(
     post,
     path = "/studies/{id}/blind/next",
+    operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "The pair, or none", body = NextPair)),
@@ -72,6 +73,7 @@ pub(super) async fn next(
 #[utoipa::path(
     get,
     path = "/blind/{token}/first",
+    operation_id = "get_first_blind_motion",
     tag = "blind",
     params(("token" = String, Path, description = "The pair")),
     responses((status = 200, description = "The motion", body = Vec<Vec<Vec<f64>>>)),
@@ -89,6 +91,7 @@ pub(super) async fn first(
 #[utoipa::path(
     get,
     path = "/blind/{token}/second",
+    operation_id = "get_second_blind_motion",
     tag = "blind",
     params(("token" = String, Path, description = "The pair")),
     responses((status = 200, description = "The motion", body = Vec<Vec<Vec<f64>>>)),
@@ -124,6 +127,7 @@ async fn motion(
 #[utoipa::path(
     post,
     path = "/blind/{token}/answer",
+    operation_id = "answer_blind_pair",
     tag = "blind",
     params(("token" = String, Path, description = "The pair")),
     request_body = RaterAnswer,
@@ -148,6 +152,7 @@ pub(super) async fn answer(
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",
+    operation_id = "get_rater_agreement",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "One row per rater", body = Vec<RaterFigures>)),
@@ -181,6 +186,7 @@ pub(super) struct Unblind {
 #[utoipa::path(
     post,
     path = "/studies/{id}/unblind",
+    operation_id = "unblind_rater",
     tag = "blind",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Unblind,

@@ -19,6 +19,7 @@ use gait_optimizer::certificate::Certificate;
 #[utoipa::path(
     get,
     path = "/trials/{id}/certificate",
+    operation_id = "get_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "The certificate: `passed`, `objections`, `checks`, the stride-to-stride map and pushes", body = Object)),
@@ -37,6 +38,7 @@ pub(super) async fn get(
 #[utoipa::path(
     post,
     path = "/trials/{id}/certificate",
+    operation_id = "request_certificate",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; its gait has converged")),
     responses((status = 200, description = "The certificate; making it takes some seconds", body = Object)),

@@ -55,6 +55,7 @@ pub(super) struct Compared {
 #[utoipa::path(
     get,
     path = "/compare",
+    operation_id = "compare_studies",
     tag = "studies",
     params(("ids" = String, Query, description = "2 to 20 identifiers of studies, with commas between them")),
     responses((status = 200, description = "One row per study", body = Vec<Compared>)),

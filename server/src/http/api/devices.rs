@@ -19,6 +19,7 @@ use gait_optimizer::Device as Definition;
 #[utoipa::path(
     get,
     path = "/devices",
+    operation_id = "list_devices",
     tag = "devices",
     responses((status = 200, description = "All of them", body = Vec<Device>)),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -31,6 +32,7 @@ pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Js
 #[utoipa::path(
     post,
     path = "/devices",
+    operation_id = "create_device",
     tag = "devices",
     request_body(content = Object, description = "A device file, as `optimizer/data/README.md` describes it"),
     responses((status = 201, description = "Added", body = Device)),
@@ -53,6 +55,7 @@ pub(super) async fn create(
 #[utoipa::path(
     get,
     path = "/devices/{id}",
+    operation_id = "get_device",
     tag = "devices",
     params(("id" = DeviceId, Path, description = "The device")),
     responses((status = 200, description = "The device", body = Device)),

@@ -38,6 +38,7 @@ pub(super) struct From {
 #[utoipa::path(
     get,
     path = "/studies/{id}/events",
+    operation_id = "follow_study_events",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "Begin after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "The last event that was seen")),
     responses((status = 200, description = "Server-sent events. First `study_state`: where the study stands; then what is recorded, with an id, replayed after `Last-Event-ID`; and `progress` of running solves. The stream stays open when the study has ended: it can be extended", body = ServerSentEvent, content_type = "text/event-stream")),

@@ -95,6 +95,7 @@ enum Coming {
 #[utoipa::path(
     get,
     path = "/trials/{id}/explanation",
+    operation_id = "get_explanation",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses(
@@ -126,6 +127,7 @@ pub(super) async fn get(
 #[utoipa::path(
     post,
     path = "/trials/{id}/explanation",
+    operation_id = "request_explanation",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; the program solved it, and it did not converge")),
     responses(

@@ -35,6 +35,7 @@ pub(super) fn two_hundred() -> f64 {
 #[utoipa::path(
     get,
     path = "/trials/{id}/problem.json",
+    operation_id = "get_solve_problem",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; what it started from was not dropped")),
     responses((status = 200, description = "What `gaitwright solve --problem` does again: subject, device, bounds, settings, reference gait, limits, start", body = Object)),
@@ -56,6 +57,7 @@ pub(super) async fn problem(
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.mot",
+    operation_id = "get_gait_motion_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
     responses((status = 200, description = "OpenSim motion file: degrees, OpenSim's signs", body = String, content_type = "text/plain")),
@@ -76,6 +78,7 @@ pub(super) async fn motion_file(
 #[utoipa::path(
     get,
     path = "/trials/{id}/controller.json",
+    operation_id = "get_controller_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial; its gait has converged and is certified, and no safety report against it is open"), ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")),
     responses((status = 200, description = "Controller file: curves and phase of every domain, set points of the prosthetic joints; it explains its fields", body = Object)),

@@ -26,6 +26,7 @@ pub(super) struct Beside<T> {
 #[utoipa::path(
     get,
     path = "/studies/{id}/figures/{file}",
+    operation_id = "get_study_figure",
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "The study"),
@@ -52,6 +53,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",
+    operation_id = "get_trial_figure",
     tag = "figures",
     params(
         ("id" = TrialId, Path, description = "The trial"),
@@ -80,6 +82,7 @@ pub(super) async fn of_trial(
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/figures/{file}",
+    operation_id = "get_lab_session_figure",
     tag = "figures",
     params(
         ("id" = LabSessionId, Path, description = "The session"),
@@ -102,6 +105,7 @@ pub(super) async fn of_session(
 #[utoipa::path(
     get,
     path = "/studies/{id}/belief/figures/{file}",
+    operation_id = "get_belief_figure",
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "The study"),
@@ -127,6 +131,7 @@ pub(super) async fn of_belief(
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}/figures/{file}",
+    operation_id = "get_reference_gait_figure",
     tag = "figures",
     params(
         ("id" = ReferenceGaitId, Path, description = "The reference gait"),

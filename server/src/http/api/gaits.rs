@@ -16,6 +16,7 @@ use axum::response::{IntoResponse, Response};
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait",
+    operation_id = "get_gait",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "The trajectory as the optimiser wrote it; CSV where `Accept` asks for it", content((Object = "application/json"), (String = "text/csv")))),
@@ -39,6 +40,7 @@ pub(super) async fn get(
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.csv",
+    operation_id = "get_gait_csv",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "One row per mesh point", body = String, content_type = "text/csv")),

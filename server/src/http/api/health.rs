@@ -24,6 +24,7 @@ pub struct Health {
 #[utoipa::path(
     get,
     path = "/health",
+    operation_id = "get_health",
     tag = "health",
     responses((status = 200, description = "The service is ready", body = Health)),
 )]

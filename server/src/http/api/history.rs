@@ -22,6 +22,7 @@ use std::sync::Arc;
 #[utoipa::path(
     get,
     path = "/studies/{id}/history",
+    operation_id = "get_study_history",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "By iteration; CSV where `Accept` asks for it", content((Vec<Milestone> = "application/json"), (String = "text/csv")))),
@@ -41,6 +42,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     get,
     path = "/studies/{id}/history.csv",
+    operation_id = "get_study_history_csv",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "By iteration", body = String, content_type = "text/csv")),

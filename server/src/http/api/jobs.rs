@@ -18,6 +18,7 @@ const MOST: u32 = 1000;
 #[utoipa::path(
     get,
     path = "/jobs",
+    operation_id = "list_jobs",
     tag = "operation",
     responses((status = 200, description = "Those that are not done", body = Vec<Job>)),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -52,6 +53,7 @@ impl Workers {
 #[utoipa::path(
     get,
     path = "/workers",
+    operation_id = "list_workers",
     tag = "operation",
     responses((status = 200, description = "Who solves", body = Workers)),
     security(("token" = ["read"]), ("session" = ["read"])),

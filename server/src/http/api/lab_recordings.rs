@@ -23,6 +23,7 @@ use utoipa::ToSchema;
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/recordings",
+    operation_id = "list_lab_recordings",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "All of them", body = Vec<LabRecording>)),
@@ -40,6 +41,7 @@ pub(super) async fn list(
 #[utoipa::path(
     get,
     path = "/lab-recordings/{id}/file",
+    operation_id = "get_lab_recording_file",
     tag = "lab",
     params(("id" = LabRecordingId, Path, description = "The recording")),
     responses((status = 200, description = "The file; CSV, or an OpenSim file", body = String, content_type = "text/plain")),
@@ -67,6 +69,7 @@ pub(super) async fn file(
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/electromyograms",
+    operation_id = "add_electromyogram",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewEmg,
@@ -89,6 +92,7 @@ pub(super) async fn electromyogram(
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/motions",
+    operation_id = "add_lab_motion",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewMotion,
@@ -130,6 +134,7 @@ pub(super) struct Processing {
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/emg-results",
+    operation_id = "process_electromyograms",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Processing,
@@ -159,6 +164,7 @@ pub(super) async fn process(
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/emg-results",
+    operation_id = "get_emg_results",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "The newest result; null: nothing was processed yet", body = Option<EmgView>)),
@@ -176,6 +182,7 @@ pub(super) async fn result(
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/limit-cycles",
+    operation_id = "get_limit_cycles",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "The newest motion of each walk", body = Vec<LimitCycles>)),

@@ -22,6 +22,7 @@ use utoipa::ToSchema;
 #[utoipa::path(
     get,
     path = "/studies/{id}/lab-sessions",
+    operation_id = "list_lab_sessions",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "Every session, without what is blinded", body = Vec<SessionView>)),
@@ -42,6 +43,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     post,
     path = "/studies/{id}/lab-sessions",
+    operation_id = "plan_lab_session",
     tag = "lab",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = NewSession,
@@ -66,6 +68,7 @@ pub(super) async fn create(
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}",
+    operation_id = "get_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "The session, without what is blinded", body = SessionView)),
@@ -95,6 +98,7 @@ pub(super) struct OfWalk {
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/controller.json",
+    operation_id = "get_walk_controller_file",
     tag = "lab",
     params(
         ("id" = LabSessionId, Path, description = "The session"),
@@ -143,6 +147,7 @@ pub(super) struct Closing {
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/close",
+    operation_id = "close_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Closing,
@@ -177,6 +182,7 @@ pub(super) struct Told {
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/unblind",
+    operation_id = "unblind_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = Told,
@@ -200,6 +206,7 @@ pub(super) async fn unblind(
 #[utoipa::path(
     get,
     path = "/lab/{id}",
+    operation_id = "get_next_walk",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "Which walk is next, and nothing that could tell a gait", body = InTheLab)),
@@ -217,6 +224,7 @@ pub(super) async fn in_the_lab(
 #[utoipa::path(
     post,
     path = "/lab/{id}/walks",
+    operation_id = "record_walk",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = RecordedWalk,
@@ -241,6 +249,7 @@ pub(super) async fn walk(
 #[utoipa::path(
     post,
     path = "/lab/{id}/answers",
+    operation_id = "answer_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     request_body = NewAnswer,
@@ -264,6 +273,7 @@ pub(super) async fn answer(
 #[utoipa::path(
     post,
     path = "/lab/{id}/take-back",
+    operation_id = "take_back_lab_answer",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "The session")),
     responses((status = 200, description = "Taken back; the question is open again", body = InTheLab)),

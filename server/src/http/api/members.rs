@@ -23,6 +23,7 @@ use utoipa::ToSchema;
 #[utoipa::path(
     get,
     path = "/studies/{id}/members",
+    operation_id = "list_study_members",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "Its members", body = StudyAccess)),
@@ -40,6 +41,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     post,
     path = "/studies/{id}/members",
+    operation_id = "add_study_member",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = NewMember,
@@ -63,6 +65,7 @@ pub(super) async fn add(
 #[utoipa::path(
     post,
     path = "/study-members/{id}/remove",
+    operation_id = "remove_study_member",
     tag = "access",
     params(("id" = MemberId, Path, description = "The membership")),
     responses((status = 200, description = "Removed", body = Member)),
@@ -94,6 +97,7 @@ pub(super) struct Restriction {
 #[utoipa::path(
     post,
     path = "/studies/{id}/access",
+    operation_id = "set_study_access",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Restriction,
@@ -136,6 +140,7 @@ pub(super) struct Invited {
 #[utoipa::path(
     post,
     path = "/studies/{id}/invitations",
+    operation_id = "invite_rater",
     tag = "access",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Invitation,

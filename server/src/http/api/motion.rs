@@ -42,6 +42,7 @@ struct Frame {
 #[utoipa::path(
     get,
     path = "/trials/{id}/motion",
+    operation_id = "get_gait_motion",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "Stick figures over one stride", body = Object)),

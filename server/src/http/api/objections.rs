@@ -48,6 +48,7 @@ impl From<Closed> for Objection {
 #[utoipa::path(
     get,
     path = "/studies/{id}/objections",
+    operation_id = "list_safety_reports",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Vec<Objection>)),
@@ -74,6 +75,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",
+    operation_id = "create_safety_review",
     tag = "preferences",
     params(("id" = TrialId, Path, description = "The trial whose gait it is")),
     request_body = Decision,

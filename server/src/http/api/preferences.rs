@@ -26,6 +26,7 @@ use utoipa::ToSchema;
 #[utoipa::path(
     get,
     path = "/studies/{id}/preferences",
+    operation_id = "list_preferences",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "After this `seq`"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
     responses((status = 200, description = "A page, by time; all of them as CSV where `Accept` asks for it. In a preference `trial_a` of the table is the winner", content((Vec<FeedbackRow> = "application/json"), (String = "text/csv")))),
@@ -90,6 +91,7 @@ fn table(study: StudyId, rows: &[FeedbackRow]) -> Response {
 #[utoipa::path(
     get,
     path = "/preferences/{id}",
+    operation_id = "get_preference",
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "The answer")),
     responses((status = 200, description = "The answer", body = FeedbackRow)),
@@ -116,6 +118,7 @@ pub(super) struct Recorded {
 #[utoipa::path(
     post,
     path = "/studies/{id}/preferences",
+    operation_id = "create_preference",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Answer,
@@ -153,6 +156,7 @@ pub(super) struct Retract {
 #[utoipa::path(
     post,
     path = "/preferences/{id}/retract",
+    operation_id = "retract_preference",
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "The answer")),
     request_body = Retract,

@@ -71,6 +71,7 @@ impl Recommended {
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation",
+    operation_id = "get_recommendation",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses(
@@ -91,6 +92,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation.csv",
+    operation_id = "get_recommendation_csv",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses(

@@ -18,6 +18,7 @@ use axum::response::Response;
 #[utoipa::path(
     get,
     path = "/reference-gaits",
+    operation_id = "list_reference_gaits",
     tag = "reference-gaits",
     responses((status = 200, description = "All of them", body = Vec<ReferenceGait>)),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -31,6 +32,7 @@ pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Js
 #[utoipa::path(
     post,
     path = "/reference-gaits",
+    operation_id = "create_reference_gait",
     tag = "reference-gaits",
     request_body = NewReferenceGait,
     responses((status = 201, description = "Imported; its provenance says what was done", body = ReferenceGait)),
@@ -57,6 +59,7 @@ pub(super) async fn create(
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}",
+    operation_id = "get_reference_gait",
     tag = "reference-gaits",
     params(("id" = ReferenceGaitId, Path, description = "The reference gait")),
     responses((status = 200, description = "The reference gait", body = ReferenceGait)),
@@ -74,6 +77,7 @@ pub(super) async fn get(
 #[utoipa::path(
     get,
     path = "/subjects/{id}/reference-gaits",
+    operation_id = "list_nearest_reference_gaits",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     responses((status = 200, description = "The nearest first; those that do not say whose they are come last", body = Vec<Match>)),

@@ -20,6 +20,7 @@ use axum::response::Response;
 #[utoipa::path(
     get,
     path = "/studies/{id}/remarks",
+    operation_id = "list_remarks",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "Every remark, by time", body = Vec<Remark>)),
@@ -40,6 +41,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     post,
     path = "/studies/{id}/remarks",
+    operation_id = "create_remark",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = NewRemark,
@@ -64,6 +66,7 @@ pub(super) async fn create(
 #[utoipa::path(
     get,
     path = "/remarks/{id}",
+    operation_id = "get_remark",
     tag = "preferences",
     params(("id" = RemarkId, Path, description = "The remark")),
     responses((status = 200, description = "The remark", body = Remark)),
@@ -81,6 +84,7 @@ pub(super) async fn get(
 #[utoipa::path(
     post,
     path = "/remarks/{id}/retract",
+    operation_id = "retract_remark",
     tag = "preferences",
     params(("id" = RemarkId, Path, description = "The remark")),
     request_body = Retract,

@@ -20,6 +20,7 @@ const TRIES: usize = 20;
 #[utoipa::path(
     post,
     path = "/studies/{id}/ask",
+    operation_id = "ask_for_trial",
     tag = "scripts",
     params(("id" = StudyId, Path, description = "The study: one with `evaluation` = `script`")),
     request_body(content = Ask, description = "May be left out"),
@@ -51,6 +52,7 @@ pub(super) async fn ask(
 #[utoipa::path(
     post,
     path = "/trials/{id}/tell",
+    operation_id = "tell_outcome",
     tag = "scripts",
     params(("id" = TrialId, Path, description = "The trial")),
     request_body = Tell,

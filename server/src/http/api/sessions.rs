@@ -17,6 +17,7 @@ use axum::response::Response;
 #[utoipa::path(
     get,
     path = "/sessions",
+    operation_id = "list_sessions",
     tag = "access",
     responses((status = 200, description = "Sessions that have not ended: the caller's own; an administrator gets everybody's", body = Vec<Session>)),
     security(("token" = []), ("session" = [])),
@@ -37,6 +38,7 @@ pub(super) async fn list(may: May<Anything>, State(app): State<AppState>) -> Res
 #[utoipa::path(
     post,
     path = "/sessions/{id}/end",
+    operation_id = "end_session",
     tag = "access",
     params(("id" = SessionId, Path, description = "The session")),
     responses((status = 200, description = "It has ended", body = Session)),

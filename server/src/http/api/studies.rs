@@ -54,6 +54,7 @@ pub(super) struct StudyPage {
 #[utoipa::path(
     get,
     path = "/studies",
+    operation_id = "list_studies",
     tag = "studies",
     params(
         ("before" = Option<StudyId>, Query, description = "Older than this one"),
@@ -84,6 +85,7 @@ pub(super) async fn list(
 #[utoipa::path(
     get,
     path = "/studies/{id}",
+    operation_id = "get_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     responses((
@@ -109,6 +111,7 @@ pub(super) async fn get(
 #[utoipa::path(
     post,
     path = "/studies",
+    operation_id = "create_study",
     tag = "studies",
     request_body = NewStudy,
     responses((status = 201, description = "Made", body = StudyView)),
@@ -142,6 +145,7 @@ pub(super) struct Why {
 #[utoipa::path(
     post,
     path = "/studies/{id}/start",
+    operation_id = "start_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body(content = Why, description = "May be left out"),
@@ -161,6 +165,7 @@ pub(super) async fn start(
 #[utoipa::path(
     post,
     path = "/studies/{id}/pause",
+    operation_id = "pause_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body(content = Why, description = "May be left out"),
@@ -180,6 +185,7 @@ pub(super) async fn pause(
 #[utoipa::path(
     post,
     path = "/studies/{id}/resume",
+    operation_id = "resume_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body(content = Why, description = "May be left out"),
@@ -199,6 +205,7 @@ pub(super) async fn resume(
 #[utoipa::path(
     post,
     path = "/studies/{id}/stop",
+    operation_id = "stop_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body(content = Why, description = "May be left out"),
@@ -241,6 +248,7 @@ async fn act(
 #[utoipa::path(
     patch,
     path = "/studies/{id}",
+    operation_id = "update_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body = Change,
@@ -266,6 +274,7 @@ pub(super) async fn patch(
 #[utoipa::path(
     post,
     path = "/studies/{id}/extend",
+    operation_id = "extend_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study"), IfMatch),
     request_body = Extend,
@@ -291,6 +300,7 @@ pub(super) async fn extend(
 #[utoipa::path(
     post,
     path = "/studies/{id}/fork",
+    operation_id = "fork_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "The study")),
     request_body(content = Fork, description = "What differs; may be left out"),

@@ -23,6 +23,7 @@ use gait_optimizer::muscle::MuscleParameters;
 #[utoipa::path(
     get,
     path = "/subjects",
+    operation_id = "list_subjects",
     tag = "subjects",
     params(("before" = Option<SubjectId>, Query, description = "Older than this one"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
     responses((status = 200, description = "A page", body = Vec<Subject>)),
@@ -42,6 +43,7 @@ pub(super) async fn list(
 #[utoipa::path(
     get,
     path = "/subjects/{id}",
+    operation_id = "get_subject",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     responses((status = 200, description = "The subject", body = Subject)),
@@ -59,6 +61,7 @@ pub(super) async fn get(
 #[utoipa::path(
     post,
     path = "/subjects",
+    operation_id = "create_subject",
     tag = "subjects",
     request_body = NewSubject,
     responses((status = 201, description = "Added", body = Subject)),
@@ -81,6 +84,7 @@ pub(super) async fn create(
 #[utoipa::path(
     get,
     path = "/subjects/{id}/consents",
+    operation_id = "list_consents",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     responses((status = 200, description = "Oldest first", body = Vec<Consent>)),
@@ -100,6 +104,7 @@ pub(super) async fn consents(
 #[utoipa::path(
     post,
     path = "/subjects/{id}/consents",
+    operation_id = "record_consent",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = NewConsent,
@@ -124,6 +129,7 @@ pub(super) async fn consent(
 #[utoipa::path(
     post,
     path = "/subjects/{id}/withdraw",
+    operation_id = "withdraw_consent",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = Withdrawal,
@@ -151,6 +157,7 @@ pub(super) async fn withdraw(
 #[utoipa::path(
     get,
     path = "/subjects/{id}/corrections",
+    operation_id = "list_subject_corrections",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     responses((status = 200, description = "Oldest first", body = Vec<Correction>)),
@@ -171,6 +178,7 @@ pub(super) async fn corrections(
 #[utoipa::path(
     post,
     path = "/subjects/{id}/corrections",
+    operation_id = "correct_subject",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body = NewCorrection,
@@ -194,6 +202,7 @@ pub(super) async fn correct(
 #[utoipa::path(
     get,
     path = "/subjects/{id}/muscles",
+    operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     responses((status = 200, description = "As in `gait_settings.muscles` of a study", body = Object)),
@@ -213,6 +222,7 @@ pub(super) async fn muscles(
 #[utoipa::path(
     post,
     path = "/subjects/{id}/muscles",
+    operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "The subject")),
     request_body(content = Object, description = "As in `gait_settings.muscles` of a study; empty: the published table"),

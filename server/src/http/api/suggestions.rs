@@ -21,6 +21,7 @@ use axum::response::Response;
 #[utoipa::path(
     get,
     path = "/studies/{id}/suggestions",
+    operation_id = "list_suggestions",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "After this `seq`"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
     responses((status = 200, description = "A page, by time", body = Vec<FeedbackRow>)),
@@ -44,6 +45,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     post,
     path = "/studies/{id}/suggestions",
+    operation_id = "create_suggestion",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
     request_body = Suggestion,

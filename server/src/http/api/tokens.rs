@@ -30,6 +30,7 @@ pub(super) struct MadeToken {
 #[utoipa::path(
     get,
     path = "/tokens",
+    operation_id = "list_tokens",
     tag = "access",
     responses((status = 200, description = "All of them, without their secrets", body = Vec<Token>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
@@ -42,6 +43,7 @@ pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Res
 #[utoipa::path(
     post,
     path = "/tokens",
+    operation_id = "create_token",
     tag = "access",
     request_body = NewToken,
     responses((status = 201, description = "Made; the secret is shown once", body = MadeToken)),
@@ -61,6 +63,7 @@ pub(super) async fn create(
 #[utoipa::path(
     post,
     path = "/tokens/{id}/revoke",
+    operation_id = "revoke_token",
     tag = "access",
     params(("id" = TokenId, Path, description = "The token")),
     responses((status = 200, description = "Ended", body = Token)),

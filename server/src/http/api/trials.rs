@@ -37,6 +37,7 @@ pub(super) struct TrialPage {
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",
+    operation_id = "list_trials",
     tag = "trials",
     params(("id" = StudyId, Path, description = "The study"), ("after" = Option<u32>, Query, description = "After the trial with this number"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
     responses((status = 200, description = "A page, by number; all of them as CSV where `Accept` asks for it", content((TrialPage = "application/json"), (String = "text/csv")))),
@@ -66,6 +67,7 @@ pub(super) async fn of_study(
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials.csv",
+    operation_id = "list_trials_csv",
     tag = "trials",
     params(("id" = StudyId, Path, description = "The study")),
     responses((status = 200, description = "All of them", body = String, content_type = "text/csv")),
@@ -85,6 +87,7 @@ pub(super) async fn of_study_csv(
 #[utoipa::path(
     get,
     path = "/trials/{id}",
+    operation_id = "get_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "The trial", body = Trial)),
@@ -102,6 +105,7 @@ pub(super) async fn get(
 #[utoipa::path(
     post,
     path = "/trials/{id}/cancel",
+    operation_id = "cancel_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "Cancelled; its solve stops within one iteration", body = Trial)),
@@ -126,6 +130,7 @@ pub(super) async fn cancel(
 #[utoipa::path(
     post,
     path = "/trials/{id}/retry",
+    operation_id = "retry_trial",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "Queued once more", body = Trial)),
@@ -148,6 +153,7 @@ pub(super) async fn retry(
 #[utoipa::path(
     get,
     path = "/trials/{id}/iterations",
+    operation_id = "list_iterations",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "Of the running solve, or as recorded", body = Vec<schema::Iteration>)),
@@ -168,6 +174,7 @@ pub(super) async fn iterations(
 #[utoipa::path(
     get,
     path = "/trials/{id}/attempts",
+    operation_id = "list_attempts",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
     responses((status = 200, description = "By attempt", body = Vec<AttemptResult>)),

@@ -31,6 +31,7 @@ pub(super) struct Me {
 #[utoipa::path(
     get,
     path = "/me",
+    operation_id = "get_caller",
     tag = "access",
     responses((status = 200, description = "The caller", body = Me)),
     security(("token" = []), ("session" = [])),
@@ -45,6 +46,7 @@ pub(super) async fn me(caller: Option<Caller>) -> Result<Json<Me>, Error> {
 #[utoipa::path(
     get,
     path = "/users",
+    operation_id = "list_users",
     tag = "access",
     responses((status = 200, description = "All of them", body = Vec<User>)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
@@ -57,6 +59,7 @@ pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Res
 #[utoipa::path(
     post,
     path = "/users",
+    operation_id = "create_user",
     tag = "access",
     request_body = NewUser,
     responses((status = 201, description = "Added", body = User)),
@@ -85,6 +88,7 @@ pub(super) struct Link {
 #[utoipa::path(
     post,
     path = "/users/{id}/link",
+    operation_id = "create_sign_in_link",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
     responses((status = 201, description = "Shown once", body = Link)),
@@ -105,6 +109,7 @@ pub(super) async fn link(
 #[utoipa::path(
     post,
     path = "/users/{id}/disable",
+    operation_id = "disable_user",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
     responses((status = 200, description = "Shut out", body = User)),
@@ -122,6 +127,7 @@ pub(super) async fn disable(
 #[utoipa::path(
     post,
     path = "/users/{id}/enable",
+    operation_id = "enable_user",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
     responses((status = 200, description = "Let in again", body = User)),
@@ -148,6 +154,7 @@ pub(super) struct NewRole {
 #[utoipa::path(
     post,
     path = "/users/{id}/role",
+    operation_id = "set_user_role",
     tag = "access",
     params(("id" = UserId, Path, description = "The user")),
     request_body = NewRole,

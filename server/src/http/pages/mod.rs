@@ -13,7 +13,7 @@ mod explanation;
 pub(super) mod figures;
 mod format;
 mod gait;
-mod glossary;
+mod help;
 mod home;
 mod lab;
 mod lab_charts;
@@ -91,7 +91,9 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/access-log", get(access_log::get))
         .route("/system", get(system::get))
         .route("/system/backup", post(system::make_backup))
-        .route("/glossary", get(glossary::get))
+        .route("/help", get(help::contents))
+        .route("/help/{name}", get(help::guide))
+        .route("/help/images/{name}", get(help::image))
         .route("/problems", get(problems::list))
         .route("/problems/{name}", get(problems::get))
         .route("/api", get(reference::get))

@@ -1,0 +1,200 @@
+//! What README and guides say: links lead somewhere, commands and their flags exist, addresses are described, and the
+//! service shows every guide.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use axum::http::StatusCode;
+use gaitwright::http::openapi;
+use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::cli;
+use gaitwright_tests::service::Service;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Every Markdown file of the repository, with its text.
+fn documents() -> BTreeMap<PathBuf, String> {
+    let folders =
+        ["", "docs", "optimizer", "optimizer/data", "optimizer/benches/casadi", "learner", "server/clients/python"];
+    let mut found = BTreeMap::new();
+    for folder in folders {
+        let Ok(entries) = std::fs::read_dir(repository().join(folder)) else { continue };
+        for path in
+            entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "md"))
+        {
+            let text = std::fs::read_to_string(&path).unwrap();
+            found.insert(path, text);
+        }
+    }
+    assert!(found.len() >= 10, "{:?}", found.keys());
+    found
+}
+
+/// The anchors of a document's headings.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let heading = |line: &str| {
+        let title = line.trim_start_matches('#').trim().to_lowercase();
+        title
+            .chars()
+            .filter(|c| c.is_alphanumeric() || " -".contains(*c))
+            .map(|c| if c == ' ' { '-' } else { c })
+            .collect()
+    };
+    text.lines().filter(|line| line.starts_with('#')).map(heading).collect()
+}
+
+/// The targets of a document's links and images.
+fn links(text: &str) -> Vec<String> {
+    text.split("](").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0.to_owned())).collect()
+}
+
+/// The lines of a document's shell blocks, without comments.
+fn commands(text: &str) -> Vec<String> {
+    let blocks = text.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let lines = blocks.flat_map(str::lines).map(|line| line.split("  #").next().unwrap().split(" > ").next().unwrap());
+    lines.map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_a_heading() {
+    let documents = documents();
+    let (mut broken, mut followed) = (Vec::new(), 0);
+    for (path, text) in &documents {
+        for link in links(text).into_iter().filter(|link| !link.contains("://") && !link.contains(char::is_whitespace))
+        {
+            let (file, fragment) = link.split_once('#').unwrap_or((&link, ""));
+            let target = if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            followed += 1;
+            let there = target.exists();
+            let heading = fragment.is_empty()
+                || anchors(&std::fs::read_to_string(&target).unwrap_or_default()).contains(fragment);
+            if !there || !heading {
+                broken.push(format!("{}: {link}", path.display()));
+            }
+        }
+    }
+    assert!(followed > 20, "{followed}");
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+#[test]
+fn every_command_and_flag_exists() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = |words: &[&str]| {
+        let output = cli::run(BINARY, folder.path(), &[words, &["--help"]].concat());
+        (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (mut wrong, mut tried) = (Vec::new(), 0);
+    for (path, text) in documents() {
+        let lines = commands(&text).into_iter().filter_map(|line| {
+            let run = line.strip_prefix("cargo run --release -- ").or_else(|| line.strip_prefix("gaitwright "));
+            run.map(str::to_owned)
+        });
+        for line in lines {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            // `config show` and its like have a word more.
+            let (mut known, mut text) = help(&words[..1]);
+            if let Some(word) = words.get(1).filter(|word| text.contains(&format!("\n  {word} "))) {
+                (known, text) = help(&[words[0], word]);
+            }
+            tried += 1;
+            let flags = words.iter().filter(|word| word.starts_with("--")).map(|word| word.split('=').next().unwrap());
+            let missing: Vec<&str> = flags.filter(|flag| !text.contains(*flag)).collect();
+            if !known || !missing.is_empty() {
+                wrong.push(format!("{}: {line}: {missing:?}", path.display()));
+            }
+        }
+    }
+    assert!(tried > 30, "{tried}");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// An address with every identifier replaced: `/studies/STUDY/ask` is `/studies/{}/ask`.
+fn template(address: &str) -> String {
+    let part = |part: &str| {
+        let named =
+            part.starts_with('{') || (part.len() > 1 && part.chars().all(|c| c.is_ascii_uppercase() || c == '-'));
+        if named { "{}".to_owned() } else { part.to_owned() }
+    };
+    address.split('/').map(part).collect::<Vec<_>>().join("/")
+}
+
+#[test]
+fn every_address_of_the_guides_is_described() {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let described: BTreeSet<String> = document["paths"]
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(|path| template(path.trim_start_matches("/api/v1")))
+        .collect();
+    let (mut unknown, mut tried) = (Vec::new(), 0);
+    for (path, text) in documents() {
+        if path.parent().unwrap().file_name().is_none_or(|folder| folder != "docs") {
+            continue;
+        }
+        let said = text.split(|c: char| c.is_whitespace() || "`\"'();,".contains(c));
+        for word in said.filter_map(|word| {
+            word.strip_prefix("/api/v1")
+                .or_else(|| word.starts_with("/studies").then_some(word))
+                .or_else(|| word.starts_with("/trials").then_some(word))
+        }) {
+            tried += 1;
+            if !described.contains(&template(word)) && !word.ends_with("$1") {
+                unknown.push(format!("{}: {word}", path.display()));
+            }
+        }
+    }
+    assert!(tried > 10, "{tried}");
+    assert!(unknown.is_empty(), "{unknown:#?}");
+}
+
+#[tokio::test]
+async fn every_guide_is_served_with_images_and_links_that_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let contents = service.fetch("/help").await;
+    let guides = std::fs::read_dir(repository().join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let mut followed = 0;
+    for guide in guides.filter(|path| path.extension().is_some_and(|e| e == "md")) {
+        let address = format!("/help/{}", guide.file_stem().unwrap().to_str().unwrap());
+        assert!(contents.text.contains(&address), "{address} is not in the table of contents");
+        let page = service.fetch(&address).await;
+        assert_eq!(page.status, StatusCode::OK, "{address}");
+        for target in page.text.split("href=\"").chain(page.text.split("src=\"")).skip(1) {
+            let target = target.split('"').next().unwrap();
+            let Some(rest) = target.strip_prefix("/help/") else { continue };
+            followed += 1;
+            let (there, fragment) = rest.split_once('#').unwrap_or((rest, ""));
+            let linked = service.fetch(&format!("/help/{there}")).await;
+            assert_eq!(linked.status, StatusCode::OK, "{address}: {target}");
+            assert!(fragment.is_empty() || linked.text.contains(&format!("id=\"{fragment}\"")), "{address}: {target}");
+        }
+    }
+    assert!(followed > 5, "{followed}");
+    assert_eq!(service.fetch("/help/nothing").await.status, StatusCode::NOT_FOUND);
+    service.stop().await;
+}
+
+/// Pages link to entries of the glossary by the anchors of its headings.
+#[test]
+fn every_link_of_a_page_to_the_glossary_has_its_entry() {
+    let glossary = anchors(&std::fs::read_to_string(repository().join("docs/glossary.md")).unwrap());
+    let mut linked = 0;
+    for template in std::fs::read_dir(repository().join("web/templates")).unwrap() {
+        let template = template.unwrap().path();
+        let text = std::fs::read_to_string(&template).unwrap();
+        for entry in text.split("/help/glossary#").skip(1) {
+            let entry = entry.split('"').next().unwrap();
+            linked += 1;
+            assert!(glossary.contains(entry), "{}: {entry}", template.display());
+        }
+    }
+    assert!(linked > 15, "{linked}");
+}
