@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::subjects::{self, Correction, PSEUDONYM_UNIQUE, Subject};
-use crate::store::{OnConstraint, SubjectId, Writer};
+use crate::store::{Connection, OnConstraint, SubjectId, Writer};
 use gait_optimizer::Subject as Body;
 use gait_optimizer::muscle::MuscleParameters;
 use serde::Deserialize;
@@ -47,13 +47,30 @@ pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &s
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the pseudonym is taken.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<Subject, Error> {
     let pseudonym = new.pseudonym.trim();
-    let body = check(pseudonym, new.height_m, new.body_mass_kg, &new.notes)?;
+    let body = checked(writer, new).await?;
     let subject = subjects::insert(writer, pseudonym, body, &new.notes)
         .await
-        .on_constraint(PSEUDONYM_UNIQUE, || Error::conflict(format!("there is a subject {pseudonym:?} already")))?;
+        .on_constraint(PSEUDONYM_UNIQUE, || is_taken(pseudonym))?;
     let detail = json!({ "pseudonym": pseudonym, "height_m": body.height_m, "body_mass_kg": body.body_mass_kg });
     audit::append(writer, actor, "subject.add", &format!("subject {}", subject.id), &detail).await?;
     Ok(subject)
+}
+
+/// Checks a subject as [`add`] does, and writes nothing.
+///
+/// # Errors
+/// As [`add`].
+pub async fn checked(db: &mut Connection, new: &NewSubject) -> Result<Body, Error> {
+    let pseudonym = new.pseudonym.trim();
+    let body = check(pseudonym, new.height_m, new.body_mass_kg, &new.notes)?;
+    match subjects::by_pseudonym(db, pseudonym).await? {
+        Some(_) => Err(is_taken(pseudonym)),
+        None => Ok(body),
+    }
+}
+
+fn is_taken(pseudonym: &str) -> Error {
+    Error::conflict(format!("there is a subject {pseudonym:?} already"))
 }
 
 /// The right height and mass of a subject.

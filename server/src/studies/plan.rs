@@ -1,15 +1,17 @@
 //! Making a study: one way in for the form, the REST interface and the command line.
 
+use super::person::{self, NewSubject};
 use super::{catalogue, recording, search};
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
 use crate::store::{
-    DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, reference_gaits, schema, studies, subjects,
+    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, reference_gaits, schema,
+    studies, subjects,
 };
 use gait_learner::{LearnerSettings, SearchSpace};
-use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -197,35 +199,48 @@ pub(super) async fn create_from(
 ///
 /// # Errors
 /// As [`create`]; nothing is written.
-pub async fn checked(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
-    let new = with_own_muscles(writer, new).await?;
-    check(writer, new).await
+pub async fn checked(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+    let new = with_own_muscles(db, new).await?;
+    check(db, new).await
+}
+
+/// As [`checked`], for a subject who is described and not written down yet; [`NewStudy::subject_id`] is not looked at.
+///
+/// # Errors
+/// As [`create`]; nothing is written.
+pub async fn checked_for_new(db: &mut Connection, subject: &NewSubject, new: NewStudy) -> Result<StudyPlan, Error> {
+    let body = person::checked(db, subject).await?;
+    check_for(db, subject.pseudonym.trim(), body, new).await
 }
 
 /// A study that says nothing of muscles takes those that are written down of its subject.
-async fn with_own_muscles(writer: &mut Writer, mut new: NewStudy) -> Result<NewStudy, Error> {
+async fn with_own_muscles(db: &mut Connection, mut new: NewStudy) -> Result<NewStudy, Error> {
     if new.gait_settings.muscles.is_published() {
-        new.gait_settings.muscles = subjects::muscles(writer, new.subject_id).await?;
+        new.gait_settings.muscles = subjects::muscles(db, new.subject_id).await?;
     }
     Ok(new)
 }
 
-async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
-    let subject = subjects::get(writer, new.subject_id).await?;
+async fn check(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+    let subject = subjects::get(db, new.subject_id).await?;
+    check_for(db, &subject.pseudonym, subject.body(), new).await
+}
+
+async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStudy) -> Result<StudyPlan, Error> {
     let device_id = match new.device_id {
-        Some(id) => devices::get(writer, id).await?.id,
-        None => catalogue::device(writer).await?.id,
+        Some(id) => devices::get(db, id).await?.id,
+        None => catalogue::device(db).await?.id,
     };
     let reference_gait_id = match new.reference_gait_id {
-        Some(id) => reference_gaits::get(writer, id).await?.id,
-        None => match recording::nearest(writer, &subject.body()).await? {
+        Some(id) => reference_gaits::get(db, id).await?.id,
+        None => match recording::nearest(db, &body).await? {
             Some(nearest) => nearest.id,
-            None => catalogue::reference_gait(writer).await?.id,
+            None => catalogue::reference_gait(db).await?.id,
         },
     };
     let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {
-        None | Some("") => format!("{}, {variant}, seed {}", subject.pseudonym, new.seed),
+        None | Some("") => format!("{}, {variant}, seed {}", pseudonym, new.seed),
         Some(name) => printable::name("name", name, 120)?.to_owned(),
     };
     let search_space = match new.search_space {
@@ -234,8 +249,8 @@ async fn check(writer: &mut Writer, new: NewStudy) -> Result<StudyPlan, Error> {
     };
     let plan = StudyPlan {
         name,
-        subject_id: subject.id,
-        body: Some(subject.body()),
+        subject_id: new.subject_id,
+        body: Some(body),
         device_id,
         reference_gait_id,
         muscles: new.muscles,

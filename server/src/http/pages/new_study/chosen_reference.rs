@@ -5,8 +5,8 @@ use super::super::drawn::Drawn;
 use crate::error::Error;
 use crate::plots::{Chart, Stroke};
 use crate::store::reference_gaits::ReferenceGait;
-use crate::store::studies::Study;
-use crate::store::{Connection, ReferenceGaitId, subjects};
+use crate::store::studies::StudyPlan;
+use crate::store::{Connection, ReferenceGaitId};
 use crate::studies::recording::{self, Match};
 use askama::Template;
 
@@ -29,10 +29,12 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    pub(super) async fn read(db: &mut Connection, study: &Study) -> Result<Self, Error> {
-        let subject = subjects::get(db, study.plan.subject_id).await?;
-        let matches = recording::matches(db, &subject.body()).await?;
-        Ok(Self { matches, chosen: study.plan.reference_gait_id })
+    pub(super) async fn read(db: &mut Connection, plan: &StudyPlan) -> Result<Self, Error> {
+        let matches = match &plan.body {
+            Some(body) => recording::matches(db, body).await?,
+            None => Vec::new(),
+        };
+        Ok(Self { matches, chosen: plan.reference_gait_id })
     }
 
     /// As a part of the page.

@@ -14,7 +14,7 @@ use crate::http::extract::Form;
 use crate::http::may::May;
 use crate::store::devices::Device;
 use crate::store::reference_gaits::ReferenceGait;
-use crate::store::studies::{FeedbackMode, Study};
+use crate::store::studies::{FeedbackMode, Study, StudyPlan};
 use crate::store::subjects::{self, Subject};
 use crate::store::{Connection, SubjectId, Writer, commit, devices, reference_gaits, trials};
 use crate::studies::person::{self, NewSubject};
@@ -278,20 +278,20 @@ pub(super) struct Checked {
     reference: Option<String>,
 }
 
-/// `POST /studies/new/check`: makes the study and takes it back, so that what is said here is what would happen.
+/// `POST /studies/new/check`: checks the form as it would be checked when it is sent, and writes nothing.
 pub(super) async fn check(
-    may: May<Run>,
+    _: May<Run>,
     State(app): State<AppState>,
     Form(fields): Form<Fields>,
 ) -> Result<Json<Checked>, PageError> {
     let editor = SpaceEditor::typed(&fields.space)?;
-    let mut writer = app.write().await?;
-    let made = match make(&mut writer, &may.caller, &fields, &editor).await {
-        Ok(study) => Ok((outlook(&mut writer, &study).await?, Choice::read(&mut writer, &study).await?)),
+    let mut reader = app.read().await?;
+    let planned = match planned(&mut reader, &fields, &editor).await {
+        Ok(plan) => Ok((outlook(&mut reader, &plan).await?, Choice::read(&mut reader, &plan).await?)),
         Err(error) => Err(as_refusal(error, &fields)?),
     };
-    drop(writer);
-    let checked = match made {
+    drop(reader);
+    let checked = match planned {
         Ok((text, choice)) => Checked { field: None, text, reference: Some(choice.shown()?) },
         Err(refused) => Checked { field: Some(refused.field), text: refused.message, reference: None },
     };
@@ -316,8 +316,7 @@ fn as_refusal(error: Error, fields: &Fields) -> Result<FieldError, Error> {
 }
 
 /// How large the study is, and how long it will take.
-async fn outlook(db: &mut Connection, study: &Study) -> Result<String, Error> {
-    let plan = &study.plan;
+async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error> {
     let combinations = format::count(plan.search_space.len());
     let size = format!("{} of {combinations} combinations of bounds will be tried", plan.trial_budget);
     let people = format::besides_solves(plan.feedback_mode);
@@ -331,26 +330,48 @@ async fn outlook(db: &mut Connection, study: &Study) -> Result<String, Error> {
     })
 }
 
+/// Makes the study, and the subject where a new one is described.
 async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &SpaceEditor) -> Result<Study, Error> {
-    let subject = if fields.subject == NEW_SUBJECT {
-        let new = NewSubject {
-            pseudonym: fields.pseudonym.clone(),
-            height_m: number("height_m", &fields.height_m, "a number of metres with a decimal point, as in 1.75")?,
-            body_mass_kg: number(
-                "body_mass_kg",
-                &fields.body_mass_kg,
-                "a number of kilograms with a decimal point, as in 65.7",
-            )?,
-            notes: String::new(),
-        };
-        person::add(writer, &caller.actor, &new).await?.id
-    } else {
-        nothing_described(fields)?;
-        number::<SubjectId>("subject", &fields.subject, "a subject of the list")?
+    let subject = match subject_of(fields)? {
+        Chosen::New(new) => person::add(writer, &caller.actor, &new).await?.id,
+        Chosen::Known(id) => id,
     };
+    plan::create(writer, &caller.actor, study_of(fields, editor, subject)?).await
+}
+
+/// What [`make`] would make.
+async fn planned(db: &mut Connection, fields: &Fields, editor: &SpaceEditor) -> Result<StudyPlan, Error> {
+    match subject_of(fields)? {
+        Chosen::New(new) => plan::checked_for_new(db, &new, study_of(fields, editor, SubjectId::fresh())?).await,
+        Chosen::Known(id) => plan::checked(db, study_of(fields, editor, id)?).await,
+    }
+}
+
+/// Whom the study is of.
+enum Chosen {
+    New(NewSubject),
+    Known(SubjectId),
+}
+
+fn subject_of(fields: &Fields) -> Result<Chosen, Error> {
+    if fields.subject != NEW_SUBJECT {
+        nothing_described(fields)?;
+        return Ok(Chosen::Known(number("subject", &fields.subject, "a subject of the list")?));
+    }
+    let height = "a number of metres with a decimal point, as in 1.75";
+    let mass = "a number of kilograms with a decimal point, as in 65.7";
+    Ok(Chosen::New(NewSubject {
+        pseudonym: fields.pseudonym.clone(),
+        height_m: number("height_m", &fields.height_m, height)?,
+        body_mass_kg: number("body_mass_kg", &fields.body_mass_kg, mass)?,
+        notes: String::new(),
+    }))
+}
+
+fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result<NewStudy, Error> {
     let (search_space, base_bounds) = editor.read()?;
     let learners = LEARNERS.map(|(name, ..)| name).join(", ");
-    let new = NewStudy {
+    Ok(NewStudy {
         name: Some(fields.name.clone()),
         device_id: optional("device", &fields.device, "a device of the list")?,
         reference_gait_id: optional("reference_gait", &fields.reference_gait, "a reference gait of the list")?,
@@ -371,8 +392,7 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
         ..NewStudy::of(subject)
-    };
-    plan::create(writer, &caller.actor, new).await
+    })
 }
 
 /// Nothing: the lowest objective counts alone.
