@@ -218,3 +218,26 @@ async fn page_of_a_study_with_7300_answers_stays_small_and_fast() {
     assert!(fastest < Duration::from_millis(400), "{fastest:?}");
     service.stop().await;
 }
+
+#[tokio::test]
+async fn study_form_is_checked_while_a_change_holds_the_only_writer() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let studies = service.fetch("/api/v1/studies").await.text;
+    let writer = service.store.write().await.unwrap();
+    let described = "subject=new&pseudonym=S77&height_m=1.8&body_mass_kg=70";
+    for (subject, accepted) in
+        [(described, true), ("subject=new&pseudonym=paper-1&height_m=1.8&body_mass_kg=70", false)]
+    {
+        let form =
+            "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=";
+        let body = format!("{form}&{subject}");
+        let asked = service.post_text("/studies/new/check", "application/x-www-form-urlencoded", &body);
+        let answer = tokio::time::timeout(Duration::from_secs(5), asked).await.expect("it waits for the writer");
+        assert_eq!(answer.status, StatusCode::OK, "{}", answer.text);
+        assert_eq!(answer.json()["field"].is_null(), accepted, "{}", answer.text);
+    }
+    drop(writer);
+    assert_eq!(service.fetch("/api/v1/studies").await.text, studies, "nothing was made");
+    service.stop().await;
+}

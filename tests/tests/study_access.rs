@@ -401,3 +401,27 @@ async fn rater_is_invited_with_assignment_and_link_in_one_step() {
     assert!(shown.text.contains("R8") && !shown.text.contains("aria-label=\"Remove a rater\""), "{}", shown.text);
     service.stop().await;
 }
+
+#[tokio::test]
+async fn study_that_is_made_restricted_is_never_open() {
+    let (_folder, service) = service().await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let other = token(&service, &[Right::Read, Right::Run]).await;
+    let subject = service.subject().await;
+    let body = json!({"subject_id": subject, "start": false, "restricted": true});
+    let made = post(&service, &clinician, "/api/v1/studies", &body).await;
+    let form = format!(
+        "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=&restricted=on\
+         &subject={subject}"
+    );
+    let sent = send(&service, &clinician, &Method::POST, "/studies/new", FORM, &form).await;
+    let by_form = sent.headers["location"].to_str().unwrap().rsplit('/').next().unwrap().to_owned();
+    for study in [made["id"].as_str().unwrap(), &by_form] {
+        let address = format!("/api/v1/studies/{study}");
+        assert_eq!(send(&service, &clinician, &Method::GET, &address, "", "").await.status, StatusCode::OK);
+        assert_eq!(send(&service, &other, &Method::GET, &address, "", "").await.status, StatusCode::NOT_FOUND);
+        let access = send(&service, &clinician, &Method::GET, &format!("{address}/members"), "", "").await.json();
+        assert_eq!((&access["restricted"], access["members"].as_array().unwrap().len()), (&json!(true), 1), "{access}");
+    }
+    service.stop().await;
+}

@@ -100,14 +100,19 @@ pub async fn restrict(
         members::set_restricted(writer, study, restricted, caller.actor.as_str()).await?;
         let detail = json!({ "restricted": restricted });
         audit::append(writer, &caller.actor, "study.restrict", &format!("study {study}"), &detail).await?;
-        let stays = !members::reaches(writer, caller.reach(), study).await?;
-        if let Reach::Open(who) | Reach::Assigned(who) = caller.reach()
-            && stays
-        {
-            insert(writer, &caller.actor, study, who).await?;
-        }
+        keep_in(writer, caller, study).await?;
     }
     access(writer, study).await
+}
+
+/// Makes a caller a member who would not reach the study otherwise.
+pub(super) async fn keep_in(writer: &mut Writer, caller: &Caller, study: StudyId) -> Result<(), Error> {
+    if let Reach::Open(who) | Reach::Assigned(who) = caller.reach()
+        && !members::reaches(writer, caller.reach(), study).await?
+    {
+        insert(writer, &caller.actor, study, who).await?;
+    }
+    Ok(())
 }
 
 /// Assigns a rater to a study and makes a one-time sign-in link: the rater, and the secret of the link, which is not

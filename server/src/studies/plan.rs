@@ -1,14 +1,15 @@
 //! Making a study: one way in for the form, the REST interface and the command line.
 
 use super::person::{self, NewSubject};
-use super::{catalogue, recording, search};
+use super::{catalogue, membership, recording, search};
+use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::{self, Actor};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
 use crate::store::{
-    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, reference_gaits, schema,
-    studies, subjects,
+    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
+    schema, studies, subjects,
 };
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
@@ -84,6 +85,9 @@ pub struct NewStudy {
     /// Whether to start at once.
     #[serde(default = "yes")]
     pub start: bool,
+    /// From the beginning only members and administrators reach it; whoever makes it is a member.
+    #[serde(default)]
+    pub restricted: bool,
 }
 
 fn yes() -> bool {
@@ -128,6 +132,7 @@ impl NewStudy {
             priority: 0,
             seed: one_seed(),
             start: true,
+            restricted: false,
         }
     }
 }
@@ -155,6 +160,7 @@ impl NewStudy {
             priority: plan.priority,
             seed: plan.seed,
             start: false,
+            restricted: false,
         }
     }
 }
@@ -170,6 +176,16 @@ pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result
     create_from(writer, actor, new, None).await
 }
 
+/// [`create`] by somebody who reaches it afterwards, also where it is restricted.
+///
+/// # Errors
+/// As [`create`].
+pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> Result<Study, Error> {
+    let study = create(writer, &caller.actor, new).await?;
+    membership::keep_in(writer, caller, study.id).await?;
+    Ok(study)
+}
+
 /// The same, noting the study whose set-up it has.
 pub(super) async fn create_from(
     writer: &mut Writer,
@@ -181,16 +197,22 @@ pub(super) async fn create_from(
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
     // A fork has the very set-up of its parent.
     let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
+    let restricted = new.restricted;
     let mut plan = check(writer, new).await?;
     if let Some(parent) = forked_from {
         // Also where the subject was corrected meanwhile: the two are compared with each other.
         plan.body = studies::get(writer, parent).await?.plan.body;
     }
     let study = studies::insert(writer, &plan, state, forked_from).await?;
+    if restricted {
+        members::set_restricted(writer, study.id, true, actor.as_str()).await?;
+    }
     let payload = json!({ "state": study.state, "reason": "created" });
     events::append(writer, study.id, "study_changed", &payload).await?;
-    let detail =
-        json!({ "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "forked_from": forked_from });
+    let detail = json!({
+        "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "forked_from": forked_from,
+        "restricted": restricted,
+    });
     audit::append(writer, actor, "study.create", &format!("study {}", study.id), &detail).await?;
     Ok(study)
 }

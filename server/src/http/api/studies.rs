@@ -125,7 +125,7 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = plan::create(&mut writer, &once.actor, new).await?;
+    let study = plan::create_by(&mut writer, &once.caller, new).await?;
     let view = StudyView::of(&mut writer, study).await?;
     let location = format!("/api/v1/studies/{}", view.study.id);
     once.finish(&app, writer, StatusCode::CREATED, Some(location), &view).await

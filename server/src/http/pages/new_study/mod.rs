@@ -36,6 +36,9 @@ pub(super) struct Fields {
     #[serde(default)]
     name: String,
     subject: String,
+    /// Present when ticked.
+    #[serde(default)]
+    restricted: Option<String>,
     #[serde(default)]
     pseudonym: String,
     #[serde(default)]
@@ -72,6 +75,7 @@ impl Default for Fields {
         Self {
             name: String::new(),
             subject: String::new(),
+            restricted: None,
             pseudonym: String::new(),
             height_m: String::new(),
             body_mass_kg: String::new(),
@@ -336,7 +340,7 @@ async fn make(writer: &mut Writer, caller: &Caller, fields: &Fields, editor: &Sp
         Chosen::New(new) => person::add(writer, &caller.actor, &new).await?.id,
         Chosen::Known(id) => id,
     };
-    plan::create(writer, &caller.actor, study_of(fields, editor, subject)?).await
+    plan::create_by(writer, caller, study_of(fields, editor, subject)?).await
 }
 
 /// What [`make`] would make.
@@ -391,6 +395,7 @@ fn study_of(fields: &Fields, editor: &SpaceEditor, subject: SubjectId) -> Result
         unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or nothing")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", plan::LARGEST_SEED))?,
+        restricted: fields.restricted.is_some(),
         ..NewStudy::of(subject)
     })
 }
