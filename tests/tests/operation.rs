@@ -8,7 +8,7 @@ use gait_optimizer::SolveStatus;
 use gaitwright::cli::study::prune;
 use gaitwright::store::audit::Actor;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, backup, certificates, commit, explanations, gaits, studies};
+use gaitwright::store::{Store, backup, certificates, commit, explanations, gaits, members, studies};
 use gaitwright::studies::archive::file::read_through;
 use gaitwright::studies::standing::Standing;
 use gaitwright_tests::analytic::Analytic;
@@ -284,4 +284,23 @@ async fn settings_show_where_each_value_comes_from() {
     std::fs::write(folder.path().join("gaitwright.toml"), "colour = 3\n").unwrap();
     let (done, text) = gaitwright(folder.path(), &["config", "show"]);
     assert!(!done && text.contains("colour is not a setting"), "{text}");
+}
+
+#[tokio::test]
+async fn restricted_study_is_restricted_where_it_is_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
+    let restricted = service.study(|new| (new.trial_budget, new.restricted) = (2, true)).await;
+    let open = service.study(|new| new.trial_budget = 2).await;
+    for study in [restricted, open] {
+        service.wait_for(study, &[StudyState::Finished]).await;
+    }
+    for study in [restricted, open] {
+        let elsewhere = Store::open(&folder.path().join(format!("{study}.db"))).await.unwrap();
+        assert_eq!(import(&elsewhere, &exported(&service.store, study).await).await.unwrap(), study);
+        let found = members::is_restricted(&mut elsewhere.read().await.unwrap(), study).await.unwrap();
+        assert_eq!(found, study == restricted);
+        elsewhere.close().await;
+    }
+    service.stop().await;
 }

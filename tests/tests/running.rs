@@ -104,6 +104,74 @@ async fn full_disk_is_answered_with_507_and_the_service_goes_on_when_there_is_ro
     service.stop().await;
 }
 
+/// A file system of a few megabytes; only root may mount one.
+struct SmallDisk(tempfile::TempDir);
+
+impl SmallDisk {
+    fn mount() -> Option<Self> {
+        let folder = tempfile::tempdir().unwrap();
+        let mounted = std::process::Command::new("mount")
+            .args(["-t", "tmpfs", "-o", "size=4m", "tmpfs"])
+            .arg(folder.path())
+            .output()
+            .is_ok_and(|output| output.status.success());
+        mounted.then_some(Self(folder))
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = std::process::Command::new("umount").arg("--lazy").arg(self.0.path()).status();
+    }
+}
+
+#[tokio::test]
+async fn disk_that_is_really_full_loses_nothing_acknowledged_and_says_so() {
+    let Some(disk) = SmallDisk::mount() else {
+        println!("skipped: a small disk cannot be mounted here");
+        return;
+    };
+    let service = Service::start(&disk.0.path().join("a.db"), Analytic::default(), 1).await;
+    service.store.set_reserve(1 << 20);
+    let subject = |number: usize| {
+        let notes = "x".repeat(3500);
+        json!({"pseudonym": format!("S{number}"), "height_m": 1.7, "body_mass_kg": 70.0, "notes": notes})
+    };
+    let filler = disk.0.path().join("filler");
+    let mut acknowledged = Vec::new();
+    let mut refused = None;
+    for number in 0..2000 {
+        if number == 20 {
+            // Fails when nothing more fits.
+            let _ = std::fs::write(&filler, vec![0; 4 << 20]);
+        }
+        let answer = service.post("/api/v1/subjects", &subject(number)).await;
+        if answer.status != StatusCode::CREATED {
+            refused = Some(answer);
+            break;
+        }
+        acknowledged.push(answer.json()["id"].as_str().unwrap().to_owned());
+    }
+    let refused = refused.expect("the disk has no end");
+    assert_eq!(refused.status, StatusCode::INSUFFICIENT_STORAGE, "{}", refused.text);
+    assert_eq!(refused.json()["type"], "/problems/storage-full");
+    let ready = service.fetch("/ready").await;
+    assert!(!ready.status.is_success() || ready.text.contains("0 MB are free"), "{} {}", ready.status, ready.text);
+    assert_eq!(service.fetch("/health").await.json()["status"], "short_of_space");
+    assert!(service.fetch("/subjects").await.text.contains("0 MB are free"));
+
+    std::fs::remove_file(&filler).unwrap();
+    let answer = service.post("/api/v1/subjects", &subject(3000)).await;
+    assert_eq!(answer.status, StatusCode::CREATED, "{}", answer.text);
+    for id in &acknowledged {
+        assert_eq!(service.fetch(&format!("/api/v1/subjects/{id}")).await.status, StatusCode::OK, "{id}");
+    }
+    let database = service.store.path().to_owned();
+    service.stop().await;
+    gaitwright::store::verify::file(&database, &[]).await.unwrap();
+    println!("{} acknowledged before the disk was full, all there", acknowledged.len());
+}
+
 #[tokio::test]
 async fn not_ready_while_the_record_takes_no_changes() {
     let folder = tempfile::tempdir().unwrap();
@@ -130,7 +198,10 @@ async fn studies_are_refused_and_answers_taken_when_space_runs_short() {
     assert_eq!(service.post("/api/v1/subjects", &subject).await.status, StatusCode::CREATED);
     let ready = service.fetch("/ready").await;
     assert!(ready.status == StatusCode::OK && ready.text.contains("nearly full"), "{}", ready.text);
-    assert!(service.fetch("/").await.text.contains("the disk is nearly full"));
+    for page in ["/", "/studies/new", "/subjects", "/system", "/rate", "/help"] {
+        assert!(service.fetch(page).await.text.contains("the disk is nearly full"), "{page}");
+    }
+    assert_eq!(service.fetch("/health").await.json()["status"], "short_of_space");
     service.store.set_reserve(0);
     let made = service.post("/api/v1/studies", &study).await;
     assert_eq!(made.status, StatusCode::CREATED, "{}", made.text);

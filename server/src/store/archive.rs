@@ -10,11 +10,12 @@ use tokio::sync::mpsc::Sender;
 
 /// Tables in the order in which their rows can be written, and which rows belong to a study. Certificates and
 /// explanations are made anew where the study is imported: nobody has to believe them.
-const TABLES: [(&str, &str); 28] = [
+const TABLES: [(&str, &str); 29] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
     ("reference_gaits", "id in (select reference_gait_id from studies where id = ?)"),
     ("studies", "id = ?"),
+    ("study_restrictions", "study_id = ? order by seq"),
     ("trials", "study_id = ? order by number"),
     ("gaits", "trial_id in (select id from trials where study_id = ?)"),
     ("explanation_requests", "trial_id in (select id from trials where study_id = ?)"),
@@ -198,7 +199,7 @@ impl Unpacking {
                     row.set("feedback_seq", Cell::Integer(*seq));
                 }
             }
-            "unblindings" | "imports" => {
+            "unblindings" | "imports" | "study_restrictions" => {
                 row.remove("seq");
             }
             _ => {}

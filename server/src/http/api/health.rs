@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 /// What `/health` answers.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Health {
-    /// `ready`.
+    /// `ready`, or `short_of_space` when less of the disk is free than is kept in reserve.
     pub status: &'static str,
     /// Version of the program.
     pub version: &'static str,
@@ -31,7 +31,8 @@ pub struct Health {
 pub async fn get(State(app): State<AppState>) -> Result<Json<Health>, Error> {
     // A connection is handed out once the database has answered on it.
     drop(app.read().await?);
-    Ok(Json(Health { status: "ready", version: env!("CARGO_PKG_VERSION") }))
+    let status = if app.store().room().is_ok() { "ready" } else { "short_of_space" };
+    Ok(Json(Health { status, version: env!("CARGO_PKG_VERSION") }))
 }
 
 /// `GET /ready`: 200 when the service does its work and takes changes, otherwise 503 with the reason.

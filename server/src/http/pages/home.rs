@@ -25,8 +25,6 @@ const PAGE: u32 = 100;
 struct Home {
     /// Whoever asks came by a link that works once, and has no other way in.
     no_password: bool,
-    /// That the disk is nearly full; none: it is not.
-    shortage: Option<String>,
     /// What goes on only when somebody does something.
     waiting: Vec<Waiting>,
     studies: Vec<Row>,
@@ -90,8 +88,7 @@ async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page 
     let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
-    let shortage = app.store().room().err().map(|shortage| shortage.to_string());
-    page(&Home { shortage, no_password, waiting, studies: rows, later: before.is_some(), next })
+    page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
 }
 
 /// Gaits that somebody called unsafe: staff look at them.

@@ -22,6 +22,7 @@ mod lab_walk;
 mod members;
 mod muscles;
 mod new_study;
+mod notice;
 mod people;
 mod problems;
 mod rate;
@@ -103,4 +104,5 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/account/sessions", post(sign_in::end_session))
         .route("/account", get(sign_in::account).post(sign_in::set_password))
         .route_layer(from_fn_with_state(state.clone(), unsent::keep))
+        .route_layer(from_fn_with_state(state.clone(), notice::show))
 }
