@@ -1,5 +1,6 @@
-//! Load on loopback while real solves run: durable preference writes of several raters at a steady rate together, and
-//! study reads; then, with nothing else going on, the pages of a study of ten thousand trials.
+//! Load on loopback while a study with ten thousand trials runs and real solves take a processor: durable preference writes
+//! of several people to that study, at a steady rate together, and reads of it; then, with nothing else going on, the pages
+//! of such a study.
 //!
 //! `cargo run --release -p gaitwright-tests --example load -- [SECONDS] [WRITES_PER_SECOND]`
 
@@ -11,6 +12,7 @@ use gaitwright::workers::{Assignment, Evaluate, GaitSolver};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
 use gaitwright_tests::service::Service;
+use serde_json::json;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -90,27 +92,30 @@ async fn main() {
     let seconds: f64 = arguments.next().map_or(20.0, |text| text.parse().expect("seconds"));
     let rate: f64 = arguments.next().map_or(200.0, |text| text.parse().expect("writes per second"));
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(&folder.path().join("a.db"), Both(Analytic::default()), 1).await;
-    let study = service
-        .study(|new| (new.trial_budget, new.muscles, new.feedback_mode) = (15, false, FeedbackMode::Mixed))
-        .await;
+    let database = folder.path().join("a.db");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let mixed = FeedbackMode::Mixed;
+    let study = service.study(|new| (new.trial_budget, new.muscles, new.feedback_mode) = (15, true, mixed)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let solved = service.study(|new| (new.trial_budget, new.muscles) = (500, true)).await;
     let converged: Vec<_> =
         service.trials(study).await.into_iter().filter(|trial| trial.state.as_str() == "converged").collect();
+    service.stop().await;
+    large::fill_to(&database, study, large::TRIALS - 100).await;
+    let service = Service::start(&database, Both(Analytic::default()), 1).await;
+    let more = json!({"trial_budget": 10_000});
+    let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &more).await;
+    println!("the study of {} trials goes on: {}", large::TRIALS - 100, extended.status);
+    let solved = service.study(|new| (new.trial_budget, new.muscles) = (500, true)).await;
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let router = service.router();
     tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
-    let body = format!(
-        "{{\"trial_a\":\"{}\",\"trial_b\":\"{}\",\"answer\":\"a\",\"author\":\"load\"}}",
-        converged[0].id, converged[1].id
-    );
+    let (one, other) = (converged[0].id, converged[1].id);
     let write = format!("/api/v1/studies/{study}/preferences");
     let read = format!("/api/v1/studies/{study}");
 
     let rater = |number: usize| {
-        let (address, write, body) = (address.clone(), write.clone(), body.clone());
+        let (address, write) = (address.clone(), write.clone());
         std::thread::spawn(move || {
             let mut connection = Connection::open(&address);
             let (begun, mut times) = (Instant::now(), Vec::new());
@@ -120,6 +125,9 @@ async fn main() {
                 let due = (times.len() as f64 + number as f64 / RATERS as f64) * each;
                 let due = begun + Duration::from_secs_f64(due);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                // Each person answers a pair once.
+                let author = format!("{number}-{}", times.len());
+                let body = json!({"trial_a": one, "trial_b": other, "answer": "a", "author": author}).to_string();
                 assert_eq!(connection.send("POST", &write, &body), 201);
                 times.push(due.elapsed());
             }

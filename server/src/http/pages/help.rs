@@ -17,13 +17,15 @@ use rust_embed::Embed;
 struct Files;
 
 /// The guides in the order in which they are listed, each with its title in the list.
-const GUIDES: [(&str, &str); 7] = [
+const GUIDES: [(&str, &str); 9] = [
     ("clinician", "For clinicians"),
     ("rater", "For raters"),
     ("lab-session", "For lab sessions"),
     ("lab-script", "For lab scripts"),
     ("unattended", "For unattended runs"),
     ("administrator", "For administrators"),
+    ("method", "Method"),
+    ("benchmarks", "Benchmarks"),
     ("glossary", "Glossary"),
 ];
 
@@ -38,7 +40,7 @@ struct Help {
     title: String,
     /// HTML made from a guide; empty for the table of contents.
     guide: String,
-    guides: [(&'static str, &'static str); 7],
+    guides: [(&'static str, &'static str); 9],
 }
 
 /// `GET /help`.
