@@ -51,6 +51,12 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
     Ok(text)
 }
 
+/// Whether two names are of one person: upper and lower case and spaces do not tell people apart.
+pub(crate) fn is_same_name(one: &str, other: &str) -> bool {
+    let letters = |name: &str| name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+    letters(one) == letters(other)
+}
+
 #[cfg(test)]
 mod tests {
     use super::{name, note, reason};

@@ -296,7 +296,7 @@ async fn a_comparison_shows_both_gaits_and_keeps_what_was_typed() {
         StatusCode::OK,
         "were the same: choose two different",
     );
-    is_page(&service.fetch(&format!("{path}?a={a}&b={UNKNOWN}")).await, StatusCode::NOT_FOUND, UNKNOWN);
+    is_page(&service.fetch(&format!("{path}?a={a}&b={UNKNOWN}")).await, unprocessable, UNKNOWN);
     let (_, other, _) = finished(&service).await;
     is_page(&service.fetch(&format!("{path}?a={other}&b={b}")).await, unprocessable, "a trial of this study");
     service.stop().await;

@@ -218,7 +218,7 @@ async fn preferences_are_given_read_back_and_taken_back() {
     let itself = json!({"trial_a": converged[0], "trial_b": converged[0], "answer": "a"});
     is_problem(&service.post(&path, &itself).await, unprocessable, "/problems/invalid-field", "itself");
     let unknown = json!({"trial_a": converged[0], "trial_b": "01890000-0000-7000-8000-000000000000", "answer": "a"});
-    is_problem(&service.post(&path, &unknown).await, StatusCode::NOT_FOUND, "/problems/not-found", "trial");
+    is_problem(&service.post(&path, &unknown).await, unprocessable, "/problems/invalid-field", "trial_b");
     let ghost = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "a", "note": "a\u{0}b"});
     is_problem(&service.post(&path, &ghost).await, unprocessable, "/problems/invalid-field", "note");
     let neither = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "both"});

@@ -130,7 +130,7 @@ fn doors() -> Vec<(Method, String, String)> {
 }
 
 /// Status and text of an answer, without the identifiers of what was asked for and of the request.
-fn told(answer: &Answer, id: &str) -> (StatusCode, String) {
+fn without_identifiers(answer: &Answer, id: &str) -> (StatusCode, String) {
     let request = answer.headers["x-request-id"].to_str().unwrap();
     (answer.status, answer.text.replace(id, "ID").replace(request, "REQUEST"))
 }
@@ -164,7 +164,7 @@ async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() 
             let nowhere = knock(&closed.service, who, method, path, UNKNOWN).await;
             let said = format!("{method} {path} as {name}: {} {}", there.status, there.text);
             assert!(matches!(there.status, StatusCode::NOT_FOUND | StatusCode::FORBIDDEN), "{said}");
-            assert_eq!(told(&there, id), told(&nowhere, UNKNOWN), "{said}");
+            assert_eq!(without_identifiers(&there, id), without_identifiers(&nowhere, UNKNOWN), "{said}");
             *refused.entry(*name).or_insert(0) += usize::from(there.status == StatusCode::NOT_FOUND);
         }
     }
@@ -184,7 +184,8 @@ async fn restricted_study_looks_unknown_to_whoever_is_no_member_at_every_door() 
             let there = knock(&closed.service, who, method, path, &closed.names[start.as_str()]).await;
             let nowhere = knock(&closed.service, who, method, path, UNKNOWN).await;
             let said = format!("{method} {path} as {name}: {} {}", there.status, there.text);
-            let same = told(&there, &closed.names[start.as_str()]) == told(&nowhere, UNKNOWN);
+            let same =
+                without_identifiers(&there, &closed.names[start.as_str()]) == without_identifiers(&nowhere, UNKNOWN);
             assert_eq!(same, there.status == StatusCode::FORBIDDEN, "{said}");
         }
     }
@@ -245,7 +246,7 @@ async fn lists_show_a_restricted_study_to_its_members_alone() {
         let there = send(service, who, &Method::GET, &path.replace("{}", &study.to_string()), "", "").await;
         let nowhere = send(service, who, &Method::GET, &path.replace("{}", UNKNOWN), "", "").await;
         assert_eq!(there.status, StatusCode::NOT_FOUND, "{path}: {}", there.text);
-        assert_eq!(told(&there, &study.to_string()), told(&nowhere, UNKNOWN), "{path}");
+        assert_eq!(without_identifiers(&there, &study.to_string()), without_identifiers(&nowhere, UNKNOWN), "{path}");
     }
     closed.service.stop().await;
 }
@@ -423,5 +424,71 @@ async fn study_that_is_made_restricted_is_never_open() {
         let access = send(&service, &clinician, &Method::GET, &format!("{address}/members"), "", "").await.json();
         assert_eq!((&access["restricted"], access["members"].as_array().unwrap().len()), (&json!(true), 1), "{access}");
     }
+    service.stop().await;
+}
+
+/// A finished study in which people may answer, and its first three gaits.
+async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
+    let mixed = |new: &mut gaitwright::studies::plan::NewStudy| {
+        (new.feedback_mode, new.trial_budget) = (FeedbackMode::Mixed, 30);
+    };
+    let study = service.study(mixed).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let gaits = trials.iter().filter(|trial| trial.state == TrialState::Converged).take(3);
+    (study, gaits.map(|trial| trial.id.to_string()).collect())
+}
+
+#[tokio::test]
+async fn one_person_answers_a_pair_once_however_the_name_is_written() {
+    let (_folder, service) = service().await;
+    let script = token(&service, &[Right::Read, Right::Answer]).await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let (study, gaits) = answered_by_people(&service).await;
+    let address = format!("/api/v1/studies/{study}/preferences");
+    let answer = |author: Option<&str>, source: &str| {
+        json!({"trial_a": gaits[0], "trial_b": gaits[1], "answer": "a", "source": source, "author": author}).to_string()
+    };
+    for (author, status) in [
+        ("Bob Lee", StatusCode::CREATED),
+        ("bob lee", StatusCode::CONFLICT),
+        ("BOB  LEE", StatusCode::CONFLICT),
+        ("\u{c9}mile", StatusCode::CREATED),
+        ("\u{e9}mile", StatusCode::CONFLICT),
+    ] {
+        let sent = send(&service, &script, &Method::POST, &address, JSON, &answer(Some(author), "subject")).await;
+        assert_eq!(sent.status, status, "{author}: {}", sent.text);
+    }
+    // Who signed in is known.
+    let other = send(&service, &clinician, &Method::POST, &address, JSON, &answer(Some("Ada"), "clinician")).await;
+    assert_eq!(other.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", other.text);
+    let own = send(&service, &clinician, &Method::POST, &address, JSON, &answer(None, "clinician")).await;
+    assert_eq!(own.status, StatusCode::CREATED, "{}", own.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn trial_of_another_study_is_answered_as_one_that_does_not_exist() {
+    let (_folder, service) = service().await;
+    let clinician = signed_in(&service, Role::Clinician).await;
+    let (study, gaits) = answered_by_people(&service).await;
+    let (_, foreign) = answered_by_people(&service).await;
+    let api = format!("/api/v1/studies/{study}");
+    let told = async |id: &str| {
+        let mut all = Vec::new();
+        for (path, body) in [
+            ("preferences", json!({"trial_a": gaits[0], "trial_b": id, "answer": "a"})),
+            ("remarks", json!({"first": gaits[0], "second": id, "answer": "cannot_tell"})),
+            ("lab-sessions", json!({"gait_one": gaits[0], "gait_two": id})),
+            ("suggestions", json!({"over": id, "bounds": {"a6": 0.2}})),
+        ] {
+            let answer =
+                send(&service, &clinician, &Method::POST, &format!("{api}/{path}"), JSON, &body.to_string()).await;
+            assert!(answer.status.is_client_error(), "{path}: {}", answer.text);
+            all.push(without_identifiers(&answer, id));
+        }
+        all
+    };
+    assert_eq!(told(&foreign[0]).await, told(UNKNOWN).await);
     service.stop().await;
 }

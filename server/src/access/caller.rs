@@ -45,7 +45,7 @@ impl Caller {
         let rates_only = scopes.iter().all(|scope| *scope == Right::Rate);
         Self {
             reach: if rates_only { Reach::Assigned(principal) } else { Reach::Open(principal) },
-            actor: Actor::named(&format!("token {name}")),
+            actor: Actor::named(&format!("{}{name}", Actor::OF_TOKENS)),
             name: name.to_owned(),
             user: None,
             role: None,

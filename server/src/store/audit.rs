@@ -20,6 +20,14 @@ pub struct Actor {
 }
 
 impl Actor {
+    /// How the text of a token begins; that of a user begins with the role.
+    pub const OF_TOKENS: &str = "token ";
+
+    /// Whether the text of an actor is that of a token.
+    pub fn is_token(text: &str) -> bool {
+        text.starts_with(Self::OF_TOKENS)
+    }
+
     /// The program itself.
     pub fn program() -> Self {
         Self::named(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))

@@ -280,39 +280,25 @@ pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -
     rows.iter().rev().map(from_row).collect()
 }
 
-/// Whose answers.
-#[derive(Debug, Clone, Copy)]
-pub enum Whose<'a> {
-    /// Those of this author.
-    Own(&'a str),
-    /// Those of everybody else.
-    Others(&'a str),
-}
-
-/// At most `limit` comparisons of two trials, whichever was named first, by people and scripts, that were not taken back:
-/// the newest first.
+/// At most `limit` comparisons of two trials, whichever was named first, by people and scripts, that were not taken back, but
+/// those of one author: the newest first.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn of_pair(
     db: &mut Connection,
     (a, b): (TrialId, TrialId),
-    whose: Whose<'_>,
+    except: Option<&str>,
     limit: u32,
 ) -> StoreResult<Vec<FeedbackRow>> {
-    let (author, own) = match whose {
-        Whose::Own(author) => (author, true),
-        Whose::Others(author) => (author, false),
-    };
     let rows = sqlx::query(select(
-        "where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and (f.author = ?3) = ?5 \
+        "where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) and (?3 is null or f.author <> ?3) \
          and f.source in ('subject', 'clinician', 'script') and r.feedback_seq is null order by f.seq desc limit ?4",
     ))
     .bind(a)
     .bind(b)
-    .bind(author)
+    .bind(except)
     .bind(limit)
-    .bind(own)
     .fetch_all(db)
     .await?;
     rows.iter().map(from_row).collect()

@@ -4,11 +4,12 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
-use crate::store::feedback::{FeedbackRow, Said, Source, Voice, Whose};
+use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
 use crate::store::presentations::Said as Judgement;
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies, trials};
+use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies};
 use crate::studies::preference::{self, Again, Statement};
+use crate::studies::walkable;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -88,6 +89,10 @@ pub fn voice<'a>(
         return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
+    // Who signed in speaks as a clinician under no other name.
+    if caller.user.is_some() && source == Source::Clinician && author != caller.name {
+        return Err(Error::invalid("author", author, &format!("{}, who is signed in, or absent", caller.name)));
+    }
     printable::note("note", note, 2000)?;
     Ok(Voice { source, author, note })
 }
@@ -101,7 +106,7 @@ const BESIDE: u32 = 20;
 /// What the database reports.
 pub async fn beside(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
     let (Said::Preference { winner: a, loser: b } | Said::Tie { a, b }) = row.said else { return Ok(Vec::new()) };
-    Ok(feedback::of_pair(db, (a, b), Whose::Others(&row.author), BESIDE).await?)
+    Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)
 }
 
 /// Takes an answer back.
@@ -122,7 +127,7 @@ pub async fn retract(
     }
     let row = feedback::get(writer, id).await?;
     if study.is_some_and(|study| study != row.study_id) {
-        return Err(Error::NotFound { what: "in this study, preference".to_owned(), id: id.to_string() });
+        return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
     }
     consents::may_be_shown(writer, row.study_id).await?;
     if matches!(row.said, Said::Label { .. }) {
@@ -142,12 +147,9 @@ pub async fn retract(
 /// A trial of the study whose gait converged; `field` named it.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Invalid`] for a trial of another study and for one without a gait.
+/// [`Error::Invalid`] for a trial that is none of the study and for one without a gait.
 pub async fn comparable(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
-    let trial = trials::get(db, id).await?;
-    if trial.study_id != study {
-        return Err(Error::invalid(field, id.to_string(), "a trial of this study"));
-    }
+    let trial = walkable::trial_of_study(db, study, field, id).await?;
     if trial.state != TrialState::Converged {
         let allowed = format!("a converged trial; trial {} is {}", trial.number, trial.state.as_str());
         return Err(Error::invalid(field, id.to_string(), &allowed));

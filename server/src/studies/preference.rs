@@ -3,7 +3,8 @@
 
 use super::walkable::{self, Grounds, NotWalkable, WalkablePair, is_same_gait, trial_of_study};
 use crate::error::Error;
-use crate::store::feedback::{self, Said, Source, Voice, Whose};
+use crate::printable;
+use crate::store::feedback::{self, FeedbackRow, Said, Source, Voice};
 use crate::store::presentations::Said as Judgement;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, remarks};
@@ -117,12 +118,15 @@ pub async fn standing_answer(
 ) -> Result<Option<StandingAnswer>, Error> {
     let of_pair = |pair: (TrialId, TrialId)| pair == (a, b) || pair == (b, a);
     let noted = remarks::of_study(db, study).await?;
-    let noted = noted.iter().rfind(|r| r.retraction.is_none() && r.author == author && of_pair(r.pair()));
+    let noted = noted
+        .iter()
+        .rfind(|r| r.retraction.is_none() && printable::is_same_name(&r.author, author) && of_pair(r.pair()));
     if let Some(noted) = noted {
         return Ok(Some(StandingAnswer::Note(noted.id)));
     }
-    let given = feedback::of_pair(db, (a, b), Whose::Own(author), u32::MAX).await?;
-    Ok(given.into_iter().find(|row| !row.by_rater).map(|row| StandingAnswer::Preference(row.id)))
+    let given = feedback::of_pair(db, (a, b), None, u32::MAX).await?;
+    let own = |row: &FeedbackRow| !row.by_rater && printable::is_same_name(&row.author, author);
+    Ok(given.into_iter().find(own).map(|row| StandingAnswer::Preference(row.id)))
 }
 
 async fn refuse_second_answer(

@@ -93,7 +93,7 @@ pub async fn retract(
 ) -> Result<Remark, Error> {
     let remark = remarks::get(writer, id).await?;
     if study.is_some_and(|study| study != remark.study_id) {
-        return Err(Error::NotFound { what: "in this study, remark".to_owned(), id: id.to_string() });
+        return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
     }
     consents::may_be_shown(writer, remark.study_id).await?;
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;

@@ -7,7 +7,7 @@ use super::objections::Objections;
 use crate::error::Error;
 use crate::store::certificates::{self, CertificateOnRecord};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, StoreResult, StudyId, TrialId, consents, gaits, trials};
+use crate::store::{Connection, StoreError, StoreResult, StudyId, TrialId, consents, gaits, trials};
 use gait_optimizer::export::ControllerFile;
 use gait_optimizer::{Gait, SolveReport};
 use std::collections::HashMap;
@@ -253,13 +253,13 @@ pub async fn admit_pair(
 /// A trial of this study; `field` named it.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Invalid`] for a trial of another study.
+/// [`Error::Invalid`], the same for a trial of another study and for one that does not exist.
 pub async fn trial_of_study(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
-    let trial = trials::get(db, id).await?;
-    if trial.study_id != study {
-        return Err(Error::invalid(field, id.to_string(), "a trial of this study"));
+    match trials::get(db, id).await {
+        Ok(trial) if trial.study_id == study => Ok(trial),
+        Ok(_) | Err(StoreError::Missing { .. }) => Err(Error::invalid(field, id.to_string(), "a trial of this study")),
+        Err(other) => Err(other.into()),
     }
-    Ok(trial)
 }
 
 /// Whether two trials gave the very same motion, as when a bound changed that no gait comes near. So many figures agree to

@@ -250,6 +250,9 @@ async fn read_back(db: &mut Connection, standing: &Standing, saved: Recorded) ->
     Ok(match saved {
         Recorded::Preference(id) => {
             let row = feedback::get(db, id).await?;
+            if row.study_id != standing.study.id {
+                return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
+            }
             let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, standing)?));
             let beside = answer::beside(db, &row).await?.into_iter().filter_map(said).collect();
             answer_in_words(&row, standing).map(|text| Saved {
@@ -262,6 +265,9 @@ async fn read_back(db: &mut Connection, standing: &Standing, saved: Recorded) ->
         }
         Recorded::Remark(id) => {
             let remark = remarks::get(db, id).await?;
+            if remark.study_id != standing.study.id {
+                return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
+            }
             remark_in_words(&remark, standing).map(|text| Saved {
                 id: saved,
                 text,

@@ -153,16 +153,18 @@ pub async fn for_device(
     Ok(row.bind(id).fetch_optional(db).await?.map(|row| row.try_get(0)).transpose()?)
 }
 
-/// Whether somebody who reads has a controller file of a lab session of this study.
+/// Whether somebody who reads may have a controller file of a lab session of this study. Who holds a token is not known: a
+/// token may be anybody's, and anybody may hold one.
 ///
 /// # Errors
 /// What the database reports.
 pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> StoreResult<bool> {
     let row = sqlx::query(
         "select 1 from lab_device_files f join lab_sessions l on l.id = f.session_id \
-         where l.study_id = ? and f.actor = ? and f.to_device = 0 limit 1",
+         where l.study_id = ?1 and (f.actor = ?2 or ?3 or f.actor glob ?4) and f.to_device = 0 limit 1",
     );
-    Ok(row.bind(study).bind(actor.as_str()).fetch_optional(db).await?.is_some())
+    let (is_token, of_tokens) = (Actor::is_token(actor.as_str()), format!("{}*", Actor::OF_TOKENS));
+    Ok(row.bind(study).bind(actor.as_str()).bind(is_token).bind(of_tokens).fetch_optional(db).await?.is_some())
 }
 
 /// Draws which gait of a pair is shown first: a fair coin each time, because the answers that the study hears tell the orders

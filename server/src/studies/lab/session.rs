@@ -179,9 +179,11 @@ pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     }
 }
 
-/// Whether somebody had fetched a controller file of this session before an instant.
+/// Whether somebody may have fetched a controller file of this session before an instant. Who holds a token is not known: a
+/// token may be anybody's, and anybody may hold one.
 pub(super) fn has_file(session: &LabSession, actor: &str, at: Instant) -> bool {
-    session.allocation.files.iter().any(|file| !file.to_device && file.actor == actor && file.at <= at)
+    let may_be = |other: &str| other == actor || Actor::is_token(other) || Actor::is_token(actor);
+    session.allocation.files.iter().any(|file| !file.to_device && may_be(&file.actor) && file.at <= at)
 }
 
 /// Which of a session's two gaits.
