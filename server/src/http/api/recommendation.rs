@@ -13,6 +13,7 @@ use crate::store::{StudyId, TrialId, schema, studies};
 use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended::{self, CertificateState};
 use crate::studies::standing::Standing;
+use crate::studies::walkable::Grounds;
 use crate::studies::walkable::WalkableGait;
 use axum::Json;
 use axum::extract::State;
@@ -132,13 +133,15 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Error> 
     let best = *ranking.first().ok_or_else(|| {
         Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better")
     })?;
-    let walkable = ranking.iter().enumerate().find_map(|(place, id)| {
-        let trial = standing.trial(*id)?;
-        Some((place, trial, standing.walkable(trial).ok()?))
-    });
     let mut reader = app.read().await?;
     let unexamined = recommended::judged(&mut reader, &ranking).await?.unexamined;
     let examining = unexamined.is_some_and(|next| app.director.examine(id, next));
+    // Read after that: once nothing is being certified, every certificate is known here.
+    let grounds = Grounds::read(&mut reader, id).await?;
+    let walkable = ranking.iter().enumerate().find_map(|(place, id)| {
+        let trial = standing.trial(*id)?;
+        Some((place, trial, grounds.admit(trial).ok()?))
+    });
     let Some((place, trial, gait)) = walkable else {
         let why = if examining {
             "nothing is recommended yet: the best gait is being certified; ask again".to_owned()
@@ -158,7 +161,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Error> 
         examining,
         passing: judged.passing.and_then(|id| {
             let trial = standing.trial(id)?;
-            Some(Recommended::of(&standing.walkable(trial).ok()?, trial))
+            Some(Recommended::of(&grounds.admit(trial).ok()?, trial))
         }),
     })
 }
