@@ -358,3 +358,101 @@ fn every_operation_has_an_identifier_of_its_own() {
     }
     assert!(known.len() > 100, "{}", known.len());
 }
+
+/// Bodies that fit a schema, drawn from it: ranges with their ends, texts that are never the same twice.
+struct Drawn {
+    state: u64,
+    drawn: u64,
+}
+
+impl Drawn {
+    /// A whole number below `end` (SplitMix64, Steele et al. 2014).
+    fn below(&mut self, end: u64) -> u64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (mixed ^ (mixed >> 31)) % end
+    }
+
+    fn value(&mut self, schema: &Value) -> Value {
+        let kind = match &schema["type"] {
+            Value::Array(_) if self.below(4) == 0 => return Value::Null,
+            Value::Array(kinds) => kinds[0].as_str().unwrap(),
+            kind => kind.as_str().unwrap(),
+        };
+        match kind {
+            "boolean" => json!(self.below(2) == 0),
+            "number" => {
+                let (least, most) = (schema["minimum"].as_f64().unwrap(), schema["maximum"].as_f64().unwrap());
+                json!(match self.below(4) {
+                    0 => least,
+                    1 => most,
+                    _ => least + (most - least) * (self.below(1000) as f64 / 1000.0),
+                })
+            }
+            "string" => {
+                self.drawn += 1;
+                json!(format!("drawn {}", self.drawn))
+            }
+            "object" => {
+                let required = schema["required"].as_array().cloned().unwrap_or_default();
+                let mut object = serde_json::Map::new();
+                for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+                    if required.contains(&json!(name)) || self.below(2) == 0 {
+                        object.insert(name.clone(), self.value(property));
+                    }
+                }
+                if schema["additionalProperties"].is_object() {
+                    object.insert("more".to_owned(), self.value(&schema["additionalProperties"]));
+                }
+                Value::Object(object)
+            }
+            other => panic!("{other} is not drawn"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn devices_and_muscles_are_accepted_exactly_where_they_fit_the_description() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let subject = service.subject().await;
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut drawn = Drawn { state: 1, drawn: 0 };
+    for path in ["/api/v1/devices", "/api/v1/subjects/{id}/muscles"] {
+        let schema = &document["paths"][path]["post"]["requestBody"]["content"]["application/json"]["schema"];
+        let address = path.replace("{id}", &subject.to_string());
+        for _ in 0..100 {
+            let body = drawn.value(schema);
+            let answer = service.post(&address, &body).await;
+            assert_eq!(answer.status, StatusCode::CREATED, "{path}: {body}: {}", answer.text);
+        }
+        // Every number beyond either end of its range is refused by name.
+        let mut refused = 0;
+        let groups = schema["properties"].as_object().unwrap().iter();
+        let groups = groups.filter(|(_, property)| property["properties"].is_object());
+        let places: Vec<(Option<&String>, &Value)> =
+            groups.map(|(name, group)| (Some(name), group)).chain([(None, schema)]).collect();
+        for (group, fields) in places {
+            for (name, field) in fields["properties"].as_object().unwrap() {
+                let (Some(least), Some(most)) = (field["minimum"].as_f64(), field["maximum"].as_f64()) else {
+                    continue;
+                };
+                let width = most - least;
+                for beyond in [least - 1e-6 * width, most + 1e-6 * width] {
+                    let mut body = drawn.value(schema);
+                    match group {
+                        Some(group) => body[group] = json!({ name: beyond }),
+                        None => body[name] = json!(beyond),
+                    }
+                    let answer = service.post(&address, &body).await;
+                    assert_eq!(answer.status, StatusCode::UNPROCESSABLE_ENTITY, "{path}: {body}: {}", answer.text);
+                    assert!(answer.json()["field"].as_str().unwrap().ends_with(name.as_str()), "{}", answer.text);
+                    refused += 1;
+                }
+            }
+        }
+        assert!(refused >= 40, "{path}: {refused}");
+    }
+    service.stop().await;
+}

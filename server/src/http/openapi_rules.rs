@@ -8,7 +8,8 @@ use crate::document;
 use crate::error::Error;
 use crate::studies::plan::LARGEST_SEED;
 use gait_learner::LearnerSettings;
-use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
+use gait_optimizer::{Device, GaitSettings, SolveOptions, Subject, TunedBounds};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
@@ -31,6 +32,10 @@ const NAMES: [(&str, &str, u32); 11] = [
     ("RemarkToMake", "author", 80),
     ("Suggestion", "author", 80),
 ];
+
+/// What a schema cannot say of a recording.
+const RECORDING: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at least \
+                         one whole stride of a walking person. Heel strikes and columns that are named must be in it.";
 
 /// Adds the rules to a description.
 pub(super) fn state(document: &mut Value) {
@@ -87,6 +92,13 @@ pub(super) fn state(document: &mut Value) {
             tell.insert("then".to_owned(), rmse);
             tell.insert("else".to_owned(), reason);
         }
+        add(schemas, "NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
+        add(schemas, "NewReferenceGait", "recording", &json!({ "minLength": 1, "x-depends": RECORDING }));
+        for (field, (least, most)) in
+            [("height_m", Subject::HEIGHT_RANGE_M), ("body_mass_kg", Subject::BODY_MASS_RANGE_KG)]
+        {
+            add(schemas, "NewReferenceGait", field, &json!({ "minimum": least, "maximum": most }));
+        }
         for component in ["NewStudy", "Fork"] {
             add(schemas, component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
             add(schemas, component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
@@ -120,6 +132,24 @@ pub(super) fn state(document: &mut Value) {
             "learner",
             settings(LearnerSettings::default(), |s: &LearnerSettings| s.validate().err().map(Error::Learner)),
         );
+    }
+    let muscles = muscles();
+    if let Some(present) =
+        document.pointer_mut("/components/schemas/NewStudy/properties/gait_settings/properties/muscles")
+    {
+        *present = muscles.clone();
+    }
+    let device = device(&one_line);
+    for (path, part, schema) in [
+        ("devices", "post/requestBody", device),
+        ("subjects~1{id}~1muscles", "post/requestBody", muscles.clone()),
+        ("subjects~1{id}~1muscles", "post/responses/201", muscles.clone()),
+        ("subjects~1{id}~1muscles", "get/responses/200", muscles),
+    ] {
+        let place = format!("/paths/~1api~1v1~1{path}/{part}/content/application~1json/schema");
+        if let Some(present) = document.pointer_mut(&place) {
+            *present = schema;
+        }
     }
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
         for (path, item) in paths {
@@ -191,6 +221,43 @@ fn describe(schemas: &mut Map<String, Value>, field: &str) {
     const DEPENDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a dimension increase, each within the range of its \
                            bound; its lengthscale lies between a hundredth of their smallest step and 10,000 times their range.";
     add(schemas, "NewStudy", field, &json!({ "x-depends": DEPENDS }));
+}
+
+/// The schema of a device file; no two devices have one name.
+fn device(name: &str) -> Value {
+    let mut properties = Map::new();
+    properties.insert("name".to_owned(), json!({ "type": "string", "minLength": 1, "maxLength": 80, "pattern": name }));
+    properties.insert("carried_limb".to_owned(), json!({ "type": "boolean" }));
+    for field in &Device::FIELDS {
+        properties.insert(field.name.to_owned(), number(field.meaning, field.minimum, field.maximum, &json!("number")));
+    }
+    let required: Vec<String> = properties.keys().cloned().collect();
+    let texts = json!({ "type": "object", "additionalProperties": { "type": "string" } });
+    properties.insert("sources".to_owned(), texts);
+    json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+}
+
+/// The schema of muscle parameters: what is left out stays as in the published table, and a muscle has lever arms only at
+/// the joints that it spans.
+fn muscles() -> Value {
+    let published = MuscleParameters::default();
+    let mut properties = Map::new();
+    properties.insert("scaled_to_body".to_owned(), json!({ "type": "boolean" }));
+    let anybody = Subject { height_m: Subject::HEIGHT_RANGE_M.0, body_mass_kg: Subject::BODY_MASS_RANGE_KG.0 };
+    for (kind, _) in published.overrides() {
+        let Some(muscle) = published.muscle_of_kind(&anybody, kind) else { continue };
+        let fields = MuscleOverride::FIELDS.iter().filter(|field| (field.value)(&muscle).is_some());
+        let numbers: Map<String, Value> = fields
+            .map(|f| (f.name.to_owned(), number(f.meaning, f.minimum, f.maximum, &json!(["number", "null"]))))
+            .collect();
+        let schema = json!({ "type": "object", "properties": numbers, "additionalProperties": false });
+        properties.insert(kind.to_owned(), schema);
+    }
+    json!({ "type": "object", "properties": properties, "additionalProperties": false })
+}
+
+fn number(meaning: &str, minimum: f64, maximum: f64, kind: &Value) -> Value {
+    json!({ "type": kind, "description": meaning, "minimum": minimum, "maximum": maximum })
 }
 
 /// The schema of settings: the shape of their defaults, with what their own checks say when a value is far out of range.
