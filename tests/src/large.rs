@@ -31,8 +31,13 @@ pub async fn fill(database: &Path, study: StudyId) {
 pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     let store = Store::open(database).await.unwrap();
     let mut writer = store.write().await.unwrap();
+    let before: u32 = sqlx::query_scalar("select max(number) from trials where study_id = ?")
+        .bind(study.to_string())
+        .fetch_one(&mut **writer)
+        .await
+        .unwrap();
     sqlx::query(
-        "with recursive n(i) as (select 4 union all select i + 1 from n where i < ?1)
+        "with recursive n(i) as (select ?3 + 1 union all select i + 1 from n where i < ?1)
          insert into trials (id, study_id, number, action_index, action, reason, best_before, state, status,
              gait_rmse_rad, cost_of_transport, objective, max_violation, iterations, seconds_total, report, violations,
              created_at, started_at, finished_at)
@@ -43,15 +48,17 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     )
     .bind(trials)
     .bind(study.to_string())
+    .bind(before)
     .execute(&mut **writer)
     .await
     .unwrap();
     sqlx::query(
         "insert into feedback (id, study_id, kind, trial_a, category, source, author, created_at)
          select printf('01890001-0000-7000-8%s-%012d', substr(study_id, 34, 3), number), study_id, 'label', id, 1, 'convergence', 'x', created_at from trials
-         where study_id = ?1 and number > 3",
+         where study_id = ?1 and number > ?2",
     )
     .bind(study.to_string())
+    .bind(before)
     .execute(&mut **writer)
     .await
     .unwrap();
@@ -59,9 +66,10 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
         "insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
          select printf('01890002-0000-7000-8%s-%012d', substr(t.study_id, 34, 3), t.number), t.study_id, 'preference', f.id, t.id, 'clinician', 'x', t.created_at
          from trials t join trials f on f.study_id = t.study_id and f.number = 1
-         where t.study_id = ?1 and t.number > 3",
+         where t.study_id = ?1 and t.number > ?2",
     )
     .bind(study.to_string())
+    .bind(before)
     .execute(&mut **writer)
     .await
     .unwrap();

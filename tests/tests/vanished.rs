@@ -66,8 +66,15 @@ async fn writes_are_refused_when_the_log_or_the_file_was_cut() {
     for ending in ["", "-wal"] {
         let (_folder, database, service) = service().await;
         assert_eq!(add_subjects(&service, "before", 5).await, (5, 0));
+        // In the middle of a change, whose commit makes the log longer than it was.
+        let mut writer = service.store.write().await.unwrap();
+        let sql =
+            "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values ('S', 'S', 1.8, 70, '')";
+        sqlx::query(sql).execute(&mut **writer).await.unwrap();
         let file = std::fs::OpenOptions::new().write(true).open(beside(&database, ending)).unwrap();
         file.set_len(100).unwrap();
+        let refused = gaitwright::store::commit(writer).await;
+        assert!(matches!(refused, Err(StoreError::RecordVanished { .. })), "{ending}: {refused:?}");
         assert_eq!(add_subjects(&service, "after", 20).await, (0, 20), "{ending}");
         service.abandon().await;
     }

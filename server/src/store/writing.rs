@@ -200,6 +200,8 @@ impl Shared {
             Some(anchors) => Some((anchors, anchor::ends(connection).await?)),
             None => None,
         };
+        // The commit makes a log that was cut as long as before, with a hole in it: its length tells nothing afterwards.
+        self.outside.check()?;
         run(connection, "commit").await?;
         // Nobody is told that a change is durable which went into a file that nobody will find again.
         self.outside.check()?;
