@@ -189,8 +189,9 @@ async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
     let script = callers::token(&service, &[Right::Read, Right::Rate]).await;
     let program = callers::token(&service, &[Right::Rate]).await;
     member(&service, study, MemberKind::Token, "[Rate]").await;
+    let rater = rater_of(&service, &[study]).await;
     let next = format!("/api/v1/studies/{study}/blind/next");
-    for (who, unblinded) in [(&clinician, true), (&script, true), (&program, false)] {
+    for (who, unblinded) in [(&clinician, true), (&script, true), (&program, true), (&rater, false)] {
         service.wait_for(study, &[StudyState::Waiting]).await;
         let mut pair = Value::Null;
         while pair.is_null() {
@@ -207,7 +208,7 @@ async fn answers_of_whoever_could_have_known_are_recorded_as_not_blind() {
     }
     let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
     let marked: Vec<_> = figures.json().as_array().unwrap().iter().map(|rater| rater["unblinded"].clone()).collect();
-    assert_eq!(marked, [json!(0), json!(1), json!(1)], "by name: {}", figures.text);
+    assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", figures.text);
     service.stop().await;
 }
 

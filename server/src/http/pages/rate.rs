@@ -2,7 +2,7 @@
 
 use super::error::{Page, PageError, page};
 use super::format::words;
-use crate::access::{Caller, Rate, Right, sign_in};
+use crate::access::{Caller, Rate, sign_in};
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::blind_motion::{blind_stride, phase};
@@ -122,7 +122,7 @@ pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(bef
         .collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
     let assigned = members::reaches_any(&mut reader, reach).await?;
-    let not_blind = may.caller.may(Right::Read);
+    let not_blind = blind::sees_gaits(&may.caller);
     page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
 }
 
@@ -179,7 +179,8 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, token).await?;
     let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
-    let not_blind = caller.may(Right::Read);
+    let not_blind = shown.presentation.unblinded
+        || blind::could_have_known(&mut reader, caller, shown.presentation.study_id).await?;
     if shown.presentation.answer.is_some() {
         let saved = read_back(&mut reader, shown).await?;
         return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
