@@ -308,7 +308,7 @@ fn every_route_is_classified() {
 
 /// What each command has to do with people and devices.
 const COMMANDS: [(&str, &str); 22] = [
-    ("convert", "makes a controller file of a gait file that no record knows: certifies it and says so"),
+    ("convert", "makes tables and pictures of a gait file, and nothing for a device"),
     ("import", "writes the rows of an archive after checking them: `archives.rs` holds its rules"),
     ("signing-key", "makes a key to sign archives"),
     ("audit", "reads the record"),

@@ -3,7 +3,7 @@
 use super::problem::read;
 use crate::document;
 use crate::error::Error;
-use gait_optimizer::{Gait, SolveOutcome, SolveStatus};
+use gait_optimizer::{Gait, SolveOutcome};
 use serde_json::Value;
 use std::path::Path;
 
@@ -12,21 +12,13 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Malformed`] with the file's name and the reason.
 pub(super) fn read_gait(path: &Path) -> Result<Gait, Error> {
-    read_gait_and_status(path).map(|(gait, _)| gait)
-}
-
-/// The same, with how the solve ended where the file says it.
-///
-/// # Errors
-/// [`Error::Malformed`] with the file's name and the reason.
-pub(super) fn read_gait_and_status(path: &Path) -> Result<(Gait, Option<SolveStatus>), Error> {
     let text = read(path)?;
     let bytes = text.as_bytes();
     let gait = document::read::<Value>(bytes).and_then(|value| {
         if value.get("gait").is_some() {
-            document::read::<SolveOutcome>(bytes).map(|outcome| (outcome.gait, Some(outcome.report.status)))
+            document::read::<SolveOutcome>(bytes).map(|outcome| outcome.gait)
         } else {
-            document::read(bytes).map(|gait| (gait, None))
+            document::read(bytes)
         }
     });
     gait.map_err(|e| Error::Malformed(format!("{}: not a gait: {e}", path.display())))
