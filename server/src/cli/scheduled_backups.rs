@@ -3,10 +3,10 @@
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::{Store, backup, commit};
+use crate::supervise::Task;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
-use tokio_util::sync::CancellationToken;
 
 /// A copy that failed is tried again after so long.
 const RETRY: Duration = Duration::from_mins(10);
@@ -20,9 +20,10 @@ pub(super) struct BackupPlan {
 }
 
 impl BackupPlan {
-    /// Makes copies until the service stops. What fails is logged and tried again.
-    pub(super) async fn follow(self, store: Store, stopping: CancellationToken) {
+    /// Makes copies as long as the task runs. What fails is logged and tried again.
+    pub(super) async fn follow(self, store: Store, task: Task) -> Result<(), Error> {
         loop {
+            task.works();
             let wait = match self.due_in(&store) {
                 Ok(Duration::ZERO) => match self.copy(&store).await {
                     Ok(()) => continue,
@@ -31,10 +32,7 @@ impl BackupPlan {
                 Ok(wait) => wait,
                 Err(error) => self.failed(&Error::Internal(error.to_string())),
             };
-            tokio::select! {
-                () = stopping.cancelled() => return,
-                () = tokio::time::sleep(wait) => {}
-            }
+            tokio::time::sleep(wait).await;
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::config::{Flags, Settings};
 use super::output::tell;
+use super::scheduled_backups::BackupPlan;
 use crate::access::people;
 use crate::error::Error;
 use crate::http::access_log::keep_pruning;
@@ -89,7 +90,6 @@ impl Serve {
         let access = Arc::new(access);
         // What commands exported while no service ran.
         access.log.write(&store, true).await?;
-        let pruning = access_log_days.map(|days| tokio::spawn(keep_pruning(store.clone(), days)));
         let mut state = AppState::new(director.clone(), Arc::clone(&access), hosts);
         state.proxies = proxies.clone();
         let app = router(state);
@@ -97,10 +97,7 @@ impl Serve {
             let director = director.clone();
             async move { Box::pin(director.run()).await }
         });
-        let dropping = tokio::spawn(retention::keep_dropping(store.clone()));
-        if let Some(plan) = backups {
-            tokio::spawn(plan.follow(store.clone(), director.stopping()));
-        }
+        let chores = tokio::spawn(keep_house(director.clone(), store.clone(), access_log_days, backups));
         tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");
@@ -134,11 +131,8 @@ impl Serve {
             None => server.http1_only().serve(service).await,
         };
         director.stop();
-        dropping.abort();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
-        if let Some(pruning) = pruning {
-            pruning.abort();
-        }
+        chores.await.map_err(|e| Error::Internal(e.to_string()))?;
         access.log.write(&store, true).await?;
         store.close().await;
         served.map_err(|e| Error::Internal(e.to_string()))
@@ -204,4 +198,22 @@ pub(super) async fn interrupted() {
     if tokio::signal::ctrl_c().await.is_err() {
         std::future::pending::<()>().await;
     }
+}
+
+/// What the service does by itself beside tuning, until the director is told to stop: drops what is past its time, and makes
+/// copies. What fails is logged and tried again; a task that panics is begun again, and `/ready` says so.
+async fn keep_house(director: Director, store: Store, access_log_days: Option<u32>, backups: Option<BackupPlan>) {
+    let dropping =
+        director.keep("dropping what is past its time", |task| retention::keep_dropping(store.clone(), task));
+    let pruning = async {
+        if let Some(days) = access_log_days {
+            director.keep("pruning the access log", |task| keep_pruning(store.clone(), days, task)).await;
+        }
+    };
+    let copying = async {
+        if let Some(plan) = backups {
+            director.keep("copying the record", |task| plan.clone().follow(store.clone(), task)).await;
+        }
+    };
+    tokio::join!(dropping, pruning, copying);
 }

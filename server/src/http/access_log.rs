@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::store::access_log::{self, Access, Kind, Tally};
 use crate::store::audit::Actor;
 use crate::store::{Store, StoreResult, access_spool, commit, now};
+use crate::supervise::Task;
 use axum::extract::{MatchedPath, RawPathParams, Request, State};
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
@@ -167,9 +168,10 @@ async fn keep_writing(app: AppState) {
 }
 
 /// Drops rows that are older than so many days, and again every hour.
-pub async fn keep_pruning(store: Store, days: u32) {
+pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Error> {
     const ROWS: u32 = 500;
     loop {
+        task.works();
         let pruned = async {
             let mut writer = store.write().await?;
             let rows = access_log::prune(&mut writer, &Actor::program(), days, ROWS).await?;

@@ -3,6 +3,7 @@
 
 use crate::error::Error;
 use crate::store::{Store, commit, idempotency, now, sessions};
+use crate::supervise::Task;
 use std::time::Duration;
 
 /// Answers to requests with an Idempotency-Key are kept so many days: a client that retries later has given up before.
@@ -43,8 +44,9 @@ pub async fn drop_expired(store: &Store) -> Result<Dropped, Error> {
 }
 
 /// Drops what is past its time, now and every hour; what fails is tried again in the next round.
-pub async fn keep_dropping(store: Store) {
+pub async fn keep_dropping(store: Store, task: Task) -> Result<(), Error> {
     loop {
+        task.works();
         match drop_expired(&store).await {
             Ok(Dropped { answers: 0, sessions: 0, links: 0 }) => {}
             Ok(Dropped { answers, sessions, links }) => {
