@@ -301,7 +301,8 @@ pub async fn leased(db: &mut Connection, engine: Option<&str>) -> StoreResult<Ve
 /// What the database reports.
 pub async fn depth(db: &mut Connection) -> StoreResult<(u32, u32)> {
     let row = sqlx::query(
-        "select coalesce(sum(state = 'queued'), 0) as queued, coalesce(sum(state = 'leased'), 0) as leased from jobs",
+        "select (select count(*) from jobs where state = 'queued') as queued, \
+                (select count(*) from jobs where state = 'leased') as leased",
     )
     .fetch_one(db)
     .await?;

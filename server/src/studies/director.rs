@@ -9,6 +9,7 @@ use super::explainer::Explainer;
 use super::explanation::Effort;
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
+use super::plans_under_way::Plans;
 use super::record;
 use super::rehearsal::{LikelyNext, PREPARED, Prepared, Rehearsals};
 use super::solve_input::SolveInput;
@@ -177,6 +178,14 @@ impl Director {
         self.0.board.close(trial);
     }
 
+    /// Keeps another task of the service running until the director is told to stop; [`Self::trouble`] speaks of it too.
+    pub async fn keep<F>(&self, name: &'static str, begin: impl Fn(Task) -> F)
+    where
+        F: Future<Output = Result<(), Error>> + Send + 'static,
+    {
+        self.0.health.keep(name, &self.0.shutdown, begin).await;
+    }
+
     /// Tells the director to stop; [`Self::run`] returns soon after.
     pub fn stop(&self) {
         self.0.shutdown.cancel();
@@ -236,12 +245,32 @@ impl Director {
         // Once: what is leased after that runs.
         self.0.leases_taken_back.get_or_try_init(|| self.take_back_leases()).await?;
         let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
+        let mut plans = Plans::default();
         loop {
-            self.plan_and_dispatch().await?;
+            self.look_after_leases().await?;
+            self.begin_plans(&mut plans).await?;
+            self.dispatch().await?;
             task.works();
-            // Nothing new for so long, or something new; what comes close together is planned with once.
-            let _ = tokio::time::timeout(pause, self.0.wake.notified()).await;
-            tokio::time::sleep(TOGETHER).await;
+            let looked = tokio::time::sleep(pause);
+            tokio::pin!(looked);
+            loop {
+                tokio::select! {
+                    Some((study, standing)) = plans.next() => {
+                        let again = plans.ended(study, standing?);
+                        self.0.waiting.send_replace(plans.waiting());
+                        self.dispatch().await?;
+                        if again {
+                            break;
+                        }
+                    }
+                    // Nothing new for so long, or something new; what comes close together is planned with once.
+                    () = &mut looked => break,
+                    () = self.0.wake.notified() => {
+                        tokio::time::sleep(TOGETHER).await;
+                        break;
+                    }
+                }
+            }
         }
     }
 
@@ -257,11 +286,10 @@ impl Director {
         Ok(())
     }
 
-    async fn plan_and_dispatch(&self) -> Result<(), Error> {
+    async fn look_after_leases(&self) -> Result<(), Error> {
         let mut reader = self.0.store.read().await?;
         let expired = jobs::expired(&mut reader, now()).await?;
         let held_up = jobs::held_up(&mut reader).await?;
-        let active = studies::active(&mut reader).await?;
         drop(reader);
         for lease in expired {
             self.look_after(&lease).await?;
@@ -269,18 +297,25 @@ impl Director {
         for lease in held_up {
             self.give_back(&lease).await?;
         }
+        Ok(())
+    }
+
+    /// Begins a plan of each active study. Each is made apart: what is computed for a large study holds up no other.
+    async fn begin_plans(&self, plans: &mut Plans) -> Result<(), Error> {
+        let active = studies::active(&mut *self.0.store.read().await?).await?;
         self.withdraw(self.0.rehearsals.forget(|id| active.iter().any(|study| study.id == id))).await;
-        let mut waiting = Vec::new();
+        plans.keep(|id| active.iter().any(|study| study.id == id));
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
-            match self.plan(study.clone()).await {
-                Ok(standing) => waiting.extend(standing),
-                Err(error) if error.is_of_machine() => return Err(error),
-                // It would fail again: somebody has to see it.
-                Err(error) => self.hold(&study, &error).await?,
-            }
+            let director = self.clone();
+            plans.begin(study.id, async move {
+                match director.plan(study.clone()).await {
+                    Err(error) if error.is_of_machine() => Err(error),
+                    // It would fail again: somebody has to see it.
+                    Err(error) => director.hold(&study, &error).await.map(|()| None),
+                    standing => standing,
+                }
+            });
         }
-        self.dispatch().await?;
-        self.0.waiting.send_replace(waiting.into());
         Ok(())
     }
 
@@ -394,6 +429,11 @@ impl Director {
 
     async fn lease(&self) -> Result<Option<Lease>, Error> {
         let engine = &self.0.engine;
+        // Asked with every change: the only writer is left to those who write.
+        let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        if queued == 0 || leased as usize >= engine.size() {
+            return Ok(None);
+        }
         let mut writer = self.0.store.write().await?;
         let until = now().after(engine.lease());
         let Some(lease) = jobs::lease(&mut writer, engine.name(), until, self.0.only, engine.size()).await? else {

@@ -28,6 +28,7 @@ mod next_step;
 pub mod objections;
 pub mod person;
 pub mod plan;
+mod plans_under_way;
 pub mod preference;
 pub mod recommended;
 pub mod record;
