@@ -103,6 +103,8 @@ async fn main() {
     large::fill_to(&database, study, large::TRIALS - 100).await;
     let service = Service::start(&database, Both(Analytic::default()), 1).await;
     let more = json!({"trial_budget": 10_000});
+    // That is the work of this harness; the gaits are certified by now.
+    service.stop_passing_gaits().await;
     let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &more).await;
     println!("the study of {} trials goes on: {}", large::TRIALS - 100, extended.status);
     let solved = service.study(|new| (new.trial_budget, new.muscles) = (500, true)).await;
@@ -110,12 +112,15 @@ async fn main() {
     let address = listener.local_addr().unwrap().to_string();
     let router = service.router();
     tokio::spawn(async move { axum::serve(listener, router).await.unwrap() });
-    let (one, other) = (converged[0].id, converged[1].id);
+    let pairs: Vec<_> = (1..converged.len())
+        .flat_map(|other| (0..other).map(move |one| (one, other)))
+        .map(|(one, other)| (converged[one].id, converged[other].id))
+        .collect();
     let write = format!("/api/v1/studies/{study}/preferences");
     let read = format!("/api/v1/studies/{study}");
 
     let rater = |number: usize| {
-        let (address, write) = (address.clone(), write.clone());
+        let (address, write, pairs) = (address.clone(), write.clone(), pairs.clone());
         std::thread::spawn(move || {
             let mut connection = Connection::open(&address);
             let (begun, mut times) = (Instant::now(), Vec::new());
@@ -125,8 +130,9 @@ async fn main() {
                 let due = (times.len() as f64 + number as f64 / RATERS as f64) * each;
                 let due = begun + Duration::from_secs_f64(due);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));
-                // Each person answers a pair once.
-                let author = format!("{number}-{}", times.len());
+                // Each person answers each pair once.
+                let (one, other) = pairs[times.len() % pairs.len()];
+                let author = format!("{number}-{}", times.len() / pairs.len());
                 let body = json!({"trial_a": one, "trial_b": other, "answer": "a", "author": author}).to_string();
                 assert_eq!(connection.send("POST", &write, &body), 201);
                 times.push(due.elapsed());

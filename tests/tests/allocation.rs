@@ -432,18 +432,31 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
 }
 
 fn is_about_the_request(line: &str) -> bool {
-    // Each form has a key of its own.
-    line.contains("name=\"key\"") || line.contains("request_id")
+    // Each form has a key of its own. Rows of sessions tell when they were last used: these requests use them.
+    let of_session =
+        line.contains("by password") || line.contains("by link") || line.contains("<tr><th scope=\"row\">20");
+    line.contains("name=\"key\"") || line.contains("request_id") || of_session
+}
+
+fn remove_what_tells_the_time(document: &mut Value) {
+    match document {
+        Value::Object(fields) => {
+            for field in ["request_id", "instance", "seen_at", "uptime_s"] {
+                fields.remove(field);
+            }
+            fields.values_mut().for_each(remove_what_tells_the_time);
+        }
+        Value::Array(rows) => rows.iter_mut().for_each(remove_what_tells_the_time),
+        _ => {}
+    }
 }
 
 /// Problem documents carry the identifier of their request.
 fn without_request(text: &str) -> String {
     match serde_json::from_str::<Value>(text) {
-        Ok(Value::Object(mut document)) => {
-            for field in ["request_id", "instance", "seen_at", "uptime_s"] {
-                document.remove(field);
-            }
-            Value::Object(document).to_string()
+        Ok(mut document) if document.is_object() || document.is_array() => {
+            remove_what_tells_the_time(&mut document);
+            document.to_string()
         }
         _ => text
             .split_inclusive(|c: char| !c.is_ascii_hexdigit())

@@ -70,7 +70,10 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     assert!(!shown.contains("do not walk with it") && shown.contains("lets it be walked with again"), "{shown}");
     // The rater's answer stands as it was given; that the other gait is better was never said.
     let mut reader = service.store.read().await.unwrap();
-    assert_eq!(presentations::of_study(&mut reader, study).await.unwrap()[0].answer, Some(Said::UnsafeSecond));
+    // On which side it was shown is drawn anew each time; the record has it as said of the pair.
+    let shown = presentations::of_study(&mut reader, study).await.unwrap().remove(0);
+    let called_unsafe = shown.answer.filter(|said| *said != Said::UnsafeBoth).map(|said| said.unsafe_of(shown.pair()));
+    assert_eq!(called_unsafe, Some(vec![gait.parse().unwrap()]));
     let trail = audit::page(&mut reader, "", None, 100).await.unwrap();
     drop(reader);
     let reviews: Vec<_> = trail.iter().filter(|row| row.action == "gait.review").collect();

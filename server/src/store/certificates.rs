@@ -2,7 +2,8 @@
 
 use super::{Connection, StoreResult, StudyId, TrialId, json, now};
 use gait_optimizer::certificate::{self, Certificate};
-use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
 use std::collections::HashMap;
 
 /// The certificate of a trial's gait by the present examination, if it was made.
@@ -68,24 +69,31 @@ pub enum CertificateOnRecord {
 /// # Errors
 /// What the database reports.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<HashMap<TrialId, CertificateOnRecord>> {
-    let rows = sqlx::query(
-        "select t.id, c.passed, exists (select 1 from gaits g where g.trial_id = t.id) as here from trials t \
-         left join certificates c on c.trial_id = t.id and c.format_version = ?2 \
-         where t.study_id = ?1 and t.state = 'converged'",
-    )
-    .bind(study)
-    .bind(certificate::FORMAT_VERSION)
-    .fetch_all(db)
-    .await?;
-    rows.iter()
-        .map(|row| {
-            let found = match (row.try_get::<Option<bool>, _>("passed")?, row.try_get("here")?) {
-                (Some(true), _) => CertificateOnRecord::Passed,
-                (Some(false), _) => CertificateOnRecord::Failed,
-                (None, true) => CertificateOnRecord::NotCertified,
-                (None, false) => CertificateOnRecord::Pruned,
-            };
-            Ok((row.try_get("id")?, found))
-        })
-        .collect()
+    let sql = AssertSqlSafe(format!("{SELECT} where t.study_id = ?2 and t.state = 'converged'"));
+    let rows = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(study).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The same of one trial; none: it has not converged.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Option<CertificateOnRecord>> {
+    let sql = AssertSqlSafe(format!("{SELECT} where t.id = ?2 and t.state = 'converged'"));
+    let row = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(trial).fetch_optional(db).await?;
+    Ok(row.as_ref().map(from_row).transpose()?.map(|(_, found)| found))
+}
+
+/// What is known of the certificates of trials.
+const SELECT: &str = "select t.id, c.passed, exists (select 1 from gaits g where g.trial_id = t.id) as here \
+                      from trials t left join certificates c on c.trial_id = t.id and c.format_version = ?1 ";
+
+fn from_row(row: &SqliteRow) -> StoreResult<(TrialId, CertificateOnRecord)> {
+    let found = match (row.try_get::<Option<bool>, _>("passed")?, row.try_get("here")?) {
+        (Some(true), _) => CertificateOnRecord::Passed,
+        (Some(false), _) => CertificateOnRecord::Failed,
+        (None, true) => CertificateOnRecord::NotCertified,
+        (None, false) => CertificateOnRecord::Pruned,
+    };
+    Ok((row.try_get("id")?, found))
 }

@@ -304,6 +304,29 @@ pub async fn of_pair(
     rows.iter().map(from_row).collect()
 }
 
+/// Who answered a comparison of two trials, whichever was named first, but blindly, in answers that were not taken back: the
+/// newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn authors_of_pair(
+    db: &mut Connection,
+    (a, b): (TrialId, TrialId),
+) -> StoreResult<Vec<(FeedbackId, String)>> {
+    let rows = sqlx::query(
+        "select f.id, f.author from feedback f \
+         where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) \
+         and f.source in ('subject', 'clinician', 'script') \
+         and not exists (select 1 from retractions r where r.feedback_seq = f.seq) \
+         and not exists (select 1 from presentation_answers p where p.feedback_id = f.id) order by f.seq desc",
+    )
+    .bind(a)
+    .bind(b)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
+}
+
 /// The version of what a study has heard: changes with every row and every retraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LogVersion {

@@ -319,6 +319,20 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Pr
     rows.iter().map(Presentation::from_row).collect()
 }
 
+/// Those presentations of a study whose answer stands and is no preference, in the order in which they were drawn.
+///
+/// # Errors
+/// What the database reports.
+pub async fn remarks_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
+    let remarks: Vec<&str> = Said::ALL.iter().filter(|said| said.is_remark()).map(|said| said.as_str()).collect();
+    let remarks = remarks.join("', '");
+    let sql = format!(
+        "{SELECT} where p.study_id = ? and a.answer in ('{remarks}') and r.presentation_id is null order by p.id"
+    );
+    let rows = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(study).fetch_all(db).await?;
+    rows.iter().map(Presentation::from_row).collect()
+}
+
 /// Notes that a rater was unblinded.
 ///
 /// # Errors

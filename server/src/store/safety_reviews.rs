@@ -108,7 +108,8 @@ pub async fn get(db: &mut Connection, id: SafetyReviewId) -> StoreResult<SafetyR
 /// # Errors
 /// What the database reports.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReview>> {
-    let sql = "select r.* from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ? order by r.id";
+    let sql =
+        "select r.* from safety_reviews r cross join trials t on t.id = r.trial_id where t.study_id = ? order by r.id";
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
@@ -147,7 +148,7 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyV
                  where s.study_id = ?1),
                 (select count(*) from lab_acts a join lab_sessions s on s.id = a.session_id
                  where s.study_id = ?1 and a.act = 'unblinded'),
-                (select count(*) from safety_reviews r join trials t on t.id = r.trial_id where t.study_id = ?1)",
+                (select count(*) from safety_reviews r cross join trials t on t.id = r.trial_id where t.study_id = ?1)",
     )
     .bind(study)
     .fetch_one(db)

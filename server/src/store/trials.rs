@@ -375,12 +375,13 @@ impl TrialCounts {
 /// What the database reports.
 pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCounts> {
     let row = sqlx::query(
-        "select count(*) as total, \
-         coalesce(sum(state in ('queued', 'running')), 0) as open, \
-         coalesce(sum(state = 'converged'), 0) as converged, \
-         coalesce(sum(state = 'not_converged'), 0) as not_converged, \
-         coalesce(sum(state in ('failed', 'lost', 'cancelled')), 0) as without_result \
-         from trials where study_id = ?",
+        "with counted as (select state, count(*) as trials from trials where study_id = ? group by state) \
+         select coalesce(sum(trials), 0) as total, \
+         coalesce(sum(iif(state in ('queued', 'running'), trials, 0)), 0) as open, \
+         coalesce(sum(iif(state = 'converged', trials, 0)), 0) as converged, \
+         coalesce(sum(iif(state = 'not_converged', trials, 0)), 0) as not_converged, \
+         coalesce(sum(iif(state in ('failed', 'lost', 'cancelled'), trials, 0)), 0) as without_result \
+         from counted",
     )
     .bind(study)
     .fetch_one(db)

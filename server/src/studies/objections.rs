@@ -71,7 +71,7 @@ impl Objections {
     /// What the database reports.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
-        for shown in presentations::of_study(db, study).await? {
+        for shown in presentations::remarks_of_study(db, study).await? {
             if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
                 let closed =

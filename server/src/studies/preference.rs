@@ -4,10 +4,10 @@
 use super::walkable::{self, Grounds, NotWalkable, WalkablePair, is_same_gait, trial_of_study};
 use crate::error::Error;
 use crate::printable;
-use crate::store::feedback::{self, FeedbackRow, Said, Source, Voice};
+use crate::store::feedback::{self, Said, Source, Voice};
 use crate::store::presentations::Said as Judgement;
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, remarks};
+use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, remarks};
 use gait_learner::ActionIndex;
 
 /// Author of what the program itself says.
@@ -76,7 +76,7 @@ async fn report_unsafe(writer: &mut Writer, statement: Statement<'_>) -> Result<
     let Statement { study, pair, fields, said, voice, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
     let second = converged(writer, study, fields.1, pair.1).await?;
-    let grounds = Grounds::read(writer, study).await?;
+    let grounds = Grounds::read_for(writer, study, &[first.id, second.id]).await?;
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
@@ -124,9 +124,9 @@ pub async fn standing_answer(
     if let Some(noted) = noted {
         return Ok(Some(StandingAnswer::Note(noted.id)));
     }
-    let given = feedback::of_pair(db, (a, b), None, u32::MAX).await?;
-    let own = |row: &FeedbackRow| !row.by_rater && printable::is_same_name(&row.author, author);
-    Ok(given.into_iter().find(own).map(|row| StandingAnswer::Preference(row.id)))
+    let given = feedback::authors_of_pair(db, (a, b)).await?;
+    let own = given.into_iter().find(|(_, other)| printable::is_same_name(other, author));
+    Ok(own.map(|(id, _)| StandingAnswer::Preference(id)))
 }
 
 async fn refuse_second_answer(
@@ -143,16 +143,20 @@ async fn refuse_second_answer(
     Ok(())
 }
 
-/// Tells the learner that an action would have been better than a trial.
+/// Tells the learner that an action would have been better than a trial. Nothing is said against the trial: its gait may have
+/// been reported as unsafe.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
+/// [`Error::Conflict`] after a withdrawal, a violated constraint or trigger, or what the database reports.
 pub(super) async fn suggest(
     writer: &mut Writer,
     over: &Trial,
     suggested: ActionIndex,
     voice: Voice<'_>,
 ) -> Result<FeedbackId, Error> {
+    if consents::is_withdrawn(writer, over.study_id).await? {
+        return Err(NotWalkable::Withdrawn.into());
+    }
     let said = Said::Suggestion { suggested, over: over.id };
     Ok(feedback::append(writer, over.study_id, &said, voice).await?)
 }

@@ -158,6 +158,23 @@ impl Grounds {
         })
     }
 
+    /// The same with the certificates of a few trials of the study alone, for changes: they hold the only writer, and a study
+    /// may have ten thousand trials. Any other trial is refused.
+    ///
+    /// # Errors
+    /// What the database reports.
+    pub async fn read_for(db: &mut Connection, study: StudyId, trials: &[TrialId]) -> StoreResult<Self> {
+        let mut found = HashMap::new();
+        for &trial in trials {
+            found.extend(certificates::of_trial(db, trial).await?.map(|certificate| (trial, certificate)));
+        }
+        Ok(Self {
+            objections: Objections::read(db, study).await?,
+            certificates: found,
+            withdrawn: consents::is_withdrawn(db, study).await?,
+        })
+    }
+
     /// Whether the gait of a trial may reach a person: the one place that decides.
     ///
     /// # Errors
@@ -197,7 +214,7 @@ impl Grounds {
 /// What the database reports, with a trial that does not exist.
 pub async fn admit(db: &mut Connection, trial: TrialId) -> StoreResult<Result<WalkableGait, NotWalkable>> {
     let trial = trials::get(db, trial).await?;
-    Ok(Grounds::read(db, trial.study_id).await?.admit(&trial))
+    Ok(Grounds::read_for(db, trial.study_id, &[trial.id]).await?.admit(&trial))
 }
 
 /// Whether both gaits of a pair that was drawn earlier may still reach a person.
@@ -240,7 +257,7 @@ pub async fn admit_pair(
 ) -> Result<WalkablePair, Error> {
     let first = trial_of_study(db, study, fields.0, pair.0).await?;
     let second = trial_of_study(db, study, fields.1, pair.1).await?;
-    let grounds = Grounds::read(db, study).await?;
+    let grounds = Grounds::read_for(db, study, &[first.id, second.id]).await?;
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
