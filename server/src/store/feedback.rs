@@ -1,5 +1,6 @@
 //! Feedback: everything the learner ever hears, append-only, in the order it was heard.
 
+use super::many_rows::read_many;
 use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use gait_learner::ActionIndex;
 use serde::{Deserialize, Serialize};
@@ -226,8 +227,7 @@ pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow
 /// What the database reports.
 pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreResult<Vec<FeedbackRow>> {
     let query = sqlx::query(select("where f.study_id = ? and f.seq > ? order by f.seq")).bind(study).bind(after);
-    let rows = query.fetch_all(db).await?;
-    rows.iter().map(from_row).collect()
+    read_many(&query.fetch_all(db).await?, from_row).await
 }
 
 /// At most `limit` comparisons of a study with a sequence number above `after`, retracted ones included, as heard.

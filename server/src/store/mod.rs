@@ -33,6 +33,7 @@ pub mod lab_recordings;
 pub mod lab_sessions;
 mod lent;
 pub mod listing;
+mod many_rows;
 pub mod members;
 mod migrations;
 mod ownership;

@@ -1,5 +1,6 @@
 //! Trials: one action of a study and what it gave.
 
+use super::many_rows::read_many;
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json, now, schema};
 use gait_learner::ActionIndex;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds, Violation};
@@ -219,7 +220,7 @@ pub async fn page(db: &mut Connection, study: StudyId, after: u32, limit: u32) -
         .bind(limit)
         .fetch_all(db)
         .await?;
-    rows.iter().map(from_row).collect()
+    read_many(&rows, from_row).await
 }
 
 /// At most `limit` trials of a study with numbers below `before`, by number: the newest of them.

@@ -52,7 +52,7 @@ struct Inner {
     /// Solves that are run before anybody asked for them.
     rehearsals: Rehearsals,
     /// Where the studies stand that wait for an answer, as of the last plan: what may be rehearsed.
-    waiting: watch::Sender<Arc<[Standing]>>,
+    waiting: watch::Sender<Arc<[Arc<Standing>]>>,
     /// What examines the best gaits of studies that ended, and what explains their trials without a gait.
     after_solves: Option<(Examiner, Explainer)>,
     beliefs: Arc<Beliefs>,

@@ -18,7 +18,7 @@ pub(super) struct Plans {
     /// Studies in which something may have changed since their plan was begun.
     again: HashSet<StudyId>,
     /// Studies that waited for an answer when they were planned last.
-    waiting: BTreeMap<StudyId, Standing>,
+    waiting: BTreeMap<StudyId, Arc<Standing>>,
 }
 
 impl Plans {
@@ -50,14 +50,14 @@ impl Plans {
     /// Notes what came of a plan. Whether it is to be made once more.
     pub(super) fn ended(&mut self, study: StudyId, standing: Option<Standing>) -> bool {
         match standing {
-            Some(standing) => self.waiting.insert(study, standing),
+            Some(standing) => self.waiting.insert(study, Arc::new(standing)),
             None => self.waiting.remove(&study),
         };
         self.again.remove(&study)
     }
 
     /// Where the studies stand that wait for an answer.
-    pub(super) fn waiting(&self) -> Arc<[Standing]> {
+    pub(super) fn waiting(&self) -> Arc<[Arc<Standing>]> {
         self.waiting.values().cloned().collect()
     }
 }
