@@ -168,6 +168,9 @@ async fn keep_writing(app: AppState) {
 }
 
 /// Drops rows that are older than so many days, and again every hour.
+///
+/// # Errors
+/// None: what fails is logged.
 pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Error> {
     const ROWS: u32 = 500;
     loop {

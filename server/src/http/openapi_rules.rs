@@ -292,19 +292,7 @@ fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> O
             json!({ "type": "object", "properties": properties, "additionalProperties": false })
         }
         Value::Bool(_) => json!({ "type": "boolean" }),
-        Value::Number(number) => {
-            let kind = if number.is_f64() { "number" } else { "integer" };
-            let mut schema = json!({ "type": kind });
-            for far in [json!(1_000_000_000_u32), json!(-1_000_000_000_i64)] {
-                if let Some((least, most)) = with(far).as_ref().and_then(range_in) {
-                    (schema["minimum"], schema["maximum"]) = (json!(least), json!(most));
-                }
-            }
-            if kind == "integer" && schema.get("minimum").is_none() {
-                schema["minimum"] = json!(0);
-            }
-            schema
-        }
+        Value::Number(number) => number_shape(number.is_f64(), with),
         Value::String(_) => match with(json!("\u{1}")).as_ref().map(words_in) {
             Some(words) if !words.is_empty() => json!({ "enum": words }),
             _ => json!({ "type": "string" }),
@@ -313,8 +301,29 @@ fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> O
             let item = items.first().map(|part| shape(whole, &format!("{place}/0"), part, refusal));
             json!({ "type": "array", "items": item.unwrap_or_else(|| json!({})) })
         }
-        Value::Null => json!({ "description": "By default nothing" }),
+        Value::Null => {
+            // Settings that are nothing by default are numbers: a fraction is read or refused by its range, or it is none.
+            let fraction = with(json!(0.5));
+            let is_fraction = fraction.as_ref().is_none_or(|refused| range_in(refused).is_some());
+            let mut schema = number_shape(is_fraction, with);
+            schema["type"] = json!([schema["type"], "null"]);
+            schema
+        }
     }
+}
+
+/// The schema of a number; `with` tells why a value in its place is refused.
+fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Value {
+    let mut schema = json!({ "type": if is_fraction { "number" } else { "integer" } });
+    for far in [json!(1_000_000_000_u32), json!(-1_000_000_000_i64)] {
+        if let Some((least, most)) = with(far).as_ref().and_then(range_in) {
+            (schema["minimum"], schema["maximum"]) = (json!(least), json!(most));
+        }
+    }
+    if !is_fraction && schema.get("minimum").is_none() {
+        schema["minimum"] = json!(u8::from(with(json!(0)).is_some()));
+    }
+    schema
 }
 
 /// `0.1 to 5` of a refused field, or `between 0.1 and 5` of a setting of the learner.

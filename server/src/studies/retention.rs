@@ -44,6 +44,9 @@ pub async fn drop_expired(store: &Store) -> Result<Dropped, Error> {
 }
 
 /// Drops what is past its time, now and every hour; what fails is tried again in the next round.
+///
+/// # Errors
+/// None: what fails is logged.
 pub async fn keep_dropping(store: Store, task: Task) -> Result<(), Error> {
     loop {
         task.works();
