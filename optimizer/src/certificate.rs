@@ -1,4 +1,4 @@
-//! The certificate of a gait: what the gait problem promised, examined without its code.
+//! The certificate of a gait: what the gait problem promised, checked without its code.
 //!
 //! From the gait as it is handed out (Bezier coefficients, phase limits, hip velocities, mesh points) and the physics of
 //! [`crate::body`], [`crate::muscle`] and [`crate::walking`] alone:
@@ -10,7 +10,7 @@
 //!    hip velocity brought back by the controller and with the hip velocity left alone;
 //! 4. the largest pushes that are recovered ([`Pushes`]).
 //!
-//! Muscles are examined in 1; the closed loop drives the joints by torques, as the device and the gait problem do.
+//! Muscles are checked in 1; the closed loop drives the joints by torques, as the device and the gait problem do.
 
 mod check;
 mod closed_loop;
@@ -46,13 +46,13 @@ use control::join;
 use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 
-/// Version of [`Certificate`]'s layout and of what it examines.
+/// Version of [`Certificate`]'s layout and of what it checks.
 pub const FORMAT_VERSION: u32 = 6;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
-    /// Version of this layout and of the examination.
+    /// Version of this layout and of its checks.
     pub format_version: u32,
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
@@ -74,8 +74,8 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// The certificate of what cannot be examined: it failed, for this reason.
-    pub fn of_unexaminable(reason: &str) -> Self {
+    /// The certificate of what cannot be certified: it failed, for this reason.
+    pub fn failed_because(reason: &str) -> Self {
         Self { objections: vec![reason.to_owned()], ..Self::empty(Vec::new()) }
     }
 
@@ -93,7 +93,7 @@ impl Certificate {
     }
 }
 
-/// Examines a gait. Deterministic; takes some seconds.
+/// Certifies a gait. Deterministic; takes some seconds.
 ///
 /// # Errors
 /// [`ModelError`] when the gait is not well-formed.

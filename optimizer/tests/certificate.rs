@@ -86,7 +86,7 @@ fn a_tighter_bound_than_the_gait_keeps_is_found() {
 
 /// Limits that the gait problem imposes and the gait does not keep, one at a time.
 #[test]
-fn every_limit_is_examined() {
+fn every_limit_is_checked() {
     type Change = fn(&mut Gait);
     let changes: [(&str, Change); 6] = [
         ("C3 friction cone of heel strikes", |gait| gait.settings.limits.impact_friction = 0.1),

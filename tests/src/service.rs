@@ -1,6 +1,6 @@
 //! A service on a temporary record.
 
-use crate::examined::{Verdicts, certificate};
+use crate::certified::{Verdicts, certificate};
 use crate::explained::Clearance;
 use axum::Router;
 use axum::body::Body;
@@ -18,9 +18,9 @@ use gaitwright::store::{
     ReferenceGaitId, Store, StudyId, SubjectId, commit, feedback, reference_gaits, studies, subjects, trials,
 };
 use gaitwright::studies::catalogue;
-use gaitwright::studies::director::Director;
 use gaitwright::studies::plan::{self, NewStudy};
-use gaitwright::workers::{AfterSolves, Dispatch, Evaluate, Examine, Explain, InProcess};
+use gaitwright::studies::scheduler::Scheduler;
+use gaitwright::workers::{AfterSolves, Certify, Dispatch, Evaluate, Explain, InProcess};
 use http_body_util::BodyExt;
 use serde_json::Value;
 use std::path::Path;
@@ -34,7 +34,7 @@ pub struct Service {
     /// The record.
     pub store: Store,
     /// What runs its studies.
-    pub director: Director,
+    pub scheduler: Scheduler,
     /// Who may do what: everybody everything, unless a test says otherwise.
     pub access: Arc<Access>,
     work: JoinHandle<()>,
@@ -89,26 +89,26 @@ impl Service {
         Self::over(with_catalogue(database).await, engine, None).passing_every_gait()
     }
 
-    /// Starts a service that examines gaits by itself, and explains at once why there are none.
-    pub async fn start_examining(database: &Path, solver: impl Evaluate, examine: impl Examine) -> Self {
-        Self::start_looking_back(database, solver, examine, Clearance::default()).await
+    /// Starts a service that certifies gaits by itself, and explains at once why there are none.
+    pub async fn start_certifying(database: &Path, solver: impl Evaluate, certify: impl Certify) -> Self {
+        Self::start_looking_back(database, solver, certify, Clearance::default()).await
     }
 
     /// Starts a service that explains by itself why there are no gaits, and passes all others at once.
     pub async fn start_explaining(database: &Path, solver: impl Evaluate, explain: impl Explain) -> Self {
-        let examine = Verdicts { pause: Duration::ZERO, passes: |_: &Gait| true };
-        Self::start_looking_back(database, solver, examine, explain).await
+        let certify = Verdicts { pause: Duration::ZERO, passes: |_: &Gait| true };
+        Self::start_looking_back(database, solver, certify, explain).await
     }
 
     /// Starts a service that looks into what solves gave.
     pub async fn start_looking_back(
         database: &Path,
         solver: impl Evaluate,
-        examine: impl Examine,
+        certify: impl Certify,
         explain: impl Explain,
     ) -> Self {
         let engine = Arc::new(InProcess::new(1, Arc::new(solver)).standing_back());
-        let after_solves = AfterSolves { examine: Arc::new(examine), explain: Arc::new(explain) };
+        let after_solves = AfterSolves { certify: Arc::new(certify), explain: Arc::new(explain) };
         Self::over(with_catalogue(database).await, engine, Some(after_solves))
     }
 
@@ -119,22 +119,22 @@ impl Service {
     }
 
     fn over(store: Store, engine: Arc<dyn Dispatch>, after_solves: Option<AfterSolves>) -> Self {
-        let director = Director::new(&store, engine, None, after_solves);
+        let scheduler = Scheduler::new(&store, engine, None, after_solves);
         let work = tokio::spawn({
-            let director = director.clone();
-            async move { Box::pin(director.run()).await.unwrap() }
+            let scheduler = scheduler.clone();
+            async move { Box::pin(scheduler.run()).await.unwrap() }
         });
-        Self { store, director, access: Arc::new(Access::without_sign_in()), work, certifier: None }
+        Self { store, scheduler, access: Arc::new(Access::without_sign_in()), work, certifier: None }
     }
 
     /// Passes every gait as it comes: people are asked about certified gaits only.
     fn passing_every_gait(mut self) -> Self {
-        let (store, director) = (self.store.clone(), self.director.clone());
+        let (store, scheduler) = (self.store.clone(), self.scheduler.clone());
         self.certifier = Some(tokio::spawn(async move {
-            let mut pulse = director.pulse();
+            let mut pulse = scheduler.pulse();
             loop {
                 if pass_every_gait(&store).await {
-                    director.changed();
+                    scheduler.changed();
                 }
                 if pulse.changed().await.is_err() {
                     return;
@@ -156,7 +156,7 @@ impl Service {
 
     /// Stops it and closes the record.
     pub async fn stop(self) {
-        self.director.stop();
+        self.scheduler.stop();
         self.work.await.unwrap();
         if let Some(certifier) = self.certifier {
             certifier.abort();
@@ -167,7 +167,7 @@ impl Service {
 
     /// Stops it as it is: of a record that takes no changes any more, its tasks may end with an error.
     pub async fn abandon(self) {
-        self.director.stop();
+        self.scheduler.stop();
         self.work.abort();
         let _ = self.work.await;
         self.store.close().await;
@@ -191,7 +191,7 @@ impl Service {
         let mut writer = self.store.write().await.unwrap();
         let study = plan::create(&mut writer, &Actor::program(), new).await.unwrap();
         commit(writer).await.unwrap();
-        self.director.changed();
+        self.scheduler.changed();
         study.id
     }
 
@@ -243,7 +243,7 @@ impl Service {
     /// What handlers can reach.
     pub fn state(&self) -> AppState {
         let hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &[]);
-        AppState::new(self.director.clone(), Arc::clone(&self.access), hosts)
+        AppState::new(self.scheduler.clone(), Arc::clone(&self.access), hosts)
     }
 
     /// The router; a request without a Host header is one for localhost.

@@ -12,7 +12,7 @@ use gaitwright::http::access_log::NO_SUBJECT_DATA;
 use gaitwright::http::{openapi, with_layers};
 use gaitwright::store::access_log::{self, Access, AccessRow, Kind, Tally};
 use gaitwright::store::audit::Actor;
-use gaitwright::store::seals::{self, Verdict};
+use gaitwright::store::seals::{self, SealCheck};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::{StudyId, commit, now};
 use gaitwright_tests::analytic::Analytic;
@@ -189,7 +189,7 @@ async fn access_log_is_append_only_and_pruned_by_age_alone() {
     let left: Vec<String> = stored(&service).await.into_iter().map(|row| row.object).collect();
     assert_eq!(left, ["10 days"]);
     let verdict = seals::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, Verdict::Whole { .. }), "{verdict:?}");
+    assert!(matches!(verdict, SealCheck::Whole { .. }), "{verdict:?}");
     service.stop().await;
 }
 

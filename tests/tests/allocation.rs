@@ -605,7 +605,7 @@ async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_dev
         let walked = lab::RecordedWalk { walk, note: String::new() };
         lab::record_walk(&mut writer, &reading_caller.actor, row, &walked).await.unwrap();
     }
-    let answer = lab::NewAnswer { number: 1, answer: presentations::Said::First, note: String::new() };
+    let answer = lab::NewAnswer { number: 1, answer: presentations::Judgement::First, note: String::new() };
     let seen = lab::answer(&mut writer, &reading_caller, row, &answer).await.unwrap();
     assert!(seen.answer.unwrap().could_have_known);
     commit(writer).await.unwrap();

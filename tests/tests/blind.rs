@@ -172,7 +172,7 @@ async fn an_answer_is_heard_of_the_gait_that_was_shown_on_that_side() {
         let heard = feedback.iter().filter(|row| row.by_rater).map(|row| row.said);
         for (said, (first, second)) in heard.zip(sides(&service.store, study).await) {
             let (winner, loser) = if answer == "first" { (first, second) } else { (second, first) };
-            assert_eq!(said, gaitwright::store::feedback::Said::Preference { winner, loser });
+            assert_eq!(said, gaitwright::store::feedback::FeedbackContent::Preference { winner, loser });
             swapped.insert(winner > loser);
         }
     }

@@ -108,7 +108,7 @@ async fn a_trial_gets_its_certificate_once() {
     let address = format!("/api/v1/trials/{}/certificate", trial.id);
     assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("has not been examined yet") && page.contains("Examine it"), "{page}");
+    assert!(page.contains("has no certificate yet") && page.contains("Certify (takes some seconds)"), "{page}");
 
     let motion = service.fetch(&format!("/api/v1/trials/{}/gait.mot?rate_hz=100", trial.id)).await;
     assert!(motion.text.contains("inDegrees=yes") && motion.text.contains("knee_angle_l"), "{}", motion.text);

@@ -8,7 +8,7 @@ use axum::body::Body;
 use axum::http::{Request, header};
 use gaitwright::access::Role;
 use gaitwright::http::openapi;
-use gaitwright::store::audit::{self, Verdict};
+use gaitwright::store::audit::{self, ChainCheck};
 use gaitwright::store::feedback::FeedbackRow;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright::store::trials::Trial;
@@ -219,7 +219,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     let explain = format!("{api}/trials/{}/explanation", service.trials(no_gait).await[0].id);
     scene.one(done, "post /trials/{id}/explanation", &explain, json!({})).await;
 
-    // Examines a real gait only; tests/certificates.rs counts its row.
+    // Certifies a real gait only; tests/certificates.rs counts its row.
     done.insert("post /trials/{id}/certificate".to_owned());
 
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
@@ -231,7 +231,7 @@ async fn every_operation_leaves_exactly_one_row_in_the_audit_trail() {
     }
     assert_eq!(*done, described);
     let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, Verdict::Whole { .. }));
+    assert!(matches!(verdict, ChainCheck::Whole { .. }));
     scene.service.stop().await;
 }
 

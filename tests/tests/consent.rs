@@ -189,7 +189,7 @@ async fn consent_is_written_down_and_withdrawn_on_the_page_of_the_subject() {
     let page = format!("/subjects/{}", service.subject().await);
     let list = service.fetch("/subjects").await;
     assert!(list.text.contains(&page) && list.text.contains("nothing written down"), "{}", list.text);
-    assert!(service.fetch(&page).await.text.contains("Nothing is written down"));
+    assert!(service.fetch(&page).await.text.contains("No consent on record"));
     let send = async |act: &str, body: &str| {
         service.post_text(&format!("{page}/{act}"), "application/x-www-form-urlencoded", body).await
     };

@@ -6,7 +6,7 @@ use gaitwright::store::studies::StudyState;
 use gaitwright::studies::belief::Beliefs;
 use gaitwright::studies::choice::ranking_to_show;
 use gaitwright::studies::recommended::Judged;
-use gaitwright::studies::standing::Standing;
+use gaitwright::studies::snapshot::StudySnapshot;
 use gaitwright::studies::summary;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -32,18 +32,18 @@ async fn documents_keep_their_shape() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| new.trial_budget = 3).await;
     let present = service.wait_for(study, &[StudyState::Finished]).await;
-    let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
+    let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
 
     // tune --json; the last trial comes first, because it has everything.
-    let there = standing.clone();
+    let there = snapshot.clone();
     let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &there, &Beliefs::default())).await;
     let best = rank.unwrap().unwrap().first().copied();
-    let mut tune = serde_json::to_value(summary::of(&standing, best, Judged::default())).unwrap();
+    let mut tune = serde_json::to_value(summary::of(&snapshot, best, Judged::default())).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();
     insta::assert_json_snapshot!("tune", shape(&tune));
 
     // solve --json.
-    let trial = &standing.trials[2];
+    let trial = &snapshot.trials[2];
     insta::assert_json_snapshot!("solve", shape(&serde_json::to_value(trial.report.as_ref().unwrap()).unwrap()));
 
     for (name, path) in [

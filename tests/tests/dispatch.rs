@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use futures_util::future::BoxFuture;
-use gaitwright::store::feedback::Said;
+use gaitwright::store::feedback::FeedbackContent;
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::TrialState;
 use gaitwright::store::{StudyId, TrialId, results};
@@ -145,7 +145,9 @@ async fn nothing_is_lost_or_doubled(service: &Service, study: StudyId) {
     assert_eq!(essence(service, study).await, undisturbed().await);
     let feedback = service.feedback(study).await;
     for trial in service.trials(study).await {
-        let labels = feedback.iter().filter(|row| matches!(row.said, Said::Label { trial: of, .. } if of == trial.id));
+        let labels = feedback
+            .iter()
+            .filter(|row| matches!(row.said, FeedbackContent::Label { trial: of, .. } if of == trial.id));
         assert_eq!(labels.count(), 1, "labels of trial {}", trial.number);
         let brought = results::of_trial(&mut service.store.read().await.unwrap(), trial.id).await.unwrap();
         assert_eq!(brought.iter().filter(|result| result.taken).count(), 1, "{brought:?}");
@@ -222,7 +224,7 @@ async fn a_job_that_is_cancelled(mut rig: Rig) {
     };
     service.wait_for(study, &[StudyState::Finished]).await;
     let feedback = service.feedback(study).await;
-    assert!(!feedback.iter().any(|row| matches!(row.said, Said::Label { trial, .. } if trial == running)));
+    assert!(!feedback.iter().any(|row| matches!(row.said, FeedbackContent::Label { trial, .. } if trial == running)));
     let brought = results::of_trial(&mut service.store.read().await.unwrap(), running).await.unwrap();
     assert!(brought.iter().all(|result| !result.taken), "{brought:?}");
     service.stop().await;

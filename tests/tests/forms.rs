@@ -353,7 +353,7 @@ async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_sid
             .await
             .iter()
             .filter_map(|row| match row.said {
-                gaitwright::store::feedback::Said::Label { trial, .. } => Some(trial),
+                gaitwright::store::feedback::FeedbackContent::Label { trial, .. } => Some(trial),
                 _ => None,
             })
             .collect();
@@ -450,7 +450,8 @@ async fn what_a_script_told_without_a_gait_offers_no_gait() {
     for page in [format!("/studies/{study}"), format!("/trials/{trial}")] {
         let shown = service.fetch(&page).await.text;
         assert!(shown.contains("the gait itself is not here"), "{shown}");
-        for offered in ["See this gait walk", "/gait.csv", "/controller.json", "/certify", "Nobody examined this gait"]
+        for offered in
+            ["See this gait walk", "/gait.csv", "/controller.json", "/certify", "This gait has no certificate yet"]
         {
             assert!(!shown.contains(offered), "{page}: {offered}");
         }
@@ -466,7 +467,7 @@ async fn what_a_script_told_without_a_gait_offers_no_gait() {
         }
     }
     assert_eq!(
-        service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json()["examining"],
+        service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json()["certifying"],
         json!(false)
     );
     service.stop().await;

@@ -69,15 +69,15 @@ fn wait_until_finished(address: &str, study: &str) {
 }
 
 /// The certificate of the best gait, and the number of the one that passes where it does not, once the service is done.
-fn examined(address: &str, study: &str) -> (Value, Value) {
+fn certificates_of(address: &str, study: &str) -> (Value, Value) {
     for _ in 0..3000 {
         let found = get(address, &format!("/api/v1/studies/{study}/recommendation")).unwrap().json();
-        if found["examining"] == false {
+        if found["certifying"] == false {
             return (found["certificate"].clone(), found["passing"]["number"].clone());
         }
         std::thread::sleep(Duration::from_millis(10));
     }
-    panic!("the gaits of the study are not examined");
+    panic!("the gaits of the study are not certified");
 }
 
 /// What each trial without a gait is said to need, once the service is done.
@@ -139,7 +139,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     wait_until_finished(&quiet.address, &undisturbed);
     let expected = essence(&quiet.address, &undisturbed);
     let expected_answers = labels(&quiet.address, &undisturbed);
-    let certified = examined(&quiet.address, &undisturbed);
+    let certified = certificates_of(&quiet.address, &undisturbed);
     assert!(["passed", "failed"].contains(&certified.0.as_str().unwrap()), "{certified:?}");
     let whys = explained(&quiet.address, &undisturbed);
     assert!(!whys.is_empty(), "trials without a gait");
@@ -182,7 +182,7 @@ fn killed_at_any_instant_a_study_ends_in_the_same_trials_and_no_acknowledged_wri
     wait_until_finished(&process.address, &study);
     assert_eq!(essence(&process.address, &study), expected);
     assert_eq!(labels(&process.address, &study), expected_answers, "no answer is given twice");
-    assert_eq!(examined(&process.address, &study), certified);
+    assert_eq!(certificates_of(&process.address, &study), certified);
     assert_eq!(explained(&process.address, &study), whys);
     let present = pseudonyms(&process.address);
     let acknowledged = acknowledged.into_inner().unwrap();

@@ -4,7 +4,7 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::emg::EmgSettings;
-use gaitwright::store::feedback::{FeedbackRow, Said, Source};
+use gaitwright::store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::trials::{Trial, TrialState};
 use gaitwright::store::{LabSessionId, Store, StudyId, audit, lab_sessions};
@@ -243,7 +243,7 @@ async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
     let (first, second) = row.walked().unwrap();
     assert_eq!(
         rows.iter().map(|row| row.said).collect::<Vec<_>>(),
-        [Said::Preference { winner: second, loser: first }]
+        [FeedbackContent::Preference { winner: second, loser: first }]
     );
     let pseudonym = service.fetch(&format!("/api/v1/studies/{study}")).await.json()["subject_id"].clone();
     let pseudonym = service.fetch(&format!("/api/v1/subjects/{}", pseudonym.as_str().unwrap())).await.json();

@@ -67,7 +67,7 @@ const RULES: [Rule; 6] =
 
 const READS: Door = Door::None("shows or gives out what is recorded; walks and answers do not follow from it");
 const RETRACTS: Door = Door::None("takes something back");
-const RUNS: Door = Door::None("runs solves or examinations; no person is asked");
+const RUNS: Door = Door::None("runs solves or certifications; no person is asked");
 const SETS_UP: Door = Door::None("sets up subjects, devices, references, users or the service");
 
 /// Every operation that changes something or hands something to a device or a person. Reading is the default for GET.
@@ -314,7 +314,7 @@ const COMMANDS: [(&str, &str); 22] = [
     ("audit", "reads the record"),
     ("backup", "copies the record"),
     ("body", "writes a body's figures"),
-    ("certify", "examines a gait file"),
+    ("certify", "certifies a gait file"),
     ("config", "shows settings"),
     ("emg", "processes a recording"),
     ("export", "writes an archive"),
@@ -539,12 +539,13 @@ fn every_writer_of_the_learners_log_is_the_one_door() {
 async fn a_plan_made_before_a_safety_report_is_not_written() {
     let scene = Rated::new().await;
     let study = scene.service.get(scene.study).await;
-    let standing = gaitwright::studies::standing::Standing::read(&mut scene.service.store.read().await.unwrap(), study)
-        .await
-        .unwrap();
+    let snapshot =
+        gaitwright::studies::snapshot::StudySnapshot::read(&mut scene.service.store.read().await.unwrap(), study)
+            .await
+            .unwrap();
     let current = async || {
         let mut writer = scene.service.store.write().await.unwrap();
-        standing.is_current(&mut writer).await.unwrap()
+        snapshot.is_current(&mut writer).await.unwrap()
     };
     assert!(current().await);
     let feedback = scene.service.feedback(scene.study).await.len();

@@ -10,11 +10,11 @@ use gaitwright::store::audit::Actor;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::{Store, backup, certificates, commit, explanations, gaits, members, studies};
 use gaitwright::studies::archive::file::read_through;
-use gaitwright::studies::standing::Standing;
+use gaitwright::studies::snapshot::StudySnapshot;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
+use gaitwright_tests::certified::certificate;
 use gaitwright_tests::consistent::Consistent;
-use gaitwright_tests::examined::certificate;
 use gaitwright_tests::explained::explanation;
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
@@ -27,11 +27,11 @@ use tower::ServiceExt;
 async fn posterior(service: &Service, study: gaitwright::store::StudyId) -> Vec<(u64, u64)> {
     let mut reader = service.store.read().await.unwrap();
     let study = studies::get(&mut reader, study).await.unwrap();
-    let standing = Standing::read(&mut reader, study).await.unwrap();
-    let plan = &standing.study.plan;
-    let belief = gait_learner::posterior(&plan.search_space, &standing.log(), &plan.learner).unwrap();
+    let snapshot = StudySnapshot::read(&mut reader, study).await.unwrap();
+    let plan = &snapshot.study.plan;
+    let belief = gait_learner::posterior(&plan.search_space, &snapshot.log(), &plan.learner).unwrap();
     let mean = |trial: &gaitwright::store::trials::Trial| belief.mean(trial.action_index).unwrap().to_bits();
-    standing.trials.iter().map(|trial| (trial.action_index.0, mean(trial))).collect()
+    snapshot.trials.iter().map(|trial| (trial.action_index.0, mean(trial))).collect()
 }
 
 #[tokio::test]
@@ -51,9 +51,9 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
         json!({"trial_a": converged[2].id, "trial_b": converged[0].id, "answer": "no_difference", "author": "K"});
     service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
     let expected = posterior(&service, study).await;
-    let examined = converged[0].id;
+    let certified = converged[0].id;
     let mut writer = service.store.write().await.unwrap();
-    assert!(certificates::find(&mut writer, examined).await.unwrap().is_some());
+    assert!(certificates::find(&mut writer, certified).await.unwrap().is_some());
     let explained = converged[1].id;
     let why = explanation(&converged[1].action, SolveStatus::Infeasible, &[]);
     assert!(explanations::request(&mut writer, explained, &Actor::program()).await.unwrap());
@@ -81,7 +81,7 @@ async fn an_exported_study_gives_the_same_posterior_elsewhere() {
     assert!(read_through(&b""[..]).is_err());
     let mut reader = fresh.read().await.unwrap();
     // What can be found out here is not believed.
-    assert_eq!(certificates::find(&mut reader, examined).await.unwrap(), None);
+    assert_eq!(certificates::find(&mut reader, certified).await.unwrap(), None);
     assert_eq!(explanations::find(&mut reader, explained).await.unwrap(), None);
     assert!(explanations::is_requested(&mut reader, explained).await.unwrap());
     drop(reader);
@@ -154,7 +154,7 @@ async fn figures_for_prometheus_count_requests_by_route() {
     let text = String::from_utf8(send("GET", "/metrics").await.to_vec()).unwrap();
     assert!(text.contains("method=\"other\"") && !text.contains("INVENTED"), "{text}");
     assert_eq!(service.fetch("/ready").await.status, StatusCode::OK);
-    service.director.stop();
+    service.scheduler.stop();
     assert_eq!(service.fetch("/ready").await.status, StatusCode::SERVICE_UNAVAILABLE);
 }
 

@@ -14,14 +14,14 @@ use gaitwright::store::{StudyId, TrialId, certificates, commit};
 use gaitwright::studies::belief::Beliefs;
 use gaitwright::studies::choice::ranking_to_show;
 use gaitwright::studies::plan::NewStudy;
-use gaitwright::studies::standing::Standing;
+use gaitwright::studies::snapshot::StudySnapshot;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::examined::{Verdicts, certificate};
+use gaitwright_tests::certified::{Verdicts, certificate};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::time::Duration;
 
-async fn examined(service: &Service, trial: TrialId, passed: bool) {
+async fn certified(service: &Service, trial: TrialId, passed: bool) {
     let mut writer = service.store.write().await.unwrap();
     assert!(certificates::keep(&mut writer, trial, &certificate(passed)).await.unwrap());
     commit(writer).await.unwrap();
@@ -82,16 +82,16 @@ async fn nothing_is_recommended_silently_whose_certificate_failed() {
         assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
         assert!(refused.text.contains(&format!("POST /api/v1/trials/{best}/certificate")), "{}", refused.text);
     }
-    assert!(service.fetch(&page).await.text.contains("Nobody examined this gait yet"));
+    assert!(service.fetch(&page).await.text.contains("This gait has no certificate yet"));
 
-    examined(&service, best, false).await;
+    certified(&service, best, false).await;
     let failed = recommendation(&service, study).await;
     assert_eq!(failed["trial_id"], json!(best), "the learner's answer is the same");
     assert_eq!(failed["certificate"], "failed");
     assert_eq!((&failed["objections"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("This gait failed its") && shown.contains("the simulated walker falls"), "{shown}");
-    assert!(shown.contains("The next best that nobody examined"), "{shown}");
+    assert!(shown.contains("The next best that nobody certified"), "{shown}");
     assert!(service.fetch(&format!("/trials/{best}")).await.text.contains("read why before it is walked with"));
     let table = service.fetch(&format!("/api/v1/studies/{study}/recommendation.csv")).await.text;
     assert!(table.starts_with("bound,value,unit,limits,certificate_of_the_gait\n"), "{table}");
@@ -99,7 +99,7 @@ async fn nothing_is_recommended_silently_whose_certificate_failed() {
 
     let other = service.trials(study).await.into_iter().find(|trial| trial.id != best && trial.state.is_result());
     let other = other.unwrap();
-    examined(&service, other.id, true).await;
+    certified(&service, other.id, true).await;
     let passing = &recommendation(&service, study).await["passing"];
     assert_eq!((&passing["trial_id"], &passing["number"]), (&json!(other.id), &json!(other.number)));
     assert_eq!(passing["bounds"], json!(other.action));
@@ -115,66 +115,66 @@ async fn a_gait_that_passed_is_said_to_have_passed() {
     let study = service.study(|new| new.trial_budget = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let best = ranked(&service, study).await[0];
-    examined(&service, best, true).await;
+    certified(&service, best, true).await;
     let passed = recommendation(&service, study).await;
     assert_eq!((&passed["certificate"], &passed["passing"]), (&json!("passed"), &Value::Null));
     assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait passed its"));
     service.stop().await;
 }
 
-/// An examiner that takes some time and passes only the gait of these bounds.
+/// A certifier that takes some time and passes only the gait of these bounds.
 fn only(bounds: Option<TunedBounds>) -> Verdicts<impl Fn(&Gait) -> bool> {
     Verdicts { pause: Duration::from_millis(200), passes: move |gait: &Gait| Some(gait.bounds) == bounds }
 }
 
-/// What is recommended once nothing is being examined any more.
+/// What is recommended once nothing is being certified any more.
 async fn settled(service: &Service, study: StudyId) -> Value {
     for _ in 0..1000 {
         let found = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
-        if found.status == StatusCode::OK && found.json()["examining"] == json!(false) {
+        if found.status == StatusCode::OK && found.json()["certifying"] == json!(false) {
             return found.json();
         }
         assert!(found.status == StatusCode::OK || found.text.contains("being certified"), "{}", found.text);
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
-    panic!("the gaits are not examined");
+    panic!("the gaits are not certified");
 }
 
 async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
     let study = service.get(study).await;
-    let standing = Standing::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &standing, &Beliefs::default())).await;
+    let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
+    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &snapshot, &Beliefs::default())).await;
     rank.unwrap().unwrap()
 }
 
-/// The trials whose gaits the service examined by itself, in order.
-async fn examined_by_service(service: &Service) -> Vec<String> {
+/// The trials whose gaits the service certified by itself, in order.
+async fn certified_by_service(service: &Service) -> Vec<String> {
     let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
     trail.retain(|row| row.action == "trial.certify" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }
 
 #[tokio::test]
-async fn when_a_study_has_ended_its_ten_best_gaits_are_examined_in_order() {
+async fn when_a_study_has_ended_its_ten_best_gaits_are_certified_in_order() {
     let folder = tempfile::tempdir().unwrap();
-    let service = Service::start_examining(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
+    let service = Service::start_certifying(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
     let study = service.study(|new| new.trial_budget = 20).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let early = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert!(early.status == StatusCode::CONFLICT && early.text.contains("being certified"), "{}", early.text);
-    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait is being examined"));
+    assert!(service.fetch(&format!("/studies/{study}")).await.text.contains("This gait is being certified"));
 
     let found = settled(&service, study).await;
     assert_eq!((&found["certificate"], &found["passing"]), (&json!("failed"), &Value::Null));
     let best = ranked(&service, study).await;
     assert!(best.len() > 10);
     let expected: Vec<String> = best[..10].iter().map(|trial| format!("trial {trial}")).collect();
-    assert_eq!(examined_by_service(&service).await, expected);
+    assert_eq!(certified_by_service(&service).await, expected);
     service.stop().await;
 }
 
 #[tokio::test]
-async fn what_ended_before_the_process_began_is_examined_until_one_passes_and_that_one_is_kept() {
+async fn what_ended_before_the_process_began_is_certified_until_one_passes_and_that_one_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;
@@ -184,12 +184,12 @@ async fn what_ended_before_the_process_began_is_examined_until_one_passes_and_th
     let third = service.trials(study).await.into_iter().find(|trial| trial.id == best[2]).unwrap();
     service.stop().await;
 
-    let service = Service::start_examining(&database, Analytic::default(), only(Some(third.action))).await;
+    let service = Service::start_certifying(&database, Analytic::default(), only(Some(third.action))).await;
     let found = settled(&service, study).await;
     assert_eq!((&found["certificate"], &found["passing"]["trial_id"]), (&json!("failed"), &json!(third.id)));
-    assert_eq!(examined_by_service(&service).await.len(), 3);
+    assert_eq!(certified_by_service(&service).await.len(), 3);
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert!(page.contains("The best gait that passed") && !page.contains("being examined"), "{page}");
+    assert!(page.contains("The best gait that passed") && !page.contains("being certified"), "{page}");
 
     tokio::time::sleep(Duration::from_millis(5)).await;
     prune(&mut service.store.clone(), 0).await.unwrap();
@@ -204,18 +204,18 @@ async fn what_ended_before_the_process_began_is_examined_until_one_passes_and_th
 }
 
 #[tokio::test]
-async fn a_recommendation_that_is_asked_for_while_the_study_runs_is_examined_beside_its_solves() {
+async fn a_recommendation_that_is_asked_for_while_the_study_runs_is_certified_beside_its_solves() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(Duration::from_millis(20));
     let passes = Verdicts { pause: Duration::from_millis(20), passes: |_: &Gait| true };
-    let service = Service::start_examining(&folder.path().join("a.db"), solver, passes).await;
+    let service = Service::start_certifying(&folder.path().join("a.db"), solver, passes).await;
     let study = service.study(|new| new.trial_budget = 500).await;
     service.wait_for_trials(study, 3).await;
-    assert!(examined_by_service(&service).await.is_empty(), "nobody asked");
+    assert!(certified_by_service(&service).await.is_empty(), "nobody asked");
     service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     let ended = async || service.trials(study).await.iter().filter(|trial| !trial.state.is_open()).count();
     let before = ended().await;
-    while examined_by_service(&service).await.is_empty() {
+    while certified_by_service(&service).await.is_empty() {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
     service.wait_for_trials(study, before + 1).await;

@@ -4,7 +4,7 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gaitwright::store::audit::{self, Verdict};
+use gaitwright::store::audit::{self, ChainCheck};
 use gaitwright::store::studies::StudyState;
 use gaitwright::store::{Store, StoreError, backup};
 use gaitwright_tests::analytic::Analytic;
@@ -115,7 +115,7 @@ async fn every_change_leaves_exactly_one_row_in_the_audit_trail() {
         assert_eq!(audit_rows(&service).await, before + count + 1, "{path}");
     }
     let verdict = audit::verify(&mut service.store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(verdict, Verdict::Whole { rows, .. } if rows == before as u64 + 9));
+    assert!(matches!(verdict, ChainCheck::Whole { rows, .. } if rows == before as u64 + 9));
     service.stop().await;
 }
 
@@ -136,7 +136,7 @@ async fn one_changed_byte_in_the_audit_trail_is_found() {
     std::fs::write(&database, bytes).unwrap();
     let pool = backup::open_read_only(&database).await.unwrap();
     let verdict = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
-    assert_eq!(verdict, Verdict::Broken { seq: 3 });
+    assert_eq!(verdict, ChainCheck::Broken { seq: 3 });
 }
 
 #[tokio::test]

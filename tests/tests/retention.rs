@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Request, header};
 use gaitwright::store::audit;
-use gaitwright::store::seals::{self, Verdict};
+use gaitwright::store::seals::{self, SealCheck};
 use gaitwright::store::studies::StudyState;
 use gaitwright::studies::retention::{Dropped, drop_expired};
 use gaitwright_tests::analytic::Analytic;
@@ -87,8 +87,8 @@ async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
     }
     assert_eq!(drop_expired(&service.store).await.unwrap(), Dropped::default());
     let mut reader = service.store.read().await.unwrap();
-    assert!(matches!(seals::verify(&mut reader).await.unwrap(), Verdict::Whole { .. }));
-    assert!(matches!(audit::verify(&mut reader).await.unwrap(), audit::Verdict::Whole { .. }));
+    assert!(matches!(seals::verify(&mut reader).await.unwrap(), SealCheck::Whole { .. }));
+    assert!(matches!(audit::verify(&mut reader).await.unwrap(), audit::ChainCheck::Whole { .. }));
     drop(reader);
     service.stop().await;
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::presentations::{self, Said};
+use gaitwright::store::presentations::{self, Judgement};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::TrialState;
 use gaitwright::store::{StudyId, TrialId, audit, lab_sessions};
@@ -35,7 +35,7 @@ async fn decide(service: &Service, trial: impl std::fmt::Display, decision: &Val
 }
 
 async fn waits_at_home(service: &Service) -> bool {
-    service.fetch("/").await.text.contains("a gait was called unsafe: look at it and decide")
+    service.fetch("/").await.text.contains("a gait was called unsafe: review it")
 }
 
 #[tokio::test]
@@ -72,7 +72,8 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     let mut reader = service.store.read().await.unwrap();
     // On which side it was shown is drawn anew each time; the record has it as said of the pair.
     let shown = presentations::of_study(&mut reader, study).await.unwrap().remove(0);
-    let called_unsafe = shown.answer.filter(|said| *said != Said::UnsafeBoth).map(|said| said.unsafe_of(shown.pair()));
+    let called_unsafe =
+        shown.answer.filter(|said| *said != Judgement::UnsafeBoth).map(|said| said.unsafe_of(shown.pair()));
     assert_eq!(called_unsafe, Some(vec![gait.parse().unwrap()]));
     let trail = audit::page(&mut reader, "", None, 100).await.unwrap();
     drop(reader);
@@ -162,8 +163,8 @@ async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
     tokio::time::sleep(std::time::Duration::from_millis(2)).await;
     service.post(&format!("/api/v1/lab-sessions/{id}/unblind"), &json!({"reason": "walked"})).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
-    let mut standing = objections(&service, study).await;
-    standing.retain(|objection| objection["stands"] == json!(true));
-    assert_eq!(standing.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
+    let mut snapshot = objections(&service, study).await;
+    snapshot.retain(|objection| objection["stands"] == json!(true));
+    assert_eq!(snapshot.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
 }

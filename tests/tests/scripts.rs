@@ -6,7 +6,7 @@ use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use gait_learner::Partner;
 use gaitwright::store::StudyId;
-use gaitwright::store::feedback::Said;
+use gaitwright::store::feedback::FeedbackContent;
 use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
@@ -228,7 +228,7 @@ async fn a_trial_that_did_not_converge_counts_in_its_batch_and_is_compared_with_
         .await
         .iter()
         .filter_map(|row| match row.said {
-            Said::Preference { winner, loser } => Some((numbers[&winner], numbers[&loser])),
+            FeedbackContent::Preference { winner, loser } => Some((numbers[&winner], numbers[&loser])),
             _ => None,
         })
         .collect();

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::seals::{self, Verdict};
+use gaitwright::store::seals::{self, SealCheck};
 use gaitwright::store::{Store, StoreError, audit, backup, verify as store_verify};
 use gaitwright_tests::every_table::filled;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
@@ -14,7 +14,7 @@ async fn open(database: &Path) -> SqliteConnection {
     SqliteConnection::connect_with(&options).await.unwrap()
 }
 
-async fn verify(database: &Path) -> Verdict {
+async fn verify(database: &Path) -> SealCheck {
     let pool = backup::open_read_only(database).await.unwrap();
     seals::verify(&mut pool.acquire().await.unwrap()).await.unwrap()
 }
@@ -43,7 +43,7 @@ async fn touched(database: &Path, sql: &str) -> PathBuf {
 #[tokio::test]
 async fn a_row_that_another_hand_changed_added_or_took_away_is_found() {
     let (_folder, database) = filled().await;
-    assert!(matches!(verify(&database).await, Verdict::Whole { .. }));
+    assert!(matches!(verify(&database).await, SealCheck::Whole { .. }));
     for sealed in seals::TABLES {
         let (table, key) = (sealed.table, sealed.key[0]);
         let written = if table == "results" { "received_at" } else { "created_at" };
@@ -52,7 +52,7 @@ async fn a_row_that_another_hand_changed_added_or_took_away_is_found() {
             format!("delete from {table} where {key} = (select max({key}) from {table})"),
         ] {
             let found = verify(&touched(&database, &sql).await).await;
-            assert!(matches!(&found, Verdict::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
+            assert!(matches!(&found, SealCheck::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
         }
     }
     for (sql, table) in [
@@ -67,26 +67,26 @@ async fn a_row_that_another_hand_changed_added_or_took_away_is_found() {
         ),
     ] {
         let found = verify(&touched(&database, sql).await).await;
-        assert!(matches!(&found, Verdict::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
+        assert!(matches!(&found, SealCheck::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
     }
 }
 
 #[tokio::test]
 async fn seals_and_audit_rows_that_are_missing_are_found_at_the_end_too() {
     let (_folder, database) = filled().await;
-    let Verdict::Whole { seals: count, .. } = verify(&database).await else { panic!("whole") };
+    let SealCheck::Whole { seals: count, .. } = verify(&database).await else { panic!("whole") };
     let count = i64::try_from(count).unwrap();
     for (sql, seq) in [
         (format!("delete from seals where seq = {count}"), count),
         ("delete from seals where seq = 3".to_owned(), 4),
         ("update seals set sha256 = '' where seq = 5".to_owned(), 5),
     ] {
-        assert_eq!(verify(&touched(&database, &sql).await).await, Verdict::Broken { seq }, "{sql}");
+        assert_eq!(verify(&touched(&database, &sql).await).await, SealCheck::Broken { seq }, "{sql}");
     }
     let cut = touched(&database, "delete from audit where seq = (select max(seq) from audit)").await;
     let pool = backup::open_read_only(&cut).await.unwrap();
     let found = audit::verify(&mut pool.acquire().await.unwrap()).await.unwrap();
-    assert!(matches!(found, audit::Verdict::Broken { .. }), "{found:?}");
+    assert!(matches!(found, audit::ChainCheck::Broken { .. }), "{found:?}");
 }
 
 /// A row like another one, with a key of its own.
@@ -158,7 +158,7 @@ async fn a_changed_row_of_a_table_with_checksums_is_found() {
         ("update _sqlx_migrations set execution_time = 7", "_sqlx_migrations"),
     ] {
         let found = verify(&touched(&database, sql).await).await;
-        assert!(matches!(&found, Verdict::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
+        assert!(matches!(&found, SealCheck::Touched { table: named, .. } if named == table), "{sql}: {found:?}");
     }
     let copy = touched(&database, "update events set payload = '{}' where seq = 1").await;
     let mut connection = open(&copy).await;

@@ -552,6 +552,6 @@ async fn upgrade_from_the_baseline_keeps_sessions_and_seals() {
     let tokens = gaitwright::store::tokens::all(&mut store.read().await.unwrap()).await.unwrap();
     assert!(!tokens.is_empty());
     let found = seals::verify(&mut store.read().await.unwrap()).await.unwrap();
-    assert!(matches!(found, seals::Verdict::Whole { .. }), "{found:?}");
+    assert!(matches!(found, seals::SealCheck::Whole { .. }), "{found:?}");
     store.close().await;
 }

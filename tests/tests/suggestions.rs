@@ -6,7 +6,7 @@ use axum::http::StatusCode;
 use gait_learner::{ActionIndex, Feedback};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::{StudyId, backup, studies};
-use gaitwright::studies::standing::Standing;
+use gaitwright::studies::snapshot::StudySnapshot;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -15,7 +15,7 @@ use std::time::Duration;
 async fn heard(service: &Service, study: StudyId) -> Vec<Feedback> {
     let mut reader = service.store.read().await.unwrap();
     let study = studies::get(&mut reader, study).await.unwrap();
-    Standing::read(&mut reader, study).await.unwrap().log().feedback
+    StudySnapshot::read(&mut reader, study).await.unwrap().log().feedback
 }
 
 #[tokio::test]

@@ -4,13 +4,13 @@
 
 use axum::http::StatusCode;
 use gait_learner::{Dimension, LearnerSettings, Partner, SearchSpace};
-use gaitwright::store::feedback::{Said, Source};
+use gaitwright::store::feedback::{FeedbackContent, Source};
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::store::trials::{Trial, TrialState};
 use gaitwright::store::{StudyId, trials};
 use gaitwright::studies::comparison::open_question;
 use gaitwright::studies::plan::NewStudy;
-use gaitwright::studies::standing::Standing;
+use gaitwright::studies::snapshot::StudySnapshot;
 use gaitwright::workers::{Attempt, InProcess};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::away::Away;
@@ -70,7 +70,7 @@ async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
 
     // Each result has one label; each converged one is compared with the converged one recorded before it.
     let feedback = service.feedback(study).await;
-    let labels = feedback.iter().filter(|row| matches!(row.said, Said::Label { .. })).count();
+    let labels = feedback.iter().filter(|row| matches!(row.said, FeedbackContent::Label { .. })).count();
     assert_eq!(labels, 15);
     let mut last: Option<&Trial> = None;
     let mut compared = 0;
@@ -79,7 +79,7 @@ async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
             .iter()
             .filter(|row| row.source == Source::GaitRmse)
             .filter(|row| match row.said {
-                Said::Preference { winner, loser } => {
+                FeedbackContent::Preference { winner, loser } => {
                     let newer = if winner > loser { winner } else { loser };
                     newer == trial.id
                 }
@@ -91,7 +91,7 @@ async fn a_study_ends_with_its_budget_and_says_why_each_trial_is() {
                 assert_eq!(answers.len(), 1, "trial {}", trial.number);
                 compared += 1;
                 let better = if trial.gait_rmse_rad < before.gait_rmse_rad { trial.id } else { before.id };
-                assert!(matches!(answers[0].said, Said::Preference { winner, .. } if winner == better));
+                assert!(matches!(answers[0].said, FeedbackContent::Preference { winner, .. } if winner == better));
             }
             _ => assert!(answers.is_empty(), "trial {}", trial.number),
         }
@@ -148,7 +148,9 @@ async fn a_panic_is_tried_again_and_then_failed_and_never_heard_by_the_learner()
     assert_eq!(trials[1].state, TrialState::Failed);
     assert!(trials[1].message.contains("panics"), "{}", trials[1].message);
     let feedback = service.feedback(study).await;
-    assert!(feedback.iter().all(|row| !matches!(row.said, Said::Label { trial, .. } if trial == trials[1].id)));
+    assert!(
+        feedback.iter().all(|row| !matches!(row.said, FeedbackContent::Label { trial, .. } if trial == trials[1].id))
+    );
     service.stop().await;
 }
 
@@ -305,8 +307,9 @@ async fn nobody_is_asked_to_compare_a_gait_with_itself() {
     let third = service.trials(study).await.remove(2);
     assert_eq!((third.warm_started_from, second.warm_started_from), (Some(first.id), Some(first.id)));
     assert_eq!(third.gait_rmse_rad, second.gait_rmse_rad);
-    let standing = Standing::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
-    let question = service.store.clone().compute(move |pool| open_question(pool, &standing)).await.unwrap();
+    let snapshot =
+        StudySnapshot::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
+    let question = service.store.clone().compute(move |pool| open_question(pool, &snapshot)).await.unwrap();
     assert_eq!(question.unwrap().trials(), Some((third.id, first.id)), "the one before is the same gait");
     service.stop().await;
 }

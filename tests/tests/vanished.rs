@@ -260,7 +260,7 @@ async fn verify_backup_and_export_work_on_a_read_only_mount() {
             assert!(done.status.success(), "{state}: {command}: {done:?}");
         }
         if state == "killed" {
-            service.director.stop();
+            service.scheduler.stop();
             service.store.close().await;
         }
     }

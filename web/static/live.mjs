@@ -12,7 +12,7 @@ const PAUSE = 500;
 /** Time before listening anew to a service that could not answer, ms. */
 const AGAIN = 3000;
 /** What is recorded of a study and changes its page. */
-const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_examined", "trial_explained"];
+const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "safety_reviewed", "gait_certified", "trial_explained"];
 
 /** @type {(node: Node) => string} What a folded part is called. */
 const titleOf = (node) => (node instanceof HTMLDetailsElement ? (node.querySelector("summary")?.textContent ?? "") : "");

@@ -134,7 +134,7 @@ fn multipliers(matrix: DMatrix<f64>) -> Option<Vec<Multiplier>> {
     Some(values)
 }
 
-/// Examines the map near the gait's first state.
+/// Checks the map near the gait's first state.
 pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(State, ReturnMap), Fall> {
     let residual = |x: &State| walker.after_stride(x).map(|after| (section(&after) - section(x)).amax());
     let fixed = fixed_point(walker, start)?;

@@ -15,7 +15,7 @@ use crate::nlp::NonlinearProgram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Places between neighbouring points where the gait is examined, and their distance from the first point.
+/// Places between neighbouring points where the gait is checked, and their distance from the first point.
 const PARTS: usize = 10;
 /// A bound is never moved by more than this share of its range.
 const LARGEST_SHARE: f64 = 0.25;

@@ -1,4 +1,4 @@
-//! `gaitwright certify`: an independent examination of a gait.
+//! `gaitwright certify`: an independent certification of a gait.
 
 use super::gait_file::read_gait;
 use super::output::data;

@@ -73,7 +73,7 @@ enum Command {
     Solve(solve::Solve),
     /// Optimise one gait for each row of a table of actions.
     Sweep(sweep::Sweep),
-    /// Examine a gait independently of its optimisation: residuals, closed loop, stability.
+    /// Certify a gait independently of its optimisation: residuals, closed loop, stability.
     Certify(certify::Certify),
     /// Write a gait for OpenSim or for the device.
     Convert(convert::Convert),

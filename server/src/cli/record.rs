@@ -16,7 +16,7 @@ pub(super) struct Audit {
 
 #[derive(Debug, Subcommand)]
 enum AuditCommand {
-    /// Examine the database file, walk the hash chains, compare every row with its seal or checksum, and the record with its
+    /// Check the database file, walk the hash chains, compare every row with its seal or checksum, and the record with its
     /// anchors: a change of the past is found, and an end that is missing.
     Verify {
         /// The SQLite file.

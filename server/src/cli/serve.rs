@@ -11,8 +11,8 @@ use crate::http::{Access, AppState, Hosts, router};
 use crate::store::audit::Actor;
 use crate::store::{Store, commit};
 use crate::studies::catalogue;
-use crate::studies::director::Director;
 use crate::studies::retention;
+use crate::studies::scheduler::Scheduler;
 use crate::workers::nats::JetStream;
 use crate::workers::{AfterSolves, Dispatch, GaitSolver, InProcess, LEASE};
 use axum_server::tls_rustls::{RustlsAcceptor, RustlsConfig};
@@ -85,20 +85,20 @@ impl Serve {
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
             None => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).standing_back()),
         };
-        let director = Director::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
+        let scheduler = Scheduler::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
         let access = Arc::new(access);
         // What commands exported while no service ran.
         access.log.write(&store, true).await?;
-        let mut state = AppState::new(director.clone(), Arc::clone(&access), hosts);
+        let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), hosts);
         state.proxies = proxies.clone();
         let app = router(state);
         let work = tokio::spawn({
-            let director = director.clone();
-            async move { Box::pin(director.run()).await }
+            let scheduler = scheduler.clone();
+            async move { Box::pin(scheduler.run()).await }
         });
-        let chores = tokio::spawn(keep_house(director.clone(), store.clone(), access_log_days, backups));
-        tracing::info!(database = %database.display(), workers = director.workers(), "listening on {origin}");
+        let chores = tokio::spawn(keep_house(scheduler.clone(), store.clone(), access_log_days, backups));
+        tracing::info!(database = %database.display(), workers = scheduler.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");
         }
@@ -112,13 +112,13 @@ impl Serve {
             tell(&format!("sign in (once, within a day): {scheme}://{here}/sign-in/{secret}"));
         }
 
-        // Streams end when the director stops, so that the drain is not held up by them.
+        // Streams end when the scheduler stops, so that the drain is not held up by them.
         let handle = Handle::<Peer>::new();
         tokio::spawn({
-            let (director, handle, interrupted) = (director.clone(), handle.clone(), interrupted());
+            let (scheduler, handle, interrupted) = (scheduler.clone(), handle.clone(), interrupted());
             async move {
                 interrupted.await;
-                director.stop();
+                scheduler.stop();
                 handle.graceful_shutdown(Some(DRAIN));
             }
         });
@@ -130,7 +130,7 @@ impl Serve {
             Some(config) => server.acceptor(RustlsAcceptor::new(config)).http1_only().serve(service).await,
             None => server.http1_only().serve(service).await,
         };
-        director.stop();
+        scheduler.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;
         chores.await.map_err(|e| Error::Internal(e.to_string()))?;
         access.log.write(&store, true).await?;
@@ -200,19 +200,19 @@ pub(super) async fn interrupted() {
     }
 }
 
-/// What the service does by itself beside tuning, until the director is told to stop: drops what is past its time, and makes
+/// What the service does by itself beside tuning, until the scheduler is told to stop: drops what is past its time, and makes
 /// copies. What fails is logged and tried again; a task that panics is begun again, and `/ready` says so.
-async fn keep_house(director: Director, store: Store, access_log_days: Option<u32>, backups: Option<BackupPlan>) {
+async fn keep_house(scheduler: Scheduler, store: Store, access_log_days: Option<u32>, backups: Option<BackupPlan>) {
     let dropping =
-        director.keep("dropping what is past its time", |task| retention::keep_dropping(store.clone(), task));
+        scheduler.keep("dropping what is past its time", |task| retention::keep_dropping(store.clone(), task));
     let pruning = async {
         if let Some(days) = access_log_days {
-            director.keep("pruning the access log", |task| keep_pruning(store.clone(), days, task)).await;
+            scheduler.keep("pruning the access log", |task| keep_pruning(store.clone(), days, task)).await;
         }
     };
     let copying = async {
         if let Some(plan) = backups {
-            director.keep("copying the record", |task| plan.clone().follow(store.clone(), task)).await;
+            scheduler.keep("copying the record", |task| plan.clone().follow(store.clone(), task)).await;
         }
     };
     tokio::join!(dropping, pruning, copying);

@@ -70,7 +70,7 @@ pub(super) struct Solve {
     /// Where no gait is found: say why, and which bound, relaxed alone, gives one. Solves up to eight times per bound.
     #[arg(long)]
     explain: bool,
-    /// Examine a converged gait as `certify` does; with --json the certificate is its member `certificate`.
+    /// Certify a converged gait as `certify` does; with --json the certificate is its member `certificate`.
     #[arg(long)]
     certify: bool,
 }

@@ -13,7 +13,7 @@ use crate::studies::belief::Beliefs;
 use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended;
 use crate::studies::retention::{self, Dropped};
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -120,8 +120,8 @@ pub async fn prune(store: &mut Store, days: u32) -> Result<u64, Error> {
     let ended = studies::ended_before(&mut *store.read().await?, before).await?;
     for study in ended {
         let id = study.id;
-        let standing = Standing::read(&mut *store.read().await?, study).await?;
-        let rank = move |pool: &OnPool| ranking_to_show(pool, &standing, &Beliefs::default());
+        let snapshot = StudySnapshot::read(&mut *store.read().await?, study).await?;
+        let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &Beliefs::default());
         let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let mut writer = store.write().await?;
         let kept = recommended::worth_keeping(&mut writer, &ranking).await?;

@@ -73,19 +73,19 @@ impl Tune {
         };
         let study = Box::pin(unattended::study(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
-        let ran = Box::pin(unattended::run_and_examine(&mut store, &study, workers, lines)).await;
+        let ran = Box::pin(unattended::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;
         let (ran, judged) = ran?;
-        let (standing, beliefs) = (ran.standing.clone(), Arc::clone(&ran.beliefs));
-        let choose = move |pool: &OnPool| best_trial(&standing, &*beliefs.posterior(pool, &standing)?);
+        let (snapshot, beliefs) = (ran.snapshot.clone(), Arc::clone(&ran.beliefs));
+        let choose = move |pool: &OnPool| best_trial(&snapshot, &*beliefs.posterior(pool, &snapshot)?);
         let best = store.compute(choose).await?.map_err(Error::Learner)?;
-        self.print(&summary::of(&ran.standing, best, judged))?;
+        self.print(&summary::of(&ran.snapshot, best, judged))?;
         if ran.interrupted {
-            let done = ran.standing.trials.len() - ran.standing.open();
+            let done = ran.snapshot.trials.len() - ran.snapshot.open();
             tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
             return Ok(Ended::Interrupted);
         }
-        match unattended::failure(&ran.standing) {
+        match unattended::failure(&ran.snapshot) {
             None => Ok(Ended::Done),
             Some(failure) => {
                 tell(&format!("gaitwright: {failure}"));
@@ -129,7 +129,7 @@ fn certificate_lines(summary: &Summary) -> Vec<String> {
             lines.push(format!("best gait that passes its certificate: trial {}{rmse}", trial.number));
             lines.push(format!("  action            {}", action_line(&trial.action)));
         }
-        None => lines.push("none of the best gaits that were examined passes its certificate".to_owned()),
+        None => lines.push("none of the best gaits that were certified passes its certificate".to_owned()),
     }
     lines
         .push("a finer mesh often passes with the same bounds: gaitwright solve --mesh 8,8,12,12 --certify".to_owned());

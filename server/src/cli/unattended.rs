@@ -8,10 +8,10 @@ use crate::store::studies::{Study, StudyState};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Store, commit, studies, trials as trial_rows};
 use crate::studies::belief::Beliefs;
-use crate::studies::director::Director;
 use crate::studies::plan::{self, NewStudy};
 use crate::studies::recommended::{self, Judged};
-use crate::studies::standing::Standing;
+use crate::studies::scheduler::Scheduler;
+use crate::studies::snapshot::StudySnapshot;
 use crate::studies::summary;
 use crate::workers::{GaitSolver, InProcess};
 use gait_optimizer::TunedBounds;
@@ -32,7 +32,7 @@ pub(super) enum Lines {
 #[derive(Debug)]
 pub(super) struct Run {
     /// How it stands.
-    pub(super) standing: Standing,
+    pub(super) snapshot: StudySnapshot,
     /// Somebody stopped it before its end.
     pub(super) interrupted: bool,
     /// What the learner believes.
@@ -40,7 +40,7 @@ pub(super) struct Run {
 }
 
 /// What went wrong in a study for reasons of the program or the machine. That an action has no gait is a result.
-pub(super) fn failure(Standing { study, trials, .. }: &Standing) -> Option<String> {
+pub(super) fn failure(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Option<String> {
     let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
     if study.state != StudyState::Finished {
         return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
@@ -71,57 +71,62 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
 /// Runs a study until it ends or somebody stops it.
 pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lines) -> Result<Run, Error> {
     let engine = InProcess::new(workers, Arc::new(GaitSolver));
-    let director = Director::new(store, Arc::new(engine), Some(study.id), None);
+    let scheduler = Scheduler::new(store, Arc::new(engine), Some(study.id), None);
     let work = tokio::spawn({
-        let director = director.clone();
-        async move { Box::pin(director.run()).await }
+        let scheduler = scheduler.clone();
+        async move { Box::pin(scheduler.run()).await }
     });
     let ended = tokio::select! {
-        ended = follow(&director, study, lines) => Some(ended),
+        ended = follow(&scheduler, study, lines) => Some(ended),
         () = interrupted() => None,
     };
-    director.stop();
+    scheduler.stop();
     work.await.map_err(|e| Error::Internal(e.to_string()))??;
     let mut reader = store.read().await?;
     let study = studies::get(&mut reader, study.id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
     let interrupted = ended.is_none();
     if let Some(ended) = ended {
         ended?;
     }
-    Ok(Run { standing, interrupted, beliefs: Arc::clone(director.beliefs()) })
+    Ok(Run { snapshot, interrupted, beliefs: Arc::clone(scheduler.beliefs()) })
 }
 
-/// Runs a study and examines its best gaits, if nobody stopped it.
-pub(super) async fn run_and_examine(
+/// Runs a study and certifies its best gaits, if nobody stopped it.
+pub(super) async fn run_and_certify(
     store: &mut Store,
     study: &Study,
     workers: usize,
     lines: Lines,
 ) -> Result<(Run, Judged), Error> {
     let ran = run(store, study, workers, lines).await?;
-    let judged = if ran.interrupted { Judged::default() } else { examined(store, &ran.standing, &ran.beliefs).await? };
+    let judged =
+        if ran.interrupted { Judged::default() } else { certified(store, &ran.snapshot, &ran.beliefs).await? };
     Ok((ran, judged))
 }
 
-/// Examines the best gaits of a study.
-pub(super) async fn examined(store: &mut Store, standing: &Standing, beliefs: &Arc<Beliefs>) -> Result<Judged, Error> {
-    tell("examining the best gait");
-    recommended::examine(store, &Actor::terminal(), standing.clone(), Arc::clone(beliefs)).await
+/// Certifies the best gaits of a study.
+pub(super) async fn certified(
+    store: &mut Store,
+    snapshot: &StudySnapshot,
+    beliefs: &Arc<Beliefs>,
+) -> Result<Judged, Error> {
+    tell("certifying the best gait");
+    recommended::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(beliefs)).await
 }
 
 /// Shows progress until the study ends.
-async fn follow(director: &Director, study: &Study, lines: Lines) -> Result<(), Error> {
+async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<(), Error> {
     let bar = ProgressBar::new(u64::from(study.plan.trial_budget));
     let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
     if let Ok(style) = ProgressStyle::with_template(style) {
         bar.set_style(style.progress_chars("=> "));
     }
-    let mut pulse = director.pulse();
-    let mut progress = director.board().listen();
+    let mut pulse = scheduler.pulse();
+    let mut progress = scheduler.board().listen();
     let mut shown = std::collections::HashSet::new();
     loop {
-        let mut reader = director.store().read().await?;
+        let mut reader = scheduler.store().read().await?;
         let present = studies::get(&mut reader, study.id).await?;
         let rows = trial_rows::of_study(&mut reader, study.id).await?;
         drop(reader);

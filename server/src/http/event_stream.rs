@@ -65,7 +65,7 @@ impl<P: Permission> Listening<P> {
         let (events, receiver) = mpsc::channel(AHEAD);
         let sender = Sender { listening: self.copy(), events, asked: None };
         let produced = produce(sender);
-        let stopping = self.app.director.stopping();
+        let stopping = self.app.scheduler.stopping();
         tokio::spawn(async move {
             tokio::select! {
                 () = stopping.cancelled() => {}
@@ -83,7 +83,7 @@ impl<P: Permission> Listening<P> {
     }
 
     async fn until_gone(&self) {
-        let mut pulse = self.app.director.pulse();
+        let mut pulse = self.app.scheduler.pulse();
         loop {
             // Either there was a change of the record, or a session may have ended by itself.
             let _ = tokio::time::timeout(ASKS_EVERY, pulse.changed()).await;

@@ -76,8 +76,8 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Result<Res
         }
     }
     for (name, meaning, value) in [
-        ("gaitwright_workers", "Solves that can run at the same time", app.director.workers() as f64),
-        ("gaitwright_solves_running", "Solves that run in this process", app.director.board().running() as f64),
+        ("gaitwright_workers", "Solves that can run at the same time", app.scheduler.workers() as f64),
+        ("gaitwright_solves_running", "Solves that run in this process", app.scheduler.board().running() as f64),
         ("gaitwright_database_bytes", "Size of the record", totals.bytes as f64),
         ("gaitwright_oldest_queued_seconds", "How long the oldest solve has waited", totals.oldest_queued_seconds),
     ] {

@@ -68,7 +68,7 @@ impl<P: Permission> Once<P> {
         Ok(app.write().await?)
     }
 
-    /// Keeps the answer, makes the effect durable and tells the director.
+    /// Keeps the answer, makes the effect durable and tells the scheduler.
     pub(crate) async fn finish<T: Serialize>(
         &self,
         app: &AppState,
@@ -86,7 +86,7 @@ impl<P: Permission> Once<P> {
             })?;
         }
         commit(writer).await?;
-        app.director.changed();
+        app.scheduler.changed();
         Ok(response(&kept))
     }
 

@@ -11,7 +11,7 @@ use crate::compute::{ComputeError, OnPool};
 use crate::error::Error;
 use crate::store::{Instant, LentWriter, Reader, Store, StoreResult, clock};
 use crate::studies::belief::Beliefs;
-use crate::studies::director::Director;
+use crate::studies::scheduler::Scheduler;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ const DEFAULT_LIFETIME_SECONDS: f64 = 12.0 * 3600.0;
 #[derive(Debug, Clone)]
 pub struct AppState {
     /// Runs the studies.
-    pub director: Director,
+    pub scheduler: Scheduler,
     /// How people and programs say who they are.
     pub access: Arc<Access>,
     /// What was asked of the service so far.
@@ -80,12 +80,12 @@ impl Access {
 }
 
 impl AppState {
-    /// A service over a director.
-    pub fn new(director: Director, access: Arc<Access>, hosts: Hosts) -> Self {
-        let beliefs = Arc::clone(director.beliefs());
-        let store = director.store().with_own_pool();
+    /// A service over a scheduler.
+    pub fn new(scheduler: Scheduler, access: Arc<Access>, hosts: Hosts) -> Self {
+        let beliefs = Arc::clone(scheduler.beliefs());
+        let store = scheduler.store().with_own_pool();
         let (requests, proxies) = (Arc::default(), Proxies::default());
-        Self { director, access, requests, beliefs, hosts, proxies, slowest_answer: SLOWEST_ANSWER, store }
+        Self { scheduler, access, requests, beliefs, hosts, proxies, slowest_answer: SLOWEST_ANSWER, store }
     }
 
     /// The record.

@@ -34,7 +34,7 @@ pub enum Drawing {
     Tiles(String, Vec<StickFigure>),
     /// A shaded table.
     Map(HeatMap),
-    /// What grew out of what.
+    /// The warm-start tree.
     Tree(Tree),
 }
 
@@ -60,7 +60,7 @@ impl Figure {
         Self { name: file_name(group, &map.title), drawing: Drawing::Map(map) }
     }
 
-    /// What grew out of what.
+    /// The warm-start tree.
     pub fn tree(tree: Tree) -> Self {
         Self { name: file_name("", &tree.title), drawing: Drawing::Tree(tree) }
     }

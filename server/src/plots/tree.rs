@@ -1,4 +1,4 @@
-//! A tree drawn from left to right: what grew out of what.
+//! A tree drawn from left to right: the warm-start tree.
 
 use super::chart::escape;
 use std::collections::BTreeSet;
@@ -26,7 +26,7 @@ const CHARACTER: f64 = 7.4;
 /// Width of what one mark means.
 const LEGEND: f64 = 140.0;
 
-/// What grew out of what.
+/// The warm-start tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree {
     /// What it shows.

@@ -131,7 +131,7 @@ pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limi
 
 /// What walking the chain found.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Verdict {
+pub enum ChainCheck {
     /// Every row follows from the one before.
     Whole {
         /// How many rows.
@@ -150,7 +150,7 @@ pub enum Verdict {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
+pub async fn verify(db: &mut Connection) -> StoreResult<ChainCheck> {
     let (mut rows, mut last, mut after) = (0_u64, ORIGIN.to_owned(), 0_i64);
     loop {
         let batch = sqlx::query("select * from audit where seq > ? order by seq limit ?")
@@ -164,21 +164,21 @@ pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
         for raw in &batch {
             let seq: i64 = raw.try_get("seq")?;
             // A row that cannot even be read was not written by this program.
-            let Ok(row) = from_row(raw) else { return Ok(Verdict::Broken { seq }) };
+            let Ok(row) = from_row(raw) else { return Ok(ChainCheck::Broken { seq }) };
             let at: String = raw.try_get("at")?;
             let expected = hash(&last, &at, &row.actor, &row.action, &row.object, &row.detail);
             // No row is ever deleted: the numbers have no gap.
             if seq != after + 1 || row.previous != last || row.hash != expected {
-                return Ok(Verdict::Broken { seq });
+                return Ok(ChainCheck::Broken { seq });
             }
             (rows, last, after) = (rows + 1, row.hash, seq);
         }
     }
     // The database counts for itself how many there were.
     if last_ever(db, "audit").await? != after {
-        return Ok(Verdict::Broken { seq: after + 1 });
+        return Ok(ChainCheck::Broken { seq: after + 1 });
     }
-    Ok(Verdict::Whole { rows, last })
+    Ok(ChainCheck::Whole { rows, last })
 }
 
 /// The largest number that a table ever gave to a row, also when the row is there no more.

@@ -6,7 +6,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use std::collections::HashMap;
 
-/// The certificate of a trial's gait by the present examination, if it was made.
+/// The certificate of a trial's gait by the present certification, if it was made.
 ///
 /// # Errors
 /// What the database reports.
@@ -20,7 +20,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Cer
         .transpose()
 }
 
-/// Whether a trial's gait passed the present examination, if it was made.
+/// Whether a trial's gait passed the present certification, if it was made.
 ///
 /// # Errors
 /// What the database reports.
@@ -64,7 +64,7 @@ pub enum CertificateOnRecord {
     Pruned,
 }
 
-/// The certificates of the converged trials of a study, by the present examination.
+/// The certificates of the converged trials of a study, by the present certification.
 ///
 /// # Errors
 /// What the database reports.

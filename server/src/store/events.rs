@@ -13,7 +13,7 @@ pub struct Event {
     /// The study.
     pub study_id: StudyId,
     /// `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`, `feedback_retracted`,
-    /// `lab_session_answered`, `safety_reviewed`, `gait_examined`, `trial_explained`,
+    /// `lab_session_answered`, `safety_reviewed`, `gait_certified`, `trial_explained`,
     /// `trial_not_explained`.
     pub kind: String,
     /// What exactly, as JSON.

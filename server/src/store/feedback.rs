@@ -51,7 +51,7 @@ impl FromStr for Source {
 /// What was said, in terms of trials.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Said {
+pub enum FeedbackContent {
     /// The trial falls into this ordinal category (0: not converged, 1: converged).
     Label {
         /// The trial.
@@ -94,7 +94,7 @@ pub struct FeedbackRow {
     pub study_id: StudyId,
     /// What was said.
     #[serde(flatten)]
-    pub said: Said,
+    pub said: FeedbackContent,
     /// Where it comes from.
     pub source: Source,
     /// Who said it.
@@ -148,13 +148,18 @@ pub struct Voice<'a> {
 ///
 /// # Errors
 /// A violated constraint or trigger, or what the database reports.
-pub async fn append(db: &mut Connection, study: StudyId, said: &Said, voice: Voice<'_>) -> StoreResult<FeedbackId> {
+pub async fn append(
+    db: &mut Connection,
+    study: StudyId,
+    said: &FeedbackContent,
+    voice: Voice<'_>,
+) -> StoreResult<FeedbackId> {
     let id = FeedbackId::fresh();
     let (kind, a, b, category, suggested) = match *said {
-        Said::Label { trial, category } => ("label", trial, None, Some(category), None),
-        Said::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
-        Said::Tie { a, b } => ("tie", a, Some(b), None, None),
-        Said::Suggestion { suggested, over } => {
+        FeedbackContent::Label { trial, category } => ("label", trial, None, Some(category), None),
+        FeedbackContent::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
+        FeedbackContent::Tie { a, b } => ("tie", a, Some(b), None, None),
+        FeedbackContent::Suggestion { suggested, over } => {
             ("suggestion", over, None, None, Some(i64::try_from(suggested.0).unwrap_or(i64::MAX)))
         }
     };
@@ -381,11 +386,11 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
     let suggested: Option<i64> = row.try_get("suggested")?;
     let kind: &str = row.try_get("kind")?;
     let said = match (kind, b, category, suggested) {
-        ("label", None, Some(category), None) => Said::Label { trial: a, category },
-        ("preference", Some(loser), None, None) => Said::Preference { winner: a, loser },
-        ("tie", Some(b), None, None) => Said::Tie { a, b },
+        ("label", None, Some(category), None) => FeedbackContent::Label { trial: a, category },
+        ("preference", Some(loser), None, None) => FeedbackContent::Preference { winner: a, loser },
+        ("tie", Some(b), None, None) => FeedbackContent::Tie { a, b },
         ("suggestion", None, None, Some(index)) => {
-            Said::Suggestion { suggested: ActionIndex(u64::try_from(index).unwrap_or(0)), over: a }
+            FeedbackContent::Suggestion { suggested: ActionIndex(u64::try_from(index).unwrap_or(0)), over: a }
         }
         _ => return Err(StoreError::Damaged { what: "feedback", reason: format!("a {kind} with other columns") }),
     };

@@ -1,7 +1,7 @@
 //! Which walk of a lab session the person who walked found better, in terms of walks.
 
 use super::audit::Actor;
-use super::presentations::Said;
+use super::presentations::Judgement;
 use super::{Connection, Instant, LabSessionId, StoreResult, now};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -12,7 +12,7 @@ pub struct LabAnswer {
     /// 1; a further one when the one before was taken back.
     pub number: u32,
     /// What was said; first is walk 2.
-    pub said: Said,
+    pub said: Judgement,
     /// Free text.
     pub note: String,
     /// Who wrote it down.
@@ -32,7 +32,7 @@ pub async fn insert(
     actor: &Actor,
     id: LabSessionId,
     number: u32,
-    (said, note): (Said, &str),
+    (said, note): (Judgement, &str),
 ) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into lab_answers (session_id, number, answer, note, actor, created_at) values (?, ?, ?, ?, ?, ?) \

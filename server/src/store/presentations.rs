@@ -48,8 +48,7 @@ impl FromStr for Kind {
 /// What a rater says of two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-#[schema(as = RaterSaid)]
-pub enum Said {
+pub enum Judgement {
     /// The gait shown first is better.
     First,
     /// The gait shown second is better.
@@ -68,7 +67,7 @@ pub enum Said {
     Withdrawn,
 }
 
-impl Said {
+impl Judgement {
     /// Every answer.
     pub const ALL: [Self; 8] = [
         Self::First,
@@ -82,11 +81,15 @@ impl Said {
     ];
 
     /// What the learner hears of it. That a gait is unsafe says that the other is better.
-    pub fn heard(self, (first, second): (TrialId, TrialId)) -> Option<feedback::Said> {
+    pub fn heard(self, (first, second): (TrialId, TrialId)) -> Option<feedback::FeedbackContent> {
         match self {
-            Self::First | Self::UnsafeSecond => Some(feedback::Said::Preference { winner: first, loser: second }),
-            Self::Second | Self::UnsafeFirst => Some(feedback::Said::Preference { winner: second, loser: first }),
-            Self::NoDifference => Some(feedback::Said::Tie { a: first, b: second }),
+            Self::First | Self::UnsafeSecond => {
+                Some(feedback::FeedbackContent::Preference { winner: first, loser: second })
+            }
+            Self::Second | Self::UnsafeFirst => {
+                Some(feedback::FeedbackContent::Preference { winner: second, loser: first })
+            }
+            Self::NoDifference => Some(feedback::FeedbackContent::Tie { a: first, b: second }),
             Self::CannotTell | Self::UnsafeBoth | Self::Withdrawn => None,
         }
     }
@@ -138,7 +141,7 @@ impl Said {
     }
 }
 
-impl FromStr for Said {
+impl FromStr for Judgement {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
         Self::ALL
@@ -174,7 +177,7 @@ pub struct Presentation {
     /// When it was drawn.
     pub created_at: Instant,
     /// What the rater said of the pair: `First` is `one`. None: nothing yet.
-    pub answer: Option<Said>,
+    pub answer: Option<Judgement>,
     /// When.
     pub answered_at: Option<Instant>,
 }
@@ -242,7 +245,7 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
 #[derive(Debug, Clone, Copy)]
 pub struct NewAnswer<'a> {
     /// What the rater says of the pair.
-    pub said: Said,
+    pub said: Judgement,
     /// How long it took by the rater's clock, ms.
     pub response_ms: Option<i64>,
     /// Free text.
@@ -324,7 +327,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Pr
 /// # Errors
 /// What the database reports.
 pub async fn remarks_of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
-    let remarks: Vec<&str> = Said::ALL.iter().filter(|said| said.is_remark()).map(|said| said.as_str()).collect();
+    let remarks: Vec<&str> = Judgement::ALL.iter().filter(|said| said.is_remark()).map(|said| said.as_str()).collect();
     let remarks = remarks.join("', '");
     let sql = format!(
         "{SELECT} where p.study_id = ? and a.answer in ('{remarks}') and r.presentation_id is null order by p.id"

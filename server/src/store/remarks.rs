@@ -1,7 +1,7 @@
 //! Remarks: what staff say of two gaits that is no preference.
 
 use super::feedback::{Retraction, Source, Voice};
-use super::presentations::Said;
+use super::presentations::Judgement;
 use super::{Connection, FeedbackId, Instant, RemarkId, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::Serialize;
 use sqlx::Row;
@@ -20,7 +20,7 @@ pub struct Remark {
     /// The other one.
     pub second: TrialId,
     /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
-    pub answer: Said,
+    pub answer: Judgement,
     /// Where it comes from.
     pub source: Source,
     /// Who said it.
@@ -50,7 +50,7 @@ pub struct NewRemark<'a> {
     /// The two gaits.
     pub pair: (TrialId, TrialId),
     /// What is said of them.
-    pub said: Said,
+    pub said: Judgement,
     /// Who says so.
     pub voice: Voice<'a>,
     /// What the learner hears of it.

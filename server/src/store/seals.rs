@@ -228,7 +228,7 @@ pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
 
 /// What comparing the record with its seals found.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Verdict {
+pub enum SealCheck {
     /// Every row is as it was sealed.
     Whole {
         /// How many seals.
@@ -256,13 +256,13 @@ pub enum Verdict {
 ///
 /// # Errors
 /// What the database reports.
-pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
+pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
     let table = "select name from sqlite_master where type = 'table' and name = 'seals'";
     if sqlx::query(table).fetch_optional(&mut *db).await?.is_none() {
-        return Ok(Verdict::None);
+        return Ok(SealCheck::None);
     }
     let chain = walk(db).await?;
-    if !matches!(chain, Verdict::Whole { .. }) {
+    if !matches!(chain, SealCheck::Whole { .. }) {
         return Ok(chain);
     }
     let known = present(db).await?;
@@ -273,11 +273,11 @@ pub async fn verify(db: &mut Connection) -> StoreResult<Verdict> {
             found => found,
         };
         if let Some(key) = unlike {
-            return Ok(Verdict::Touched { table: sealed.table.to_owned(), key });
+            return Ok(SealCheck::Touched { table: sealed.table.to_owned(), key });
         }
     }
     Ok(match of_no_table(db, &known).await? {
-        Some((table, key)) => Verdict::Touched { table, key },
+        Some((table, key)) => SealCheck::Touched { table, key },
         None => chain,
     })
 }
@@ -294,7 +294,7 @@ async fn of_no_table(db: &mut Connection, known: &[Sealed]) -> StoreResult<Optio
     Ok(sqlx::query_as(AssertSqlSafe(sql)).fetch_optional(db).await?)
 }
 
-async fn walk(db: &mut Connection) -> StoreResult<Verdict> {
+async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
     let (mut last, mut after) = (ORIGIN.to_owned(), 0_i64);
     loop {
         let batch = sqlx::query("select * from seals where seq > ? order by seq limit ?")
@@ -309,20 +309,20 @@ async fn walk(db: &mut Connection) -> StoreResult<Verdict> {
             let seq: i64 = row.try_get("seq")?;
             let text = |name: &str| row.try_get::<String, _>(name);
             let (Ok(table), Ok(key), Ok(sha256)) = (text("evidence"), text("key"), text("sha256")) else {
-                return Ok(Verdict::Broken { seq });
+                return Ok(SealCheck::Broken { seq });
             };
             let hash = chained(&last, &table, &key, &sha256);
             if seq != after + 1 || text("previous")? != last || text("hash")? != hash {
-                return Ok(Verdict::Broken { seq });
+                return Ok(SealCheck::Broken { seq });
             }
             (last, after) = (hash, seq);
         }
     }
     // The database counts for itself how many there were.
     if super::audit::last_ever(db, "seals").await? != after {
-        return Ok(Verdict::Broken { seq: after + 1 });
+        return Ok(SealCheck::Broken { seq: after + 1 });
     }
-    Ok(Verdict::Whole { seals: after.unsigned_abs(), last })
+    Ok(SealCheck::Whole { seals: after.unsigned_abs(), last })
 }
 
 /// The key of a row that nobody sealed.

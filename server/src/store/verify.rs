@@ -1,4 +1,4 @@
-//! The whole examination of a record: its file, its schema, its chains, every row of every table, and its anchors.
+//! The whole verification of a record: its file, its schema, its chains, every row of every table, and its anchors.
 
 use super::anchor::{self, Ends};
 use super::{Connection, StoreError, StoreResult, audit, backup, migrations, seals};
@@ -18,19 +18,19 @@ pub struct Whole {
     pub anchors: Vec<(PathBuf, Ends)>,
 }
 
-/// Examines a record that another process may own.
+/// Verifies a record that another process may own.
 ///
 /// # Errors
 /// [`StoreError::Damaged`], [`StoreError::CutOff`] or [`StoreError::Rewritten`] with the first thing that is not as this
 /// program left it, or what the database reports.
 pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
     let pool = backup::open_read_only(record).await?;
-    let found = examine(&pool, record, anchors).await;
+    let found = verify_pool(&pool, record, anchors).await;
     pool.close().await;
     found
 }
 
-async fn examine(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
+async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
     let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     backup::check_open(pool).await?;
     let version = migrations::check_version(pool, record).await?;
@@ -38,14 +38,14 @@ async fn examine(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> Store
     let mut db = pool.begin().await?;
     schema(&mut db, version).await?;
     let audit = match audit::verify(&mut db).await? {
-        audit::Verdict::Whole { rows, last } => (rows, last),
-        audit::Verdict::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
+        audit::ChainCheck::Whole { rows, last } => (rows, last),
+        audit::ChainCheck::Broken { seq } => return Err(damaged(format!("the audit trail is broken at row {seq}"))),
     };
     let seals = match seals::verify(&mut db).await? {
-        seals::Verdict::Whole { seals, last } => Some((seals, last)),
-        seals::Verdict::None => None,
-        seals::Verdict::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
-        seals::Verdict::Touched { table, key } => {
+        seals::SealCheck::Whole { seals, last } => Some((seals, last)),
+        seals::SealCheck::None => None,
+        seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
+        seals::SealCheck::Touched { table, key } => {
             return Err(damaged(format!("row {key} of {table} is not as this program wrote it")));
         }
     };

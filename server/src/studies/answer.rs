@@ -4,11 +4,11 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
-use crate::store::feedback::{FeedbackRow, Said, Source, Voice};
-use crate::store::presentations::Said as Judgement;
+use crate::store::feedback::{FeedbackContent, FeedbackRow, Source, Voice};
+use crate::store::presentations::Judgement;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies};
-use crate::studies::preference::{self, Again, Statement};
+use crate::studies::preference::{self, Again, GivenJudgement};
 use crate::studies::walkable;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -17,7 +17,7 @@ use utoipa::ToSchema;
 /// Which of two gaits is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum PairAnswer {
     /// The first.
     A,
     /// The second.
@@ -35,7 +35,7 @@ pub struct Answer {
     /// The second gait.
     pub trial_b: TrialId,
     /// Which is better.
-    pub answer: Verdict,
+    pub answer: PairAnswer,
     /// Who says so: `subject`, `clinician` or `script`.
     /// By default what the caller is.
     #[serde(default)]
@@ -59,12 +59,12 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     let voice = voice(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
     let said = match answer.answer {
-        Verdict::A => Judgement::First,
-        Verdict::B => Judgement::Second,
-        Verdict::NoDifference => Judgement::NoDifference,
+        PairAnswer::A => Judgement::First,
+        PairAnswer::B => Judgement::Second,
+        PairAnswer::NoDifference => Judgement::NoDifference,
     };
     let fields = ("trial_a", "trial_b");
-    let statement = Statement { study: study.id, pair: (a, b), fields, said, voice, again: Again::Refused };
+    let statement = GivenJudgement { study: study.id, pair: (a, b), fields, said, voice, again: Again::Refused };
     let heard = preference::hear(writer, statement).await?;
     let id = heard.ok_or_else(|| Error::Internal("a preference was not heard".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
@@ -105,7 +105,9 @@ const BESIDE: u32 = 20;
 /// # Errors
 /// What the database reports.
 pub async fn beside(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
-    let (Said::Preference { winner: a, loser: b } | Said::Tie { a, b }) = row.said else { return Ok(Vec::new()) };
+    let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.said else {
+        return Ok(Vec::new());
+    };
     Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)
 }
 
@@ -130,7 +132,7 @@ pub async fn retract(
         return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
     }
     consents::may_be_shown(writer, row.study_id).await?;
-    if matches!(row.said, Said::Label { .. }) {
+    if matches!(row.said, FeedbackContent::Label { .. }) {
         return Err(Error::conflict("only an answer can be taken back: a label says what the solver did"));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;

@@ -1,10 +1,10 @@
 //! What the learner believes about a study's search space, in the forms people ask for, kept until it hears more.
 
 use super::seed::{Purpose, derive};
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::compute::OnPool;
 use crate::store::StudyId;
-use crate::store::feedback::{FeedbackRow, LogVersion, Said};
+use crate::store::feedback::{FeedbackContent, FeedbackRow, LogVersion};
 use gait_learner::{ActionIndex, Agreement, BestProbability, LearnerError, Marginal, Posterior, posterior};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -42,13 +42,13 @@ pub struct Comparison {
 
 impl Belief {
     /// What follows from the posterior of a study: CPU work.
-    fn of(standing: &Standing, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
-        let plan = &standing.study.plan;
+    fn of(snapshot: &StudySnapshot, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
+        let plan = &snapshot.study.plan;
         let dimensions = 0..plan.search_space.dimensions().len();
         let marginals = dimensions.map(|d| posterior.marginal(d)).collect::<Result<_, _>>()?;
         let mut comparisons = Vec::new();
-        for row in standing.feedback.iter().filter(|row| row.retraction.is_none()) {
-            let Some((winner, loser)) = preferred(standing, row) else { continue };
+        for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
+            let Some((winner, loser)) = preferred(snapshot, row) else { continue };
             let probability = posterior.preference_probability(winner, loser)?;
             comparisons.push(Comparison { given: row.clone(), probability });
         }
@@ -64,10 +64,10 @@ impl Belief {
 }
 
 /// Winner and loser as actions, of a preference between two trials that tried different ones.
-fn preferred(standing: &Standing, row: &FeedbackRow) -> Option<(ActionIndex, ActionIndex)> {
-    let action = |id| standing.trial(id).map(|trial| trial.action_index);
+fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex, ActionIndex)> {
+    let action = |id| snapshot.trial(id).map(|trial| trial.action_index);
     match row.said {
-        Said::Preference { winner, loser } => {
+        FeedbackContent::Preference { winner, loser } => {
             Some((action(winner)?, action(loser)?)).filter(|(winner, loser)| winner != loser)
         }
         _ => None,
@@ -86,17 +86,17 @@ impl Beliefs {
     ///
     /// # Errors
     /// When the learner refuses the log.
-    pub fn posterior(&self, _: &OnPool, standing: &Standing) -> Result<Arc<Posterior>, LearnerError> {
-        let plan = &standing.study.plan;
-        self.posteriors.get_or(standing, || posterior(&plan.search_space, &standing.log(), &plan.learner))
+    pub fn posterior(&self, _: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Posterior>, LearnerError> {
+        let plan = &snapshot.study.plan;
+        self.posteriors.get_or(snapshot, || posterior(&plan.search_space, &snapshot.log(), &plan.learner))
     }
 
     /// The belief of a study, computed where the log has changed since: CPU work.
     ///
     /// # Errors
     /// When the learner refuses the log.
-    pub fn of(&self, pool: &OnPool, standing: &Standing) -> Result<Arc<Belief>, LearnerError> {
-        self.beliefs.get_or(standing, || Belief::of(standing, self.posterior(pool, standing)?))
+    pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
+        self.beliefs.get_or(snapshot, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
     }
 }
 
@@ -113,10 +113,10 @@ impl<T> Default for Kept<T> {
 impl<T> Kept<T> {
     fn get_or(
         &self,
-        standing: &Standing,
+        snapshot: &StudySnapshot,
         compute: impl FnOnce() -> Result<T, LearnerError>,
     ) -> Result<Arc<T>, LearnerError> {
-        let (study, version) = (standing.study.id, standing.version);
+        let (study, version) = (snapshot.study.id, snapshot.version);
         // The list is whole between any two statements that hold the lock.
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, found)) = kept().iter().find(|(id, at, _)| (*id, *at) == (study, version)) {

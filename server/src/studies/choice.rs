@@ -3,7 +3,7 @@
 use super::belief::Beliefs;
 use super::search;
 use super::seed::{Purpose, derive};
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::compute::OnPool;
 use crate::store::TrialId;
 use crate::store::trials::{NewTrial, Trial, TrialState};
@@ -29,24 +29,24 @@ impl ChoiceError {
     }
 }
 
-/// The next trial of a study, after what the learner believes now. Depends on the standing alone: the same log gives the same
+/// The next trial of a study, after what the learner believes now. Depends on the snapshot alone: the same log gives the same
 /// trial, bit for bit.
 ///
 /// # Errors
 /// [`ChoiceError`], among them that every action was tried.
-pub fn next_trial(_: &OnPool, standing: &Standing, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
-    let plan = &standing.study.plan;
-    let number = standing.trials.last().map_or(1, |trial| trial.number + 1);
-    let log = standing.log();
+pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
+    let plan = &snapshot.study.plan;
+    let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
+    let log = snapshot.log();
     let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
-    let proposal = propose(&plan.search_space, &log, &standing.taken_without_result(), &plan.learner, seed)?;
+    let proposal = propose(&plan.search_space, &log, &snapshot.taken_without_result(), &plan.learner, seed)?;
     Ok(NewTrial {
         number,
         action_index: proposal.action,
         action: search::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
         reason: reason_in_words(proposal.reason),
-        best_before: proposal.best.and_then(|action| standing.trial_of(action)).map(|trial| trial.id),
-        warm_started_from: best_converged(standing, belief)?,
+        best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
+        warm_started_from: best_converged(snapshot, belief)?,
     })
 }
 
@@ -54,8 +54,8 @@ pub fn next_trial(_: &OnPool, standing: &Standing, belief: &Posterior) -> Result
 ///
 /// # Errors
 /// When a trial's action is not in the search space.
-pub fn best_converged(standing: &Standing, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
-    Ok(by_mean(standing, belief, |_| true)?.first().copied())
+pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(by_mean(snapshot, belief, |_| true)?.first().copied())
 }
 
 /// The recommended trial: of those with a gait, that with the highest posterior mean; a gait that somebody called unsafe is
@@ -63,26 +63,26 @@ pub fn best_converged(standing: &Standing, belief: &Posterior) -> Result<Option<
 ///
 /// # Errors
 /// As [`best_converged`].
-pub fn best_trial(standing: &Standing, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
-    Ok(ranking(standing, belief)?.first().copied())
+pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(ranking(snapshot, belief)?.first().copied())
 }
 
 /// The gaits of a study that nobody called unsafe, the recommended one first, by posterior mean.
 ///
 /// # Errors
 /// As [`best_converged`].
-pub fn ranking(standing: &Standing, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(standing, belief, |trial| !standing.grounds.objections.closes(trial.id))
+pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
+    by_mean(snapshot, belief, |trial| !snapshot.grounds.objections.closes(trial.id))
 }
 
 /// Converged trials by posterior mean, the earliest of equals first.
 fn by_mean(
-    standing: &Standing,
+    snapshot: &StudySnapshot,
     belief: &Posterior,
     counts: impl Fn(&Trial) -> bool,
 ) -> Result<Vec<TrialId>, LearnerError> {
     let mut ranked = Vec::new();
-    for trial in standing.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
+    for trial in snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
         ranked.push((belief.mean(trial.action_index)?, trial.id));
     }
     ranked.sort_by(|(mean_a, _), (mean_b, _)| mean_b.total_cmp(mean_a));
@@ -96,18 +96,22 @@ pub const MANY: usize = 400;
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn ranking_to_show(pool: &OnPool, standing: &Standing, beliefs: &Beliefs) -> Result<Vec<TrialId>, LearnerError> {
-    if standing.trials.len() >= MANY {
-        return Ok(last_believed(standing).into_iter().collect());
+pub fn ranking_to_show(
+    pool: &OnPool,
+    snapshot: &StudySnapshot,
+    beliefs: &Beliefs,
+) -> Result<Vec<TrialId>, LearnerError> {
+    if snapshot.trials.len() >= MANY {
+        return Ok(last_believed(snapshot).into_iter().collect());
     }
-    ranking(standing, &*beliefs.posterior(pool, standing)?)
+    ranking(snapshot, &*beliefs.posterior(pool, snapshot)?)
 }
 
 /// What the learner last believed to be best, if that has a gait that nobody called unsafe; it does not take every trial to
 /// tell.
-pub fn last_believed(standing: &Standing) -> Option<TrialId> {
-    let best = standing.trials.last().and_then(|newest| newest.best_before).and_then(|best| standing.trial(best))?;
-    (best.state == TrialState::Converged && !standing.grounds.objections.closes(best.id)).then_some(best.id)
+pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
+    let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
+    (best.state == TrialState::Converged && !snapshot.grounds.objections.closes(best.id)).then_some(best.id)
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

@@ -1,38 +1,38 @@
 //! Whom to compare a new trial with, and what Gait RMSE answers.
 
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use super::walkable::{NotWalkable, WalkablePair, is_same_gait};
 use crate::compute::OnPool;
 use crate::store::TrialId;
-use crate::store::feedback::Said;
+use crate::store::feedback::FeedbackContent;
 use crate::store::trials::Trial;
 use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};
 use std::collections::HashSet;
 
 /// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
-/// as the learner's settings say. `standing` is read before the new trial's result is in it.
+/// as the learner's settings say. `snapshot` is read before the new trial's result is in it.
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn partners(_: &OnPool, standing: &Standing, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
-    let Some(new) = standing.trial(new) else { return Ok(Vec::new()) };
-    let plan = &standing.study.plan;
-    let comparable = standing.comparable();
-    let log = standing.log();
+pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
+    let Some(new) = snapshot.trial(new) else { return Ok(Vec::new()) };
+    let plan = &snapshot.study.plan;
+    let comparable = snapshot.comparable();
+    let log = snapshot.log();
     let questions = comparisons_to_ask_among(&plan.search_space, &log, new.action_index, &plan.learner, |a| {
         comparable.contains(&a)
     })?;
-    Ok(questions.into_iter().filter_map(|q| standing.trial_of(q.against)).map(|trial| trial.id).collect())
+    Ok(questions.into_iter().filter_map(|q| snapshot.trial_of(q.against)).map(|trial| trial.id).collect())
 }
 
 /// What Gait RMSE says about two gaits: the smaller one is better, equal ones tie.
-pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> Said {
+pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
     if new.1 < old.1 {
-        Said::Preference { winner: new.0, loser: old.0 }
+        FeedbackContent::Preference { winner: new.0, loser: old.0 }
     } else if old.1 < new.1 {
-        Said::Preference { winner: old.0, loser: new.0 }
+        FeedbackContent::Preference { winner: old.0, loser: new.0 }
     } else {
-        Said::Tie { a: new.0, b: old.0 }
+        FeedbackContent::Tie { a: new.0, b: old.0 }
     }
 }
 
@@ -62,18 +62,18 @@ impl Question {
 ///
 /// # Errors
 /// When the learner refuses the log.
-pub fn open_question(_: &OnPool, standing: &Standing) -> Result<Question, LearnerError> {
-    let plan = &standing.study.plan;
-    let log = standing.log();
-    let may_be_asked = |trial: &&Trial| standing.grounds.may_become_walkable(trial);
+pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
+    let plan = &snapshot.study.plan;
+    let log = snapshot.log();
+    let may_be_asked = |trial: &&Trial| snapshot.grounds.may_become_walkable(trial);
     let mut candidates: HashSet<ActionIndex> =
-        standing.trials.iter().filter(may_be_asked).map(|trial| trial.action_index).collect();
+        snapshot.trials.iter().filter(may_be_asked).map(|trial| trial.action_index).collect();
     let Some(&newest) = log.visited.iter().rev().find(|action| candidates.contains(action)) else {
         return Ok(Question::None);
     };
-    let Some(own) = standing.trial_of(newest) else { return Ok(Question::None) };
+    let Some(own) = snapshot.trial_of(newest) else { return Ok(Question::None) };
     candidates.retain(|action| {
-        *action == newest || !standing.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
+        *action == newest || !snapshot.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
     });
     // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
     // best one, and with it the question.
@@ -85,11 +85,11 @@ pub fn open_question(_: &OnPool, standing: &Standing) -> Result<Question, Learne
     let questions =
         comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
     let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
-    let mut pairs = open.filter_map(|q| Some((standing.trial_of(q.action)?, standing.trial_of(q.against)?)));
-    let Some((first, second)) = pairs.find(|(a, b)| !standing.grounds.objections.is_skipped((a.id, b.id))) else {
+    let mut pairs = open.filter_map(|q| Some((snapshot.trial_of(q.action)?, snapshot.trial_of(q.against)?)));
+    let Some((first, second)) = pairs.find(|(a, b)| !snapshot.grounds.objections.is_skipped((a.id, b.id))) else {
         return Ok(Question::None);
     };
-    Ok(match (standing.walkable(first), standing.walkable(second)) {
+    Ok(match (snapshot.walkable(first), snapshot.walkable(second)) {
         (Ok(a), Ok(b)) => WalkablePair::of((a, first), (b, second)).map_or(Question::None, Question::Pair),
         (Err(NotWalkable::NotCertified { id, .. }), _) | (_, Err(NotWalkable::NotCertified { id, .. })) => {
             Question::AfterCertificate(id)

@@ -23,7 +23,7 @@ pub struct NewConsent {
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Withdrawal {
-    /// Why, as far as the subject says.
+    /// Reason, if the subject gives one.
     #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
 }

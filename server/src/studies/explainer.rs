@@ -1,5 +1,5 @@
 //! What the service explains: trials without a gait for which somebody asked, then those of studies that have ended and whose
-//! best gaits were examined.
+//! best gaits were certified.
 //!
 //! Which trial comes next follows from the record, so a process that is killed goes on where it was. One is explained at a
 //! time, behind every solve.
@@ -26,7 +26,7 @@ pub(super) struct Explainer {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Studies whose best gaits were examined.
+    /// Studies whose best gaits were certified.
     ended: BTreeSet<StudyId>,
     /// What is being explained.
     running: Option<TrialId>,
@@ -49,7 +49,7 @@ impl Explainer {
         Self { store, explain, state: Mutex::default(), told: Notify::new() }
     }
 
-    /// Takes up a study whose best gaits were examined.
+    /// Takes up a study whose best gaits were certified.
     pub(super) fn take_up(&self, study: StudyId) {
         self.state().ended.insert(study);
         self.told.notify_one();

@@ -3,8 +3,8 @@
 //! An iteration is a result. Results count in the order in which they came, which is the order of the trials' numbers
 //! unless several trials run at the same time.
 
-use super::standing::Standing;
-use crate::store::feedback::{FeedbackRow, Said};
+use super::snapshot::StudySnapshot;
+use crate::store::feedback::{FeedbackContent, FeedbackRow};
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Instant, TrialId};
 use serde::Serialize;
@@ -27,18 +27,18 @@ pub struct Milestone {
 }
 
 /// The trials that gave a result, in the order in which they did: the first is iteration 1.
-pub fn results(standing: &Standing) -> Vec<&Trial> {
-    labelled(standing).into_iter().map(|(_, trial)| trial).collect()
+pub fn results(snapshot: &StudySnapshot) -> Vec<&Trial> {
+    labelled(snapshot).into_iter().map(|(_, trial)| trial).collect()
 }
 
 /// With the instant at which each was recorded.
-fn labelled(standing: &Standing) -> Vec<(Instant, &Trial)> {
-    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+fn labelled(snapshot: &StudySnapshot) -> Vec<(Instant, &Trial)> {
+    let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let label = |row: &FeedbackRow| match row.said {
-        Said::Label { trial, .. } => by_id.get(&trial).map(|trial| (row.created_at, *trial)),
+        FeedbackContent::Label { trial, .. } => by_id.get(&trial).map(|trial| (row.created_at, *trial)),
         _ => None,
     };
-    standing.feedback.iter().filter_map(label).collect()
+    snapshot.feedback.iter().filter_map(label).collect()
 }
 
 /// How many results were there when a trial was proposed.
@@ -54,9 +54,9 @@ fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
 /// The best trial after each iteration at which it was asked for. What the learner believed when it proposed a trial is
 /// the best after the results that were there then; after the last one, what it believes now. The first gait there is
 /// is the best one until more is known. `best`: the best trial now.
-pub fn of(standing: &Standing, best: Option<TrialId>) -> Vec<Milestone> {
-    let labelled = labelled(standing);
-    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
+    let labelled = labelled(snapshot);
+    let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let milestone = |results: usize, id: TrialId| {
         let best = by_id.get(&id).filter(|best| best.state == TrialState::Converged)?;
         Some(Milestone {
@@ -70,7 +70,7 @@ pub fn of(standing: &Standing, best: Option<TrialId>) -> Vec<Milestone> {
     let mut milestones: Vec<Milestone> = Vec::new();
     let first = labelled.iter().position(|(_, trial)| trial.state == TrialState::Converged);
     milestones.extend(first.and_then(|index| milestone(index + 1, labelled[index].1.id)));
-    let proposed = standing.trials.iter();
+    let proposed = snapshot.trials.iter();
     milestones.extend(proposed.filter_map(|trial| milestone(results_before(&labelled, trial), trial.best_before?)));
     if !labelled.is_empty()
         && let Some(best) = best
@@ -87,8 +87,8 @@ pub fn of(standing: &Standing, best: Option<TrialId>) -> Vec<Milestone> {
 
 /// What is known of some trials without asking the learner: the best when each was proposed. Iterations are those of
 /// one trial at a time.
-pub fn known(standing: &Standing) -> Vec<Milestone> {
-    let by_id: HashMap<TrialId, &Trial> = standing.trials.iter().map(|trial| (trial.id, trial)).collect();
+pub fn known(snapshot: &StudySnapshot) -> Vec<Milestone> {
+    let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let best_before = |trial: &Trial| {
         let best = by_id.get(&trial.best_before?).filter(|best| best.state == TrialState::Converged)?;
         Some(Milestone {
@@ -99,5 +99,5 @@ pub fn known(standing: &Standing) -> Vec<Milestone> {
             cost_of_transport: best.cost_of_transport,
         })
     };
-    standing.trials.iter().filter_map(best_before).collect()
+    snapshot.trials.iter().filter_map(best_before).collect()
 }

@@ -1,7 +1,7 @@
 //! Studies: the tuning loop, and the rules of what may happen to a study and to a trial.
 //!
 //! The rules ([`lifecycle`], [`trial_state`], [`choice`], [`comparison`]) are pure functions of the record.
-//! The [`Director`](director::Director) applies them: it proposes, dispatches, records; it keeps no state that the
+//! The [`Scheduler`](scheduler::Scheduler) applies them: it proposes, dispatches, records; it keeps no state that the
 //! record does not have, so that a process that ends at any instant is continued by the next one.
 
 pub mod answer;
@@ -9,15 +9,14 @@ pub mod archive;
 pub mod belief;
 pub mod blind;
 pub mod catalogue;
+pub mod certification;
+mod certifier;
 pub mod change;
 pub mod choice;
 pub mod command;
 pub mod comparison;
 pub mod consent;
 pub mod device;
-pub mod director;
-pub mod examination;
-mod examiner;
 mod explainer;
 pub mod explanation;
 pub mod history;
@@ -30,18 +29,19 @@ pub mod person;
 pub mod plan;
 mod plans_under_way;
 pub mod preference;
+mod prefetch;
 pub mod recommended;
 pub mod record;
 pub mod recording;
-mod rehearsal;
 pub mod remark;
 pub mod retention;
 pub mod safety_review;
+pub mod scheduler;
 pub mod script;
 pub mod search;
 pub mod seed;
+pub mod snapshot;
 pub mod solve_input;
-pub mod standing;
 pub mod suggestion;
 pub mod summary;
 pub mod trial_state;

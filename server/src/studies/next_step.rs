@@ -4,10 +4,10 @@ use super::belief::Beliefs;
 use super::choice;
 use super::comparison::{self, Question};
 use super::lifecycle::Act;
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::compute::OnPool;
 use crate::error::Error;
-use crate::store::feedback::{FeedbackRow, Said, Source};
+use crate::store::feedback::{FeedbackContent, FeedbackRow, Source};
 use crate::store::studies::{Evaluation, FeedbackMode, StudyState};
 use crate::store::trials::{NewTrial, TrialState};
 use crate::store::{FeedbackId, now};
@@ -22,11 +22,11 @@ pub(super) enum Step {
     Try(NewTrial),
 }
 
-/// Decides it, from the standing alone: `beliefs` spares computing what is known.
-pub(super) fn next_step(pool: &OnPool, standing: &Standing, beliefs: &Beliefs) -> Result<Step, Error> {
-    let study = &standing.study;
+/// Decides it, from the snapshot alone: `beliefs` spares computing what is known.
+pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<Step, Error> {
+    let study = &snapshot.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
-        match (study.state, comparison::open_question(pool, standing).map_err(Error::Learner)?) {
+        match (study.state, comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
             (StudyState::Running, Question::Pair(_)) => {
                 return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into()));
             }
@@ -39,27 +39,27 @@ pub(super) fn next_step(pool: &OnPool, standing: &Standing, beliefs: &Beliefs) -
     if study.state != StudyState::Running {
         return Ok(Step::Nothing);
     }
-    let ended_in_a_row = standing.trials.iter().rev().filter(|trial| !trial.state.is_open());
+    let ended_in_a_row = snapshot.trials.iter().rev().filter(|trial| !trial.state.is_open());
     let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
     if failed == FAILURES_IN_A_ROW {
-        let message = standing.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
+        let message = snapshot.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
         let reason = format!("{failed} trials in a row failed; the last: {}", message.unwrap_or_default());
         return Ok(Step::Act(Act::Pause, reason));
     }
-    let open = standing.open();
-    let tried = u32::try_from(standing.trials.len()).unwrap_or(u32::MAX);
+    let open = snapshot.open();
+    let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
     if tried >= study.plan.trial_budget {
         let finished = Step::Act(Act::Finish, format!("all {} trials are done", study.plan.trial_budget));
         return Ok(if open == 0 { finished } else { Step::Nothing });
     }
-    if let Some(reason) = standing.is_enough() {
+    if let Some(reason) = snapshot.is_enough() {
         return Ok(if open == 0 { Step::Act(Act::Finish, reason) } else { Step::Nothing });
     }
     if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
         return Ok(Step::Nothing);
     }
-    let belief = beliefs.posterior(pool, standing).map_err(Error::Learner)?;
-    match choice::next_trial(pool, standing, &belief) {
+    let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
+    match choice::next_trial(pool, snapshot, &belief) {
         Ok(new) => Ok(Step::Try(new)),
         Err(e) if e.is_exhausted() && open == 0 => {
             Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
@@ -71,18 +71,21 @@ pub(super) fn next_step(pool: &OnPool, standing: &Standing, beliefs: &Beliefs) -
 }
 
 /// The trials that would be proposed next, one for each answer to the question that waits for one.
-pub(super) fn likely_next(pool: &OnPool, standing: &Standing) -> Result<Vec<NewTrial>, Error> {
-    let question = comparison::open_question(pool, standing).map_err(Error::Learner)?;
+pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
+    let question = comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
     let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
-    for said in [Said::Preference { winner: a, loser: b }, Said::Preference { winner: b, loser: a }, Said::Tie { a, b }]
-    {
-        let mut then = standing.clone();
+    for said in [
+        FeedbackContent::Preference { winner: a, loser: b },
+        FeedbackContent::Preference { winner: b, loser: a },
+        FeedbackContent::Tie { a, b },
+    ] {
+        let mut then = snapshot.clone();
         then.study.state = StudyState::Running;
         then.feedback.push(FeedbackRow {
-            seq: standing.feedback.last().map_or(1, |row| row.seq + 1),
+            seq: snapshot.feedback.last().map_or(1, |row| row.seq + 1),
             id: FeedbackId::fresh(),
-            study_id: standing.study.id,
+            study_id: snapshot.study.id,
             said,
             source: Source::Subject,
             author: String::new(),

@@ -3,7 +3,7 @@
 
 use crate::access::Reach;
 use crate::error::Error;
-use crate::store::presentations::Said;
+use crate::store::presentations::Judgement;
 use crate::store::safety_reviews::{self, SafetyReview, SafetyVerdict};
 use crate::store::studies::{self, Study};
 use crate::store::{
@@ -21,14 +21,14 @@ pub struct Closed {
     /// When.
     pub at: Instant,
     /// Where it was said.
-    pub said: Statement,
+    pub said: SafetyReportSource,
     /// What staff decided who looked at it.
     pub review: Option<SafetyReview>,
 }
 
 /// Where somebody called a gait unsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Statement {
+pub enum SafetyReportSource {
     /// A rater, comparing blindly.
     Rater(PresentationId),
     /// In a remark.
@@ -74,13 +74,18 @@ impl Objections {
         for shown in presentations::remarks_of_study(db, study).await? {
             if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
                 let by = format!("rater {}", shown.rater);
-                let closed =
-                    |trial| Closed { trial, by: by.clone(), at, said: Statement::Rater(shown.id), review: None };
+                let closed = |trial| Closed {
+                    trial,
+                    by: by.clone(),
+                    at,
+                    said: SafetyReportSource::Rater(shown.id),
+                    review: None,
+                };
                 found.hear(said, shown.pair(), closed);
             }
         }
         for remark in remarks::of_study(db, study).await?.iter().filter(|remark| remark.retraction.is_none()) {
-            let (by, at, said) = (&remark.author, remark.created_at, Statement::Staff(remark.id));
+            let (by, at, said) = (&remark.author, remark.created_at, SafetyReportSource::Staff(remark.id));
             found.hear(remark.answer, remark.pair(), |trial| Closed { trial, by: by.clone(), at, said, review: None });
         }
         for session in lab_sessions::of_study(db, study).await? {
@@ -91,7 +96,7 @@ impl Objections {
             if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
                 // Which of the two it is would tell the order: both are closed until that is told.
                 let by = format!("the subject in lab session {}, of one of its two gaits or both", session.number);
-                let (at, said) = (answer.at, Statement::Subject);
+                let (at, said) = (answer.at, SafetyReportSource::Subject);
                 let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
                 found.closed.extend([session.gait_one, session.gait_two].map(closed));
             }
@@ -110,8 +115,8 @@ impl Objections {
         }
     }
 
-    fn hear(&mut self, said: Said, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
-        if said == Said::CannotTell {
+    fn hear(&mut self, said: Judgement, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
+        if said == Judgement::CannotTell {
             self.skipped.push(pair);
         }
         self.closed.extend(said.unsafe_of(pair).into_iter().map(closed));

@@ -1,6 +1,6 @@
 //! The plans that are being made: one task for each study, one at a time.
 
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::error::Error;
 use crate::store::StudyId;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use tokio::task::{Id, JoinSet};
 
 /// What came of a plan: where the study stands if it waits for an answer.
-type Planned = Result<Option<Standing>, Error>;
+type Planned = Result<Option<StudySnapshot>, Error>;
 
 /// See the module.
 #[derive(Debug, Default)]
@@ -18,7 +18,7 @@ pub(super) struct Plans {
     /// Studies in which something may have changed since their plan was begun.
     again: HashSet<StudyId>,
     /// Studies that waited for an answer when they were planned last.
-    waiting: BTreeMap<StudyId, Arc<Standing>>,
+    waiting: BTreeMap<StudyId, Arc<StudySnapshot>>,
 }
 
 impl Plans {
@@ -48,16 +48,16 @@ impl Plans {
     }
 
     /// Notes what came of a plan. Whether it is to be made once more.
-    pub(super) fn ended(&mut self, study: StudyId, standing: Option<Standing>) -> bool {
-        match standing {
-            Some(standing) => self.waiting.insert(study, Arc::new(standing)),
+    pub(super) fn ended(&mut self, study: StudyId, snapshot: Option<StudySnapshot>) -> bool {
+        match snapshot {
+            Some(snapshot) => self.waiting.insert(study, Arc::new(snapshot)),
             None => self.waiting.remove(&study),
         };
         self.again.remove(&study)
     }
 
     /// Where the studies stand that wait for an answer.
-    pub(super) fn waiting(&self) -> Arc<[Arc<Standing>]> {
+    pub(super) fn waiting(&self) -> Arc<[Arc<StudySnapshot>]> {
         self.waiting.values().cloned().collect()
     }
 }

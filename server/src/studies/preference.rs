@@ -4,8 +4,8 @@
 use super::walkable::{self, Grounds, NotWalkable, WalkablePair, is_same_gait, trial_of_study};
 use crate::error::Error;
 use crate::printable;
-use crate::store::feedback::{self, Said, Source, Voice};
-use crate::store::presentations::Said as Judgement;
+use crate::store::feedback::{self, FeedbackContent, Source, Voice};
+use crate::store::presentations::Judgement;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, remarks};
 use gait_learner::ActionIndex;
@@ -24,7 +24,7 @@ pub enum Again {
 
 /// What a person says of two gaits.
 #[derive(Debug, Clone, Copy)]
-pub struct Statement<'a> {
+pub struct GivenJudgement<'a> {
     /// The study.
     pub study: StudyId,
     /// The two gaits, in the order in which they were shown or walked.
@@ -48,8 +48,8 @@ pub struct Statement<'a> {
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after a withdrawal and for a second answer.
-pub async fn hear(writer: &mut Writer, statement: Statement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let Statement { study, pair, fields, said, voice, again } = statement;
+pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
+    let GivenJudgement { study, pair, fields, said, voice, again } = statement;
     if !matches!(voice.source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", voice.source.as_str(), "subject, clinician, script"));
     }
@@ -72,8 +72,8 @@ pub async fn hear(writer: &mut Writer, statement: Statement<'_>) -> Result<Optio
 
 /// A safety report names gaits of this study that exist. What the learner hears of it says nothing of a gait that was
 /// reported before.
-async fn report_unsafe(writer: &mut Writer, statement: Statement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let Statement { study, pair, fields, said, voice, .. } = statement;
+async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
+    let GivenJudgement { study, pair, fields, said, voice, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
     let second = converged(writer, study, fields.1, pair.1).await?;
     let grounds = Grounds::read_for(writer, study, &[first.id, second.id]).await?;
@@ -157,7 +157,7 @@ pub(super) async fn suggest(
     if consents::is_withdrawn(writer, over.study_id).await? {
         return Err(NotWalkable::Withdrawn.into());
     }
-    let said = Said::Suggestion { suggested, over: over.id };
+    let said = FeedbackContent::Suggestion { suggested, over: over.id };
     Ok(feedback::append(writer, over.study_id, &said, voice).await?)
 }
 
@@ -169,11 +169,11 @@ pub(super) async fn compute(
     writer: &mut Writer,
     study: StudyId,
     (trial, state): (TrialId, TrialState),
-    answers: &[Said],
+    answers: &[FeedbackContent],
     author: &str,
 ) -> Result<(), Error> {
     let voice = |source| Voice { source, author, note: "" };
-    let label = Said::Label { trial, category: u32::from(state == TrialState::Converged) };
+    let label = FeedbackContent::Label { trial, category: u32::from(state == TrialState::Converged) };
     feedback::append(writer, study, &label, voice(Source::Convergence)).await?;
     for answer in answers {
         feedback::append(writer, study, answer, voice(Source::GaitRmse)).await?;

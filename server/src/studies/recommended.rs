@@ -1,9 +1,9 @@
 //! What the certificate of a recommended gait says: nothing is recommended silently whose certificate failed.
 
 use super::belief::Beliefs;
+use super::certification;
 use super::choice;
-use super::examination;
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::Actor;
@@ -13,8 +13,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use utoipa::ToSchema;
 
-/// So many of the best gaits are examined in search of one that passes.
-pub const MOST_EXAMINED: usize = 10;
+/// So many of the best gaits are certified in search of one that passes.
+pub const MOST_CERTIFIED: usize = 10;
 
 /// What is known of a gait's certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
@@ -25,10 +25,10 @@ pub enum CertificateState {
     /// Something is not.
     Failed,
     /// The service is at it.
-    BeingExamined,
+    BeingCertified,
     /// Nobody asked for it yet.
     #[default]
-    NotExamined,
+    NotCertified,
 }
 
 impl CertificateState {
@@ -37,8 +37,8 @@ impl CertificateState {
         match self {
             Self::Passed => "passed",
             Self::Failed => "failed",
-            Self::BeingExamined => "being_examined",
-            Self::NotExamined => "not_examined",
+            Self::BeingCertified => "being_certified",
+            Self::NotCertified => "not_certified",
         }
     }
 }
@@ -52,18 +52,18 @@ pub struct Judged {
     pub objections: Vec<String>,
     /// Where the best one failed: the best gait that is known to pass.
     pub passing: Option<TrialId>,
-    /// The best gait that was not examined, where no better one passed; of the first [`MOST_EXAMINED`].
-    pub unexamined: Option<TrialId>,
-    /// The service is examining that one by itself.
-    pub examining: bool,
+    /// The best gait that was not certified, where no better one passed; of the first [`MOST_CERTIFIED`].
+    pub without_certificate: Option<TrialId>,
+    /// The service is certifying that one by itself.
+    pub certifying: bool,
 }
 
 impl Judged {
-    /// Says whether the service is examining the best gait that was not examined.
-    pub fn examined_by_service(&mut self, examining: bool) {
-        self.examining = examining;
-        if examining && self.verdict == CertificateState::NotExamined {
-            self.verdict = CertificateState::BeingExamined;
+    /// Says whether the service is certifying the best gait that was not certified.
+    pub fn certified_by_service(&mut self, certifying: bool) {
+        self.certifying = certifying;
+        if certifying && self.verdict == CertificateState::NotCertified {
+            self.verdict = CertificateState::BeingCertified;
         }
     }
 }
@@ -78,7 +78,7 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
         let verdict = match certificates::passed(db, trial).await? {
             Some(true) => CertificateState::Passed,
             Some(false) => CertificateState::Failed,
-            None => CertificateState::NotExamined,
+            None => CertificateState::NotCertified,
         };
         if place == 0 {
             judged.verdict = verdict;
@@ -89,8 +89,8 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
                 break;
             }
             CertificateState::Failed => {}
-            _ if place < MOST_EXAMINED && gaits::is_here(db, trial).await? => {
-                judged.unexamined.get_or_insert(trial);
+            _ if place < MOST_CERTIFIED && gaits::is_here(db, trial).await? => {
+                judged.without_certificate.get_or_insert(trial);
             }
             _ => {}
         }
@@ -101,17 +101,17 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
     Ok(judged)
 }
 
-/// The next gait to examine in search of one that passes: none when one has passed, or the first [`MOST_EXAMINED`] have
-/// failed. `refused`: what cannot be examined.
+/// The next gait to certify in search of one that passes: none when one has passed, or the first [`MOST_CERTIFIED`] have
+/// failed. `refused`: what cannot be certified.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn next_to_examine(
+pub async fn next_to_certify(
     db: &mut Connection,
     ranking: &[TrialId],
     refused: &BTreeSet<TrialId>,
 ) -> StoreResult<Option<TrialId>> {
-    for &trial in ranking.iter().take(MOST_EXAMINED) {
+    for &trial in ranking.iter().take(MOST_CERTIFIED) {
         match certificates::passed(db, trial).await? {
             Some(true) => return Ok(None),
             None if !refused.contains(&trial) && gaits::is_here(db, trial).await? => return Ok(Some(trial)),
@@ -122,7 +122,7 @@ pub async fn next_to_examine(
 }
 
 /// The gaits that a study recommends or may still recommend: the best one, the best one that passes its certificate, and, as long
-/// as none is known to pass, those that are still to be examined.
+/// as none is known to pass, those that are still to be certified.
 ///
 /// # Errors
 /// What the database reports.
@@ -130,7 +130,7 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
     let mut kept = Vec::new();
     for (place, &trial) in ranking.iter().enumerate() {
         let passed = certificates::passed(db, trial).await?;
-        if place == 0 || passed == Some(true) || (passed.is_none() && place < MOST_EXAMINED) {
+        if place == 0 || passed == Some(true) || (passed.is_none() && place < MOST_CERTIFIED) {
             kept.push(trial);
         }
         if passed == Some(true) {
@@ -140,36 +140,36 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
     Ok(kept)
 }
 
-/// Examines the gaits of a study, the best one first, until one passes or [`MOST_EXAMINED`] have failed.
+/// Certifies the gaits of a study, the best one first, until one passes or [`MOST_CERTIFIED`] have failed.
 ///
-/// What is no gait of the walker, as another worker may have sent it, stays unexamined.
+/// What is no gait of the walker, as another worker may have sent it, stays without a certificate.
 ///
 /// # Errors
 /// What learner and database report.
-pub async fn examine(
+pub async fn certify(
     store: &mut Store,
     actor: &Actor,
-    standing: Standing,
+    snapshot: StudySnapshot,
     beliefs: Arc<Beliefs>,
 ) -> Result<Judged, Error> {
-    let rank = move |pool: &OnPool| choice::ranking_to_show(pool, &standing, &beliefs);
+    let rank = move |pool: &OnPool| choice::ranking_to_show(pool, &snapshot, &beliefs);
     let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
     let mut refused = BTreeSet::new();
     loop {
-        let next = next_to_examine(&mut *store.read().await?, &ranking, &refused).await?;
+        let next = next_to_certify(&mut *store.read().await?, &ranking, &refused).await?;
         let Some(trial) = next else { break };
-        let begun = examination::begin(&mut *store.read().await?, trial).await?;
-        let certificate = match examination::certificate(store, begun).await {
+        let begun = certification::begin(&mut *store.read().await?, trial).await?;
+        let certificate = match certification::certificate(store, begun).await {
             Ok(certificate) => certificate,
             Err(error) if error.is_input() => {
-                tracing::warn!(%trial, %error, "what a trial gave cannot be examined");
+                tracing::warn!(%trial, %error, "what a trial gave cannot be certified");
                 refused.insert(trial);
                 continue;
             }
             Err(error) => return Err(error),
         };
         let mut writer = store.write().await?;
-        examination::record(&mut writer, actor, trial, &certificate).await?;
+        certification::record(&mut writer, actor, trial, &certificate).await?;
         commit(writer).await?;
     }
     Ok(judged(&mut *store.read().await?, &ranking).await?)

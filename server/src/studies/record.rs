@@ -3,10 +3,10 @@
 
 use super::comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use super::trial_state::{self, Happening};
 use crate::error::Error;
-use crate::store::feedback::Said;
+use crate::store::feedback::FeedbackContent;
 use crate::store::gaits::PackedGait;
 use crate::store::jobs::{Lease, Troubles};
 use crate::store::studies::FeedbackMode;
@@ -49,12 +49,12 @@ pub async fn ended(
         tokio::time::sleep(FIRST_PAUSE * attempt).await;
         let mut reader = store.read().await?;
         let study = studies::get(&mut reader, lease.study).await?;
-        let standing = Standing::read(&mut reader, study).await?;
+        let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
-        let answers = answers(store, &standing, lease.trial, &end).await?;
+        let answers = answers(store, &snapshot, lease.trial, &end).await?;
 
         let mut writer = store.write().await?;
-        if !standing.is_current(&mut writer).await? {
+        if !snapshot.is_current(&mut writer).await? {
             continue;
         }
         let taken = jobs::finish(&mut writer, lease).await?;
@@ -170,17 +170,22 @@ async fn give_up_or_requeue(
 }
 
 /// What Gait RMSE answers about the new trial, unless the study leaves the answers to people.
-async fn answers(store: &mut Store, standing: &Standing, new: TrialId, end: &TrialEnd) -> Result<Vec<Said>, Error> {
+async fn answers(
+    store: &mut Store,
+    snapshot: &StudySnapshot,
+    new: TrialId,
+    end: &TrialEnd,
+) -> Result<Vec<FeedbackContent>, Error> {
     let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
     let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
-    if standing.study.plan.feedback_mode == FeedbackMode::Human {
+    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
         return Ok(Vec::new());
     }
-    let standing_there = standing.clone();
+    let standing_there = snapshot.clone();
     let partners = store.compute(move |pool| partners(pool, &standing_there, new)).await?.map_err(Error::Learner)?;
     Ok(partners
         .into_iter()
-        .filter_map(|id| standing.trial(id)?.gait_rmse_rad.map(|old| by_gait_rmse((new, rmse), (id, old))))
+        .filter_map(|id| snapshot.trial(id)?.gait_rmse_rad.map(|old| by_gait_rmse((new, rmse), (id, old))))
         .collect())
 }
 

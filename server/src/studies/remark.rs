@@ -1,12 +1,12 @@
 //! What staff say of two gaits that is no preference: one way in for the form and the REST interface.
 
 use super::answer::voice;
-use super::preference::{self, Again, Statement};
+use super::preference::{self, Again, GivenJudgement};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::feedback::Source;
-use crate::store::presentations::Said;
+use crate::store::presentations::Judgement;
 use crate::store::remarks::{self, Remark};
 use crate::store::{RemarkId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
 use serde::Deserialize;
@@ -23,7 +23,7 @@ pub struct NewRemark {
     /// The other one.
     pub second: TrialId,
     /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`; which gait is better is a preference.
-    pub answer: Said,
+    pub answer: Judgement,
     /// Who says so: `subject`, `clinician` or `script`.
     /// By default what the caller is.
     #[serde(default)]
@@ -52,7 +52,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
         ));
     }
     let voice = voice(caller, new.source, new.author.as_deref(), &new.note)?;
-    let statement = Statement {
+    let statement = GivenJudgement {
         study: study.id,
         pair: (new.first, new.second),
         fields: ("first", "second"),
@@ -71,9 +71,9 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
 ///
 /// # Errors
 /// As [`preference::hear`].
-pub(super) async fn write(writer: &mut Writer, statement: Statement<'_>) -> Result<RemarkId, Error> {
+pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<RemarkId, Error> {
     let heard = preference::hear(writer, statement).await?;
-    let Statement { study, pair, said, voice, .. } = statement;
+    let GivenJudgement { study, pair, said, voice, .. } = statement;
     let id = remarks::insert(writer, &remarks::NewRemark { study, pair, said, voice, feedback: heard }).await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "remark_id": id })).await?;
     Ok(id)

@@ -1,6 +1,6 @@
 //! Staff look at a gait that was called unsafe, and decide: one way in for the form and the REST interface.
 
-use super::objections::{Closed, Objections, Statement};
+use super::objections::{Closed, Objections, SafetyReportSource};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -88,11 +88,11 @@ async fn take_back_what_was_heard(
     Ok(())
 }
 
-async fn heard_of(db: &mut Connection, said: Statement) -> StoreResult<Option<FeedbackId>> {
+async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<Option<FeedbackId>> {
     match said {
-        Statement::Rater(id) => presentations::heard_of(db, id).await,
-        Statement::Staff(id) => Ok(remarks::get(db, id).await?.feedback_id),
+        SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
+        SafetyReportSource::Staff(id) => Ok(remarks::get(db, id).await?.feedback_id),
         // The learner hears it when the order is told.
-        Statement::Subject => Ok(None),
+        SafetyReportSource::Subject => Ok(None),
     }
 }

@@ -7,13 +7,13 @@ use super::belief::Beliefs;
 use super::choice::{self, ChoiceError};
 use super::comparison::{by_gait_rmse, partners};
 use super::preference;
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::access::Caller;
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
-use crate::store::feedback::Said;
+use crate::store::feedback::FeedbackContent;
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
 use crate::store::trials::{NewTrial, Told, Trial, TrialState};
 use crate::store::{Store, StudyId, TrialId, Writer, events, studies, trials};
@@ -38,7 +38,7 @@ pub enum Suggestion {
     /// It has an open trial already.
     Same(TrialId),
     /// This one is new, if the study still stands where it stood.
-    New(Box<Standing>, Box<NewTrial>),
+    New(Box<StudySnapshot>, Box<NewTrial>),
 }
 
 /// Looks what a worker should evaluate: no transaction is open yet.
@@ -67,23 +67,23 @@ pub async fn suggest(
         let reason = format!("the study is {}: {}", study.state.as_str(), study.state_reason);
         return Err(Error::conflict(reason.trim_end_matches(": ")));
     }
-    let standing = Standing::read(&mut db, study).await?;
+    let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let plan = &standing.study.plan;
-    if standing.trials.len() >= plan.trial_budget as usize {
+    let plan = &snapshot.study.plan;
+    if snapshot.trials.len() >= plan.trial_budget as usize {
         return Err(Error::conflict(format!("all {} trials were given out", plan.trial_budget)));
     }
-    if standing.open() >= plan.parallel_trials as usize {
-        return Err(Error::conflict(format!("{} trials are open already: tell what they gave first", standing.open())));
+    if snapshot.open() >= plan.parallel_trials as usize {
+        return Err(Error::conflict(format!("{} trials are open already: tell what they gave first", snapshot.open())));
     }
     let choose = move |pool: &OnPool| {
-        let believed = beliefs.posterior(pool, &standing).map_err(ChoiceError::Learner);
-        let chosen = believed.and_then(|belief| choice::next_trial(pool, &standing, &belief));
-        (standing, chosen)
+        let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
+        let chosen = believed.and_then(|belief| choice::next_trial(pool, &snapshot, &belief));
+        (snapshot, chosen)
     };
-    let (standing, chosen) = store.compute(choose).await?;
+    let (snapshot, chosen) = store.compute(choose).await?;
     match chosen {
-        Ok(new) => Ok(Suggestion::New(Box::new(standing), Box::new(new))),
+        Ok(new) => Ok(Suggestion::New(Box::new(snapshot), Box::new(new))),
         Err(e) if e.is_exhausted() => Err(Error::conflict("every action of the search space was tried")),
         Err(ChoiceError::Learner(e)) => Err(Error::Learner(e)),
         Err(ChoiceError::Bounds(e)) => Err(e.into()),
@@ -100,16 +100,16 @@ pub async fn give_out(
     worker: &str,
     suggestion: &Suggestion,
 ) -> Result<Option<Trial>, Error> {
-    let (standing, new) = match suggestion {
+    let (snapshot, new) = match suggestion {
         Suggestion::Same(id) => {
             audit::append(writer, &caller.actor, "trial.ask", &format!("trial {id}"), &json!({ "again": true }))
                 .await?;
             return Ok(Some(trials::get(writer, *id).await?));
         }
-        Suggestion::New(standing, new) => (standing, new),
+        Suggestion::New(snapshot, new) => (snapshot, new),
     };
-    let study = standing.study.id;
-    if !is_current(writer, standing).await? {
+    let study = snapshot.study.id;
+    if !is_current(writer, snapshot).await? {
         return Ok(None);
     }
     let id = trials::insert(writer, study, new).await?;
@@ -153,9 +153,9 @@ pub struct Tell {
 /// What to write when a script tells.
 #[derive(Debug)]
 pub struct Heard {
-    standing: Standing,
+    snapshot: StudySnapshot,
     told: Told,
-    answers: Vec<Said>,
+    answers: Vec<FeedbackContent>,
 }
 
 /// Checks what was told and what follows from it: no transaction is open yet.
@@ -173,25 +173,25 @@ pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, 
     }
     let study = studies::get(&mut db, trial.study_id).await?;
     let told = checked(&study, tell)?;
-    let standing = Standing::read(&mut db, study).await?;
+    let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let (TrialState::Converged, Some(rmse)) = (told.state, told.gait_rmse_rad) else {
-        return Ok(Heard { standing, told, answers: Vec::new() });
+        return Ok(Heard { snapshot, told, answers: Vec::new() });
     };
-    if standing.study.plan.feedback_mode == FeedbackMode::Human {
-        return Ok(Heard { standing, told, answers: Vec::new() });
+    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+        return Ok(Heard { snapshot, told, answers: Vec::new() });
     }
     let find = move |pool: &OnPool| {
-        let partners = partners(pool, &standing, id);
-        (standing, partners)
+        let partners = partners(pool, &snapshot, id);
+        (snapshot, partners)
     };
-    let (standing, partners) = store.compute(find).await?;
+    let (snapshot, partners) = store.compute(find).await?;
     let partners = partners.map_err(Error::Learner)?;
     let answers = partners
         .into_iter()
-        .filter_map(|old| standing.trial(old)?.gait_rmse_rad.map(|figure| by_gait_rmse((id, rmse), (old, figure))))
+        .filter_map(|old| snapshot.trial(old)?.gait_rmse_rad.map(|figure| by_gait_rmse((id, rmse), (old, figure))))
         .collect();
-    Ok(Heard { standing, told, answers })
+    Ok(Heard { snapshot, told, answers })
 }
 
 fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
@@ -227,9 +227,9 @@ fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
 /// # Errors
 /// What the database reports.
 pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &Heard) -> Result<Option<Trial>, Error> {
-    let study = heard.standing.study.id;
+    let study = heard.snapshot.study.id;
     let present = trials::get(writer, id).await?;
-    if present.state != TrialState::Running || !is_current(writer, &heard.standing).await? {
+    if present.state != TrialState::Running || !is_current(writer, &heard.snapshot).await? {
         return Ok(None);
     }
     trials::tell(writer, id, &heard.told).await?;
@@ -242,10 +242,10 @@ pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &H
 }
 
 /// Whether the study has heard nothing and given out nothing since it was read.
-async fn is_current(writer: &mut Writer, standing: &Standing) -> Result<bool, Error> {
-    let study = standing.study.id;
+async fn is_current(writer: &mut Writer, snapshot: &StudySnapshot) -> Result<bool, Error> {
+    let study = snapshot.study.id;
     let total = trials::counts(writer, study).await?.total;
-    Ok(standing.is_current(writer).await?
-        && total as usize == standing.trials.len()
-        && studies::get(writer, study).await?.revision == standing.study.revision)
+    Ok(snapshot.is_current(writer).await?
+        && total as usize == snapshot.trials.len()
+        && studies::get(writer, study).await?.revision == snapshot.study.revision)
 }

@@ -1,7 +1,7 @@
 //! A study in one document: what `tune --json` prints, a contract for scripts.
 
 use super::recommended::{CertificateState, Judged};
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::store::studies::StudyState;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{StudyId, TrialId};
@@ -61,19 +61,19 @@ pub struct TrialSummary {
 }
 
 /// The summary of a study and its best trial, with what is known of its certificates.
-pub fn of(standing: &Standing, best: Option<TrialId>, judged: Judged) -> Summary {
-    let best = best.and_then(|id| standing.trial(id));
+pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, judged: Judged) -> Summary {
+    let best = best.and_then(|id| snapshot.trial(id));
     Summary {
-        study_id: standing.study.id,
-        state: standing.study.state,
+        study_id: snapshot.study.id,
+        state: snapshot.study.state,
         best_trial: best.map(|trial| trial.number),
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
         best_certificate: judged.verdict,
         best_objections: judged.objections,
-        passing: judged.passing.and_then(|id| standing.trial(id)).map(|trial| line(trial, &standing.trials)),
-        trials: standing.trials.iter().map(|trial| line(trial, &standing.trials)).collect(),
+        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
+        trials: snapshot.trials.iter().map(|trial| line(trial, &snapshot.trials)).collect(),
     }
 }
 

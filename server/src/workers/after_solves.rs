@@ -1,14 +1,14 @@
 //! What is found out about solves when they are over.
 
-use super::{Examine, Explain, GaitExaminer, GaitExplainer};
+use super::{Certify, Explain, GaitCertifier, GaitExplainer};
 use std::fmt;
 use std::sync::Arc;
 
 /// Whoever looks into what solves gave.
 #[derive(Clone)]
 pub struct AfterSolves {
-    /// Gaits are examined.
-    pub examine: Arc<dyn Examine>,
+    /// Gaits are certified.
+    pub certify: Arc<dyn Certify>,
     /// That there is no gait is explained.
     pub explain: Arc<dyn Explain>,
 }
@@ -16,7 +16,7 @@ pub struct AfterSolves {
 impl AfterSolves {
     /// The real thing.
     pub fn by_optimizer() -> Self {
-        Self { examine: Arc::new(GaitExaminer), explain: Arc::new(GaitExplainer) }
+        Self { certify: Arc::new(GaitCertifier), explain: Arc::new(GaitExplainer) }
     }
 }
 

@@ -6,9 +6,9 @@
 
 mod after_solves;
 mod board;
+mod certify;
 mod dispatch;
 mod evaluate;
-mod examine;
 mod explain;
 mod in_process;
 pub mod nats;
@@ -16,8 +16,8 @@ pub(crate) mod stand_back;
 
 pub use after_solves::AfterSolves;
 pub use board::{Board, Progress, Track};
+pub use certify::{Certify, GaitCertifier};
 pub use dispatch::{Attempt, Dispatch, DispatchError, Finding, News, Receipt};
 pub use evaluate::{Assignment, Evaluate, GaitSolver};
-pub use examine::{Examine, GaitExaminer};
 pub use explain::{Explain, GaitExplainer, Unexplained};
 pub use in_process::{IN_PROCESS, InProcess, LEASE};

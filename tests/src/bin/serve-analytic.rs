@@ -6,7 +6,7 @@
 
 use gait_optimizer::Gait;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::examined::Verdicts;
+use gaitwright_tests::certified::Verdicts;
 use gaitwright_tests::explained::Clearance;
 use gaitwright_tests::service::Service;
 use std::path::PathBuf;
@@ -19,11 +19,11 @@ async fn main() {
     let address = arguments.next().expect("an address");
     let pause = arguments.next().map_or(0, |text| text.parse().expect("milliseconds"));
     // About half of the gaits pass.
-    let examiner =
+    let certifier =
         Verdicts { pause: Duration::from_millis(20), passes: |gait: &Gait| gait.bounds.to_array()[5] < 0.25 };
     let (solver, explainer) =
         (Analytic::slow(Duration::from_millis(pause)), Clearance::slow(Duration::from_millis(20)));
-    let service = Service::start_looking_back(&database, solver, examiner, explainer).await;
+    let service = Service::start_looking_back(&database, solver, certifier, explainer).await;
     let listener = tokio::net::TcpListener::bind(address).await.unwrap();
     println!("http://{}", listener.local_addr().unwrap());
     axum::serve(listener, service.router()).await.unwrap();

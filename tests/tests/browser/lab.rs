@@ -193,7 +193,7 @@ async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
 
     // From the first page to the decision.
     let page = browser.open(&site.at("/")).await;
-    assert!(page.text("main").await.contains("a gait was called unsafe: look at it and decide"));
+    assert!(page.text("main").await.contains("a gait was called unsafe: review it"));
     page.click("#waits ~ ul a").await;
     page.wait_for("[data-part=state] [role=alert] a[href$='#safety-review']").await;
     page.click("[data-part=state] [role=alert] a[href$='#safety-review']").await;

@@ -65,7 +65,7 @@ impl Outcome {
     pub(super) fn certificate_in_words(&self) -> String {
         match (self.certificate, self.passing) {
             (CertificateState::Passed, _) => "passed".to_owned(),
-            (CertificateState::NotExamined | CertificateState::BeingExamined, _) => "not examined".to_owned(),
+            (CertificateState::NotCertified | CertificateState::BeingCertified, _) => "not certified".to_owned(),
             (CertificateState::Failed, None) => "failed".to_owned(),
             (CertificateState::Failed, Some((number, rmse))) => {
                 let rmse = rmse.map_or_else(String::new, |rmse| format!(" ({rmse:.4} rad)"));

@@ -21,7 +21,7 @@ use crate::studies::choice::best_trial;
 use crate::studies::history;
 use crate::studies::plan::{self, NewStudy};
 use crate::studies::recommended::Judged;
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use clap::{Args, ValueEnum};
 use comparison::Outcome;
 use gait_optimizer::{ReferenceGait, Subject};
@@ -128,23 +128,23 @@ impl Reproduce {
                     let title = format!("subject {subject}, {words} muscles, seed {seed}");
                     tell(&title);
                     let (study, finished) = Box::pin(self.study(store, subject, muscles, seed, reference)).await?;
-                    let (standing, beliefs) = if finished {
-                        (Standing::read(&mut *store.read().await?, study).await?, Arc::default())
+                    let (snapshot, beliefs) = if finished {
+                        (StudySnapshot::read(&mut *store.read().await?, study).await?, Arc::default())
                     } else {
                         let ran = unattended::run(store, &study, 1, Lines::Progress).await?;
                         if ran.interrupted {
                             return Ok(None);
                         }
-                        if ran.standing.study.state != StudyState::Finished {
-                            let why = unattended::failure(&ran.standing).unwrap_or_default();
+                        if ran.snapshot.study.state != StudyState::Finished {
+                            let why = unattended::failure(&ran.snapshot).unwrap_or_default();
                             return Err(Error::Internal(format!("{title}: {why}; nothing is compared")));
                         }
-                        (ran.standing, ran.beliefs)
+                        (ran.snapshot, ran.beliefs)
                     };
-                    failures.extend(unattended::failure(&standing).map(|failure| format!("{title}: {failure}")));
-                    let judged = unattended::examined(store, &standing, &beliefs).await?;
+                    failures.extend(unattended::failure(&snapshot).map(|failure| format!("{title}: {failure}")));
+                    let judged = unattended::certified(store, &snapshot, &beliefs).await?;
                     outcomes
-                        .push(outcome(store, subject, muscles, seed, &standing, &beliefs, judged, reference).await?);
+                        .push(outcome(store, subject, muscles, seed, &snapshot, &beliefs, judged, reference).await?);
                 }
             }
         }
@@ -193,16 +193,16 @@ async fn outcome(
     subject: u32,
     muscles: bool,
     seed: u64,
-    standing: &Standing,
+    snapshot: &StudySnapshot,
     beliefs: &Arc<Beliefs>,
     judged: Judged,
     reference: &ReferenceGait,
 ) -> Result<Outcome, Error> {
-    let (there, beliefs) = (standing.clone(), Arc::clone(beliefs));
+    let (there, beliefs) = (snapshot.clone(), Arc::clone(beliefs));
     let choose = move |pool: &OnPool| best_trial(&there, &*beliefs.posterior(pool, &there)?);
     let best = store.compute(choose).await?.map_err(Error::Learner)?;
-    let milestones = history::of(standing, best);
-    let best = best.and_then(|id| standing.trial(id));
+    let milestones = history::of(snapshot, best);
+    let best = best.and_then(|id| snapshot.trial(id));
     let gait = match best {
         Some(trial) => Some(gaits::get(&mut *store.read().await?, trial.id).await?),
         None => None,
@@ -211,17 +211,17 @@ async fn outcome(
         subject,
         muscles,
         seed,
-        trials: standing.trials.len(),
-        converged: standing.trials.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count(),
-        solve_seconds: standing.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
-        wall_seconds: wall_seconds(standing),
-        by_iteration: comparison::by_iteration(&milestones, history::results(standing).len()),
+        trials: snapshot.trials.len(),
+        converged: snapshot.trials.iter().filter(|trial| trial.gait_rmse_rad.is_some()).count(),
+        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        wall_seconds: wall_seconds(snapshot),
+        by_iteration: comparison::by_iteration(&milestones, history::results(snapshot).len()),
         best_trial: best.map(|trial| trial.number),
         best_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
         certificate: judged.verdict,
         objections: judged.objections,
-        passing: judged.passing.and_then(|id| standing.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
+        passing: judged.passing.and_then(|id| snapshot.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
         best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
         gait,
         reference: reference.clone(),
@@ -229,8 +229,8 @@ async fn outcome(
 }
 
 /// From the first trial's start to the last one's end.
-fn wall_seconds(standing: &Standing) -> f64 {
-    let begun = standing.trials.iter().filter_map(|trial| trial.started_at).min();
-    let ended = standing.trials.iter().filter_map(|trial| trial.finished_at).max();
+fn wall_seconds(snapshot: &StudySnapshot) -> f64 {
+    let begun = snapshot.trials.iter().filter_map(|trial| trial.started_at).min();
+    let ended = snapshot.trials.iter().filter_map(|trial| trial.finished_at).max();
     begun.zip(ended).map_or(0.0, |(begun, ended)| ended.seconds_since(begun))
 }

@@ -1,4 +1,4 @@
-//! Certificates: an examination of a trial's gait that is independent of its optimisation.
+//! Certificates: a certification of a trial's gait that is independent of its optimisation.
 
 use crate::access::{Read, Run};
 use crate::error::Error;
@@ -8,7 +8,7 @@ use crate::http::once::Once;
 use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::{TrialId, certificates};
-use crate::studies::examination;
+use crate::studies::certification;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -52,12 +52,12 @@ pub(super) async fn create(
     if let Some(before) = once.answered_before(&app).await? {
         return Ok(before);
     }
-    let begun = examination::begin(&mut *app.read().await?, id).await?;
-    let certificate = examination::certificate(app.store_mut(), begun).await?;
+    let begun = certification::begin(&mut *app.read().await?, id).await?;
+    let certificate = certification::certificate(app.store_mut(), begun).await?;
     let mut writer = match once.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    examination::record(&mut writer, &once.actor, id, &certificate).await?;
+    certification::record(&mut writer, &once.actor, id, &certificate).await?;
     once.finish(&app, writer, StatusCode::OK, None, &certificate).await
 }

@@ -11,7 +11,7 @@ use crate::store::studies::{self, StudyState};
 use crate::store::trials::{self, TrialCounts};
 use crate::store::{StudyId, consents, schema};
 use crate::studies::choice::ranking_to_show;
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use axum::Json;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
@@ -84,26 +84,26 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<Compared, Error> {
     let study = studies::get(&mut reader, id).await?;
     consents::may_be_shown(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let rank = move |pool: &OnPool| {
-        let best = ranking_to_show(pool, &standing, &beliefs);
-        (standing, best)
+        let best = ranking_to_show(pool, &snapshot, &beliefs);
+        (snapshot, best)
     };
-    let (standing, best) = app.compute(rank).await?;
-    let best = best.map_err(Error::Learner)?.first().and_then(|id| standing.trial(*id));
+    let (snapshot, best) = app.compute(rank).await?;
+    let best = best.map_err(Error::Learner)?.first().and_then(|id| snapshot.trial(*id));
     Ok(Compared {
         id,
-        name: standing.study.plan.name.clone(),
-        muscles: standing.study.plan.muscles,
-        seed: standing.study.plan.seed,
-        state: standing.study.state,
+        name: snapshot.study.plan.name.clone(),
+        muscles: snapshot.study.plan.muscles,
+        seed: snapshot.study.plan.seed,
+        state: snapshot.study.state,
         trials: counts,
         best_trial: best.map(|trial| trial.number),
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
-        solve_seconds: standing.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
     })
 }

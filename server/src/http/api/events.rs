@@ -85,8 +85,8 @@ pub(super) struct ServerSentEvent {
 }
 
 async fn follow(app: &AppState, study: StudyId, mut after: i64, sender: &mut Sender<Read>) -> Result<(), Gone> {
-    let mut pulse = app.director.pulse();
-    let mut progress = app.director.board().listen();
+    let mut pulse = app.scheduler.pulse();
+    let mut progress = app.scheduler.board().listen();
     let mut shown: HashMap<TrialId, Instant> = HashMap::new();
     loop {
         after = replay(app, study, after, sender).await?;

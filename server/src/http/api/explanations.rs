@@ -112,7 +112,7 @@ pub(super) async fn get(
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let coming = |state| (StatusCode::ACCEPTED, Json(ComingExplanation { trial_id: id, state })).into_response();
-    match explanation::state(&mut reader, &trial, app.director.explaining(id)).await? {
+    match explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await? {
         ExplanationState::Made(made) => Ok(Json(TrialExplanation::new(id, *made)).into_response()),
         ExplanationState::BeingMade => Ok(coming(Coming::BeingMade)),
         ExplanationState::Waiting => Ok(coming(Coming::Waiting)),
@@ -145,7 +145,7 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let asked = explanation::ask(&mut writer, &once.actor, id, app.director.explaining(id)).await?;
+    let asked = explanation::ask(&mut writer, &once.actor, id, app.scheduler.explaining(id)).await?;
     if let Some(made) = asked {
         return once.finish(&app, writer, StatusCode::OK, None, &TrialExplanation::new(id, made)).await;
     }

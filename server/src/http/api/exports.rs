@@ -93,7 +93,7 @@ pub(super) async fn controller(
     let mut reader = app.read().await?;
     let found = walkable::admit(&mut reader, id).await?;
     if matches!(found, Err(NotWalkable::NotCertified { .. })) {
-        app.director.certify(id);
+        app.scheduler.certify(id);
     }
     let gait = found?;
     let trajectory = gait.trajectory(&mut reader).await?;

@@ -40,12 +40,12 @@ pub async fn get(State(app): State<AppState>) -> Result<Json<Health>, Error> {
 /// # Errors
 /// [`Error::NotReady`] with the reason, [`Error::StorageFull`] when the disk is full.
 pub async fn ready(State(app): State<AppState>) -> Result<String, Error> {
-    if app.director.stopping().is_cancelled() {
+    if app.scheduler.stopping().is_cancelled() {
         return Err(Error::NotReady("the service is stopping".to_owned()));
     }
     let not_writable = |reason: String| Error::NotReady(format!("the record takes no changes: {reason}"));
     app.store().probe().await.map_err(not_writable)?;
-    if let Some(trouble) = app.director.trouble() {
+    if let Some(trouble) = app.scheduler.trouble() {
         return Err(Error::NotReady(trouble));
     }
     // Answers still fit: what is large is refused, with the same words.

@@ -11,7 +11,7 @@ use crate::http::shown::Shown;
 use crate::store::{StudyId, studies};
 use crate::studies::choice::ranking_to_show;
 use crate::studies::history::{self, Milestone};
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use axum::Json;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -59,12 +59,12 @@ pub(super) async fn of_study_csv(
 async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let compute = move |pool: &OnPool| {
-        let best = ranking_to_show(pool, &standing, &beliefs)?.first().copied();
-        Ok(history::of(&standing, best))
+        let best = ranking_to_show(pool, &snapshot, &beliefs)?.first().copied();
+        Ok(history::of(&snapshot, best))
     };
     app.compute(compute).await?.map_err(Error::Learner)
 }

@@ -45,7 +45,7 @@ impl Workers {
         {
             *at_work.entry(worker).or_default() += 1;
         }
-        Ok(Self { places: app.director.workers(), at_work })
+        Ok(Self { places: app.scheduler.workers(), at_work })
     }
 }
 

@@ -11,7 +11,7 @@ use crate::http::once::OnceWith;
 use crate::http::pages_of::{After, linked_after};
 use crate::http::reached::Id;
 use crate::http::shown::Shown;
-use crate::store::feedback::{self, FeedbackRow, Said};
+use crate::store::feedback::{self, FeedbackContent, FeedbackRow};
 use crate::store::{FeedbackId, StudyId, studies};
 use crate::studies::answer::{self, Answer};
 use axum::Json;
@@ -65,9 +65,9 @@ fn table(study: StudyId, rows: &[FeedbackRow]) -> Response {
     ]);
     for row in rows {
         let (kind, a, b) = match row.said {
-            Said::Preference { winner, loser } => ("preference", winner, loser),
-            Said::Tie { a, b } => ("tie", a, b),
-            Said::Label { .. } | Said::Suggestion { .. } => continue,
+            FeedbackContent::Preference { winner, loser } => ("preference", winner, loser),
+            FeedbackContent::Tie { a, b } => ("tie", a, b),
+            FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => continue,
         };
         let retraction = row.retraction.as_ref();
         table.row(cells![

@@ -12,7 +12,7 @@ use crate::store::trials::Trial;
 use crate::store::{StudyId, TrialId, schema, studies};
 use crate::studies::choice::ranking_to_show;
 use crate::studies::recommended::{self, CertificateState};
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable::Grounds;
 use crate::studies::walkable::WalkableGait;
 use axum::Json;
@@ -37,7 +37,7 @@ pub(super) struct Recommendation {
     /// Where it failed: the best action whose gait is known to pass.
     passing: Option<Recommended>,
     /// A better gait, or one that passes, may follow: gaits of the study are being certified. Ask again.
-    examining: bool,
+    certifying: bool,
 }
 
 /// An action that a trial tried.
@@ -120,30 +120,30 @@ pub(super) async fn of_study_csv(
 async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Error> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    let standing = Standing::read(&mut reader, study).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let rank = move |pool: &OnPool| {
-        let unanswered = standing.waits_for_first_answer();
-        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(pool, &standing, &beliefs) };
-        (standing, ranking)
+        let unanswered = snapshot.waits_for_first_answer();
+        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(pool, &snapshot, &beliefs) };
+        (snapshot, ranking)
     };
-    let (standing, ranking) = app.compute(rank).await?;
+    let (snapshot, ranking) = app.compute(rank).await?;
     let ranking = ranking.map_err(Error::Learner)?;
     let best = *ranking.first().ok_or_else(|| {
         Error::conflict("nothing is recommended yet: there is no gait, or no answer says which is better")
     })?;
     let mut reader = app.read().await?;
-    let unexamined = recommended::judged(&mut reader, &ranking).await?.unexamined;
-    let examining = unexamined.is_some_and(|next| app.director.examine(id, next));
+    let without_certificate = recommended::judged(&mut reader, &ranking).await?.without_certificate;
+    let certifying = without_certificate.is_some_and(|next| app.scheduler.certify_best_of(id, next));
     // Read after that: once nothing is being certified, every certificate is known here.
     let grounds = Grounds::read(&mut reader, id).await?;
     let walkable = ranking.iter().enumerate().find_map(|(place, id)| {
-        let trial = standing.trial(*id)?;
+        let trial = snapshot.trial(*id)?;
         Some((place, trial, grounds.admit(trial).ok()?))
     });
     let Some((place, trial, gait)) = walkable else {
-        let why = if examining {
+        let why = if certifying {
             "nothing is recommended yet: the best gait is being certified; ask again".to_owned()
         } else {
             format!("nothing is recommended: the best gait has no certificate; POST /api/v1/trials/{best}/certificate")
@@ -154,13 +154,13 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Error> 
     drop(reader);
     Ok(Recommendation {
         study_id: id,
-        study: standing.study.plan.name.clone(),
+        study: snapshot.study.plan.name.clone(),
         best: Recommended::of(&gait, trial),
         certificate: judged.verdict,
         objections: judged.objections,
-        examining,
+        certifying,
         passing: judged.passing.and_then(|id| {
-            let trial = standing.trial(id)?;
+            let trial = snapshot.trial(id)?;
             Some(Recommended::of(&grounds.admit(trial).ok()?, trial))
         }),
     })

@@ -239,7 +239,7 @@ async fn act(
     let view = StudyView::of(&mut writer, done.study).await?;
     let answer = once.finish(app, writer, StatusCode::OK, None, &view).await?;
     for trial in done.cancelled {
-        app.director.cancel_solve(trial).await;
+        app.scheduler.cancel_solve(trial).await;
     }
     Ok(tagged(answer, revision))
 }

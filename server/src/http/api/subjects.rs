@@ -148,7 +148,7 @@ pub(super) async fn withdraw(
     let (row, cancelled) = consent::withdraw(&mut writer, &once.actor, id, &why).await?;
     let answer = once.finish(&app, writer, StatusCode::OK, None, &row).await?;
     for trial in cancelled {
-        app.director.cancel_solve(trial).await;
+        app.scheduler.cancel_solve(trial).await;
     }
     Ok(answer)
 }

@@ -122,7 +122,7 @@ pub(super) async fn cancel(
     };
     let trial = command::cancel(&mut writer, &once.actor, id, "cancelled on request").await?;
     let answer = once.finish(&app, writer, StatusCode::OK, None, &trial).await?;
-    app.director.cancel_solve(id).await;
+    app.scheduler.cancel_solve(id).await;
     Ok(answer)
 }
 
@@ -164,7 +164,7 @@ pub(super) async fn iterations(
     State(app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Vec<IterationRecord>>, Error> {
-    if let Some(track) = app.director.board().track(id) {
+    if let Some(track) = app.scheduler.board().track(id) {
         return Ok(Json(track.records));
     }
     Ok(Json(gaits::iterations(&mut *app.read().await?, id).await?))

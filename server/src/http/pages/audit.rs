@@ -6,7 +6,7 @@ use crate::access::Administer;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
-use crate::store::audit::{self, AuditRow, Verdict};
+use crate::store::audit::{self, AuditRow, ChainCheck};
 use askama::Template;
 use axum::extract::State;
 use serde::Deserialize;
@@ -30,7 +30,7 @@ pub(super) struct Choice {
 struct AuditPage {
     rows: Vec<AuditRow>,
     older: Option<i64>,
-    verdict: Option<Verdict>,
+    verdict: Option<ChainCheck>,
     contains: String,
 }
 

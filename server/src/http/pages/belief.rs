@@ -17,7 +17,7 @@ use crate::store::trials::{Trial, TrialState};
 use crate::store::{StudyId, TrialId, studies, trials};
 use crate::studies::belief::{Belief, Comparison, MOST_ANSWERS};
 use crate::studies::choice::{MANY, ranking_to_show};
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use askama::Template;
 use axum::extract::State;
 use gait_learner::{Agreement, Dimension, LearnerError, Marginal, SearchSpace};
@@ -97,18 +97,18 @@ pub(super) async fn get(
     let study = studies::get(&mut *app.read().await?, id).await?;
     page(&match believed(&mut app, id).await? {
         Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
-        Believed::There(standing, belief) => {
+        Believed::There(snapshot, belief) => {
             let beliefs = Arc::clone(&app.beliefs);
             let draw = move |pool: &OnPool| {
                 // As on the page of the study: nothing before people have answered.
-                let silent = standing.waits_for_first_answer();
+                let silent = snapshot.waits_for_first_answer();
                 let ranking = if silent {
                     Vec::new()
                 } else {
-                    ranking_to_show(pool, &standing, &beliefs).map_err(Error::Learner)?
+                    ranking_to_show(pool, &snapshot, &beliefs).map_err(Error::Learner)?
                 };
                 let recommended = ranking.first().copied();
-                show(id, &standing, &belief, recommended, &choice)
+                show(id, &snapshot, &belief, recommended, &choice)
             };
             let shown = app.compute(draw).await.map_err(Error::from)??;
             BeliefPage { study, absent: None, shown: Some(shown) }
@@ -121,11 +121,11 @@ pub(super) async fn get(
 /// # Errors
 /// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or what the database and the learner report.
 pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: Choice) -> Result<Vec<Figure>, Error> {
-    let Believed::There(standing, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
+    let Believed::There(snapshot, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
     let draw = move |_: &OnPool| {
         let chosen = chosen(belief.posterior.space(), &choice)?;
         let mut figures = marginals(&belief);
-        figures.extend(maps(&belief, &standing, chosen).map_err(Error::Learner)?.figures);
+        figures.extend(maps(&belief, &snapshot, chosen).map_err(Error::Learner)?.figures);
         Ok(figures)
     };
     app.compute(draw).await?
@@ -134,7 +134,7 @@ pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: Choice) -> 
 /// What the learner believes of a study, or why it is not told.
 enum Believed {
     Absent(String),
-    There(Box<Standing>, Arc<Belief>),
+    There(Box<StudySnapshot>, Arc<Belief>),
 }
 
 async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
@@ -146,9 +146,9 @@ async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     if trials::counts(&mut reader, id).await?.total as usize >= MANY {
         return too_many(format!("{MANY} trials"));
     }
-    let standing = Standing::read(&mut reader, study).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
-    let answers = standing.log().feedback.len();
+    let answers = snapshot.log().feedback.len();
     if answers == 0 {
         let why = "Nothing was heard yet: the first result gives the learner something to believe.";
         return Ok(Believed::Absent(why.to_owned()));
@@ -158,20 +158,20 @@ async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
     }
     let beliefs = app.beliefs.clone();
     let think =
-        move |pool: &OnPool| beliefs.of(pool, &standing).map(|belief| Believed::There(Box::new(standing), belief));
+        move |pool: &OnPool| beliefs.of(pool, &snapshot).map(|belief| Believed::There(Box::new(snapshot), belief));
     app.compute(think).await?.map_err(Error::Learner)
 }
 
 fn show(
     id: StudyId,
-    standing: &Standing,
+    snapshot: &StudySnapshot,
     belief: &Belief,
     recommended: Option<TrialId>,
     choice: &Choice,
 ) -> Result<Everything, Error> {
     let chosen = chosen(belief.posterior.space(), choice)?;
     let files = format!("/api/v1/studies/{id}/belief/figures");
-    let maps = maps(belief, standing, chosen).map_err(Error::Learner)?;
+    let maps = maps(belief, snapshot, chosen).map_err(Error::Learner)?;
     let names =
         |asked: fn(&DimensionChoice) -> bool| maps.dimensions.iter().find(|d| asked(d)).map(|d| d.name.as_str());
     let query = match (names(|d| d.right), names(|d| d.down)) {
@@ -179,7 +179,7 @@ fn show(
         _ => String::new(),
     };
     let charts = maps.figures.iter().zip(MAP_NOTES);
-    let (best, others) = best(belief, standing, recommended).map_err(Error::Learner)?;
+    let (best, others) = best(belief, snapshot, recommended).map_err(Error::Learner)?;
     Ok(Everything {
         agreement: belief.agreement,
         marginals: marginals(belief).iter().map(|figure| Drawn::of(figure, &files, "")).collect(),
@@ -187,7 +187,7 @@ fn show(
         maps,
         best,
         others,
-        answers: belief.comparisons.iter().take(LISTED).filter_map(|c| answer_row(c, standing)).collect(),
+        answers: belief.comparisons.iter().take(LISTED).filter_map(|c| answer_row(c, snapshot)).collect(),
         more_answers: belief.comparisons.len().saturating_sub(LISTED),
     })
 }
@@ -235,7 +235,7 @@ fn marginals(belief: &Belief) -> Vec<Figure> {
     belief.posterior.space().dimensions().iter().zip(&belief.marginals).map(draw).collect()
 }
 
-fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) -> Result<Maps, LearnerError> {
+fn maps(belief: &Belief, snapshot: &StudySnapshot, chosen: Option<(usize, usize)>) -> Result<Maps, LearnerError> {
     let space = belief.posterior.space();
     let dimensions = space.dimensions().iter().enumerate();
     let dimensions = dimensions
@@ -249,7 +249,7 @@ fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) ->
     let (Some((right, down)), Some(best)) = (chosen, belief.posterior.best()) else {
         return Ok(Maps { dimensions, held: None, figures: Vec::new() });
     };
-    let held = standing.trial_of(best).map(|trial| (trial.id, trial.number));
+    let held = snapshot.trial_of(best).map(|trial| (trial.id, trial.number));
     let slice = belief.posterior.slice(down, right, best)?;
     let at = |row: usize, column: usize| {
         let mut levels = space.levels(best);
@@ -270,7 +270,7 @@ fn maps(belief: &Belief, standing: &Standing, chosen: Option<(usize, usize)>) ->
                 framed,
             });
             let chance = belief.posterior.probability_of_converging(action)?;
-            let below = tried(standing, space, [(down, row), (right, column)]);
+            let below = tried(snapshot, space, [(down, row), (right, column)]);
             chances.push(Cell { value: chance, text: percent(chance), below, framed });
         }
         utility.push(utilities);
@@ -297,12 +297,12 @@ const MAP_NOTES: [&str; 2] = [
 ];
 
 /// How many trials with these levels converged and how many did not.
-fn tried(standing: &Standing, space: &SearchSpace, levels: [(usize, usize); 2]) -> String {
+fn tried(snapshot: &StudySnapshot, space: &SearchSpace, levels: [(usize, usize); 2]) -> String {
     let here = |trial: &&Trial| {
         let own = space.levels(trial.action_index);
         levels.iter().all(|(dimension, level)| own[*dimension] == *level)
     };
-    let count = |state| standing.trials.iter().filter(here).filter(|trial| trial.state == state).count();
+    let count = |state| snapshot.trials.iter().filter(here).filter(|trial| trial.state == state).count();
     match (count(TrialState::Converged), count(TrialState::NotConverged)) {
         (0, 0) => String::new(),
         (converged, not) => format!("{converged} yes, {not} no"),
@@ -312,11 +312,11 @@ fn tried(standing: &Standing, space: &SearchSpace, levels: [(usize, usize); 2]) 
 /// The trials that are most likely the best, the recommended one always among them; and how many others there are.
 fn best(
     belief: &Belief,
-    standing: &Standing,
+    snapshot: &StudySnapshot,
     recommended: Option<TrialId>,
 ) -> Result<(Vec<BestRow>, usize), LearnerError> {
     let tried: Vec<_> =
-        belief.best.iter().filter_map(|entry| Some((entry, standing.trial_of(entry.action)?))).collect();
+        belief.best.iter().filter_map(|entry| Some((entry, snapshot.trial_of(entry.action)?))).collect();
     let marked = tried.iter().position(|(_, trial)| recommended == Some(trial.id));
     let row = |place: usize| {
         let (entry, trial) = tried[place];
@@ -340,9 +340,9 @@ fn listed(length: usize, always: Option<usize>) -> Vec<usize> {
     (0..length.min(LISTED)).chain(always.filter(|&place| place >= LISTED)).collect()
 }
 
-fn answer_row(comparison: &Comparison, standing: &Standing) -> Option<AnswerRow> {
+fn answer_row(comparison: &Comparison, snapshot: &StudySnapshot) -> Option<AnswerRow> {
     Some(AnswerRow {
-        text: answer_in_words(&comparison.given, standing)?,
+        text: answer_in_words(&comparison.given, snapshot)?,
         source: format::source(&comparison.given),
         percent: percent(comparison.probability),
         agrees: comparison.probability > 0.5,

@@ -7,7 +7,7 @@ use crate::http::AppState;
 use crate::http::may::May;
 use crate::http::reached::Id;
 use crate::store::{TrialId, commit};
-use crate::studies::examination;
+use crate::studies::certification;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
@@ -81,10 +81,10 @@ pub(super) async fn post(
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
-    let begun = examination::begin(&mut *app.read().await.map_err(crate::error::Error::from)?, id).await?;
-    let certificate = examination::certificate(app.store_mut(), begun).await?;
+    let begun = certification::begin(&mut *app.read().await.map_err(crate::error::Error::from)?, id).await?;
+    let certificate = certification::certificate(app.store_mut(), begun).await?;
     let mut writer = app.write().await?;
-    examination::record(&mut writer, &may.caller.actor, id, &certificate).await?;
+    certification::record(&mut writer, &may.caller.actor, id, &certificate).await?;
     commit(writer).await?;
     Ok(Redirect::to(&format!("/trials/{id}#certificate")))
 }

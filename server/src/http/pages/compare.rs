@@ -22,12 +22,12 @@ use crate::store::{
     Connection, FeedbackId, RemarkId, StoreError, StudyId, TrialId, commit, events, feedback, gaits, presentations,
     reference_gaits, remarks, studies, trials,
 };
-use crate::studies::answer::{self, Answer, Verdict};
+use crate::studies::answer::{self, Answer, PairAnswer};
 use crate::studies::choice::MANY;
 use crate::studies::comparison::{Question, open_question};
 use crate::studies::preference::{self, StandingAnswer};
 use crate::studies::remark::{self, NewRemark};
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use askama::Template;
 use axum::extract::State;
@@ -161,34 +161,34 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
     let is_going_on = matches!(study.state, StudyState::Running | StudyState::Waiting);
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
     let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
-    let standing = if large {
-        Standing::newest(&mut reader, study, OFFERED).await?
+    let snapshot = if large {
+        StudySnapshot::newest(&mut reader, study, OFFERED).await?
     } else {
-        Standing::read(&mut reader, study).await?
+        StudySnapshot::read(&mut reader, study).await?
     };
     let saved = match choice.saved {
-        Some(saved) => read_back(&mut reader, &standing, saved).await?,
+        Some(saved) => read_back(&mut reader, &snapshot, saved).await?,
         None => None,
     };
     drop(reader);
     let ask = move |pool: &OnPool| {
-        let question = if large { Ok(Question::None) } else { open_question(pool, &standing) };
-        (standing, question)
+        let question = if large { Ok(Question::None) } else { open_question(pool, &snapshot) };
+        (snapshot, question)
     };
-    let (standing, question) = app.compute(ask).await.map_err(Error::from)?;
+    let (snapshot, question) = app.compute(ask).await.map_err(Error::from)?;
     let question = question.map_err(Error::Learner)?.trials();
     let mut reader = app.read().await?;
     let waits = question.is_some();
     let mut being_certified = 0;
     for trial in
-        standing.trials.iter().rev().filter(|trial| standing.waits_for_certificate(trial)).take(CERTIFIED_AT_ONCE)
+        snapshot.trials.iter().rev().filter(|trial| snapshot.waits_for_certificate(trial)).take(CERTIFIED_AT_ONCE)
     {
-        being_certified += usize::from(app.director.certify(trial.id));
+        being_certified += usize::from(app.scheduler.certify(trial.id));
     }
-    let mut trials: Vec<Offered> = standing
+    let mut trials: Vec<Offered> = snapshot
         .trials
         .iter()
-        .filter(|trial| standing.walkable(trial).is_ok())
+        .filter(|trial| snapshot.walkable(trial).is_ok())
         .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
         .collect();
     if refused.is_none()
@@ -228,7 +228,7 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
     };
     let (charts, strides) = app.compute(draw).await.map_err(Error::from)?;
     page(&ComparePage {
-        study: standing.study,
+        study: snapshot.study,
         trials,
         a,
         b,
@@ -246,16 +246,16 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
 }
 
 /// What the record holds; none when it speaks of trials that are not at hand.
-async fn read_back(db: &mut Connection, standing: &Standing, saved: Recorded) -> Result<Option<Saved>, Error> {
+async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorded) -> Result<Option<Saved>, Error> {
     Ok(match saved {
         Recorded::Preference(id) => {
             let row = feedback::get(db, id).await?;
-            if row.study_id != standing.study.id {
+            if row.study_id != snapshot.study.id {
                 return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
             }
-            let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, standing)?));
+            let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
             let beside = answer::beside(db, &row).await?.into_iter().filter_map(said).collect();
-            answer_in_words(&row, standing).map(|text| Saved {
+            answer_in_words(&row, snapshot).map(|text| Saved {
                 id: saved,
                 text,
                 at: row.created_at.minute(),
@@ -265,10 +265,10 @@ async fn read_back(db: &mut Connection, standing: &Standing, saved: Recorded) ->
         }
         Recorded::Remark(id) => {
             let remark = remarks::get(db, id).await?;
-            if remark.study_id != standing.study.id {
+            if remark.study_id != snapshot.study.id {
                 return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
             }
-            remark_in_words(&remark, standing).map(|text| Saved {
+            remark_in_words(&remark, snapshot).map(|text| Saved {
                 id: saved,
                 text,
                 at: remark.created_at.minute(),
@@ -321,13 +321,13 @@ impl Submitted {
             Said::Remark(NewRemark { first: a, second: b, answer, source, author, note })
         };
         let said = match self.answer.as_str() {
-            "a" => preference(Verdict::A),
-            "b" => preference(Verdict::B),
-            "no_difference" => preference(Verdict::NoDifference),
-            "cannot_tell" => remark(presentations::Said::CannotTell),
-            "unsafe_a" => remark(presentations::Said::UnsafeFirst),
-            "unsafe_b" => remark(presentations::Said::UnsafeSecond),
-            "unsafe_both" => remark(presentations::Said::UnsafeBoth),
+            "a" => preference(PairAnswer::A),
+            "b" => preference(PairAnswer::B),
+            "no_difference" => preference(PairAnswer::NoDifference),
+            "cannot_tell" => remark(presentations::Judgement::CannotTell),
+            "unsafe_a" => remark(presentations::Judgement::UnsafeFirst),
+            "unsafe_b" => remark(presentations::Judgement::UnsafeSecond),
+            "unsafe_both" => remark(presentations::Judgement::UnsafeBoth),
             other => {
                 let allowed = "a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both: choose one";
                 return Err(Error::invalid("answer", other, allowed));
@@ -413,7 +413,7 @@ async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) ->
     let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
     idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
     commit(writer).await?;
-    app.director.changed();
+    app.scheduler.changed();
     Ok(Given::Saved(saved))
 }
 
@@ -453,6 +453,6 @@ pub(super) async fn retract(
         }
     }
     commit(writer).await?;
-    app.director.changed();
+    app.scheduler.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))
 }

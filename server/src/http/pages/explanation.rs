@@ -50,8 +50,8 @@ pub(super) async fn post(
     Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    explanation::ask(&mut writer, &may.caller.actor, id, app.director.explaining(id)).await?;
+    explanation::ask(&mut writer, &may.caller.actor, id, app.scheduler.explaining(id)).await?;
     commit(writer).await?;
-    app.director.changed();
+    app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}#explanation")))
 }

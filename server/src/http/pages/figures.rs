@@ -49,7 +49,7 @@ pub(crate) struct StudyFigures {
     /// Those of the studies that have no gait to draw.
     without_gait: Vec<String>,
     sections: Vec<Section>,
-    /// Which gait grew out of which: on the study's own page.
+    /// Warm-start tree: on the study's own page.
     tree: Option<Figure>,
 }
 
@@ -91,7 +91,7 @@ impl Best {
     }
 
     fn name(&self) -> &str {
-        &self.side.standing.study.plan.name
+        &self.side.snapshot.study.plan.name
     }
 }
 
@@ -114,7 +114,7 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<Stud
         shown.push(Best::read(app, other).await?);
     }
     let mut reader = app.read().await?;
-    let reference = shown[0].side.standing.study.plan.reference_gait_id;
+    let reference = shown[0].side.snapshot.study.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
     drop(reader);
     let draw = move |_: &OnPool| {
@@ -124,12 +124,12 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<Stud
     let (shown, sections) = app.compute(draw).await?;
     let without_gait = shown.iter().filter(|best| best.gait.is_none()).map(|best| best.name().to_owned()).collect();
     let first = shown.into_iter().next().ok_or_else(|| Error::Internal("no study was read".to_owned()))?;
-    let tree = study::warm_starts(&first.side.standing, first.figures.best);
-    Ok(StudyFigures { best: first.trial, study: first.side.standing.study, without_gait, sections: sections?, tree })
+    let tree = study::warm_starts(&first.side.snapshot, first.figures.best);
+    Ok(StudyFigures { best: first.trial, study: first.side.snapshot.study, without_gait, sections: sections?, tree })
 }
 
 fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, Error> {
-    let standings: Vec<_> = shown.iter().map(|best| (&best.side.standing, &best.figures)).collect();
+    let snapshots: Vec<_> = shown.iter().map(|best| (&best.side.snapshot, &best.figures)).collect();
     let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
     let mut tiles = Vec::new();
     for (name, gait) in &gaits {
@@ -141,7 +141,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
             id: study::COURSE,
             heading: "Gait RMSE of the best action by iteration",
             hint: "Figure 3b of the paper, with a study with muscles and one without.".to_owned(),
-            figures: charts(study::COURSE, study::course(&standings).into_iter().collect()),
+            figures: charts(study::COURSE, study::course(&snapshots).into_iter().collect()),
         },
         Section {
             id: "angles",
@@ -170,7 +170,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
 /// # Errors
 /// [`Error::NotFound`], or what the database reports.
 pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
-    if let Some(running) = app.director.board().track(id) {
+    if let Some(running) = app.scheduler.board().track(id) {
         return Ok(gait_charts::solve(&running.records).into_iter().collect());
     }
     let mut reader = app.read().await?;

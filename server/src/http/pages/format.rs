@@ -2,7 +2,7 @@
 
 use crate::plots::power_of_ten;
 use crate::store::feedback::{FeedbackRow, Source};
-use crate::store::presentations::Said;
+use crate::store::presentations::Judgement;
 use crate::store::studies::FeedbackMode;
 use gait_optimizer::TunedBounds;
 
@@ -104,16 +104,16 @@ pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
 }
 
 /// What the person who walked said in a lab session: first is walk 2.
-pub(super) fn walks_in_words(said: Said) -> &'static str {
+pub(super) fn walks_in_words(said: Judgement) -> &'static str {
     match said {
-        Said::First => "walk 2 was better, the first with the device",
-        Said::Second => "walk 3 was better, the second with the device",
-        Said::NoDifference => "no difference between walk 2 and walk 3",
-        Said::CannotTell => "cannot tell which walk was better",
-        Said::UnsafeFirst => "walk 2 was unsafe",
-        Said::UnsafeSecond => "walk 3 was unsafe",
-        Said::UnsafeBoth => "walk 2 and walk 3 were unsafe",
-        Said::Withdrawn => "taken back",
+        Judgement::First => "walk 2 was better, the first with the device",
+        Judgement::Second => "walk 3 was better, the second with the device",
+        Judgement::NoDifference => "no difference between walk 2 and walk 3",
+        Judgement::CannotTell => "cannot tell which walk was better",
+        Judgement::UnsafeFirst => "walk 2 was unsafe",
+        Judgement::UnsafeSecond => "walk 3 was unsafe",
+        Judgement::UnsafeBoth => "walk 2 and walk 3 were unsafe",
+        Judgement::Withdrawn => "taken back",
     }
 }
 

@@ -86,7 +86,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
     }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     let last_event = events::last(&mut reader, study.id).await?;
-    let explained = explanation::state(&mut reader, &trial, app.director.explaining(id)).await?;
+    let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
     let may_run = may.caller.may(Run::NEEDED);
     let reviews = may.caller.may(Answer::NEEDED);
     // Who did not sign in has no name yet.

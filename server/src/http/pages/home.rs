@@ -94,7 +94,7 @@ async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page 
 /// Gaits that somebody called unsafe: staff look at them.
 fn unsafe_gaits((study, count): (Study, usize)) -> Waiting {
     let what = match count {
-        1 => "a gait was called unsafe: look at it and decide".to_owned(),
+        1 => "a gait was called unsafe: review it".to_owned(),
         _ => format!("{count} gaits were called unsafe: look at them and decide"),
     };
     Waiting { link: format!("/studies/{}", study.id), what, study }

@@ -341,7 +341,7 @@ pub(super) async fn unblind(
     };
     let done = done.await;
     // The learner may have heard something.
-    app.director.changed();
+    app.scheduler.changed();
     answer(&mut app, id, &may.caller, done, Forms::default()).await
 }
 

@@ -96,7 +96,7 @@ pub(super) async fn answer(
         let mut writer = app.write().await?;
         lab::answer(&mut writer, &may.caller, id, &new).await?;
         commit(writer).await?;
-        app.director.changed();
+        app.scheduler.changed();
         Ok(())
     };
     read_back(&app, id, answered.await, new.note).await

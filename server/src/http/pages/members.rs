@@ -106,7 +106,7 @@ pub(super) async fn post(
     match act(&mut writer, &may.caller, id, &asked).await {
         Ok(invited) => {
             commit(writer).await?;
-            app.director.changed();
+            app.scheduler.changed();
             let Some((name, secret)) = invited else {
                 // Whoever removed himself does not reach the study any more.
                 return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());

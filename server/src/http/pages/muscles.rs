@@ -1,4 +1,4 @@
-//! The muscles of a person: the form for what is known better than the published table.
+//! The muscles of a person: the form for measured values that override the published table.
 
 use super::error::{Page, PageError, page};
 use super::format;

@@ -205,7 +205,7 @@ pub(super) async fn post(
         Ok(outcome) => {
             commit(writer).await?;
             // Event streams of whoever may no more are listening to nothing else.
-            app.director.changed();
+            app.scheduler.changed();
             Ok(show(&app, outcome, None, Asked::default()).await?.into_response())
         }
         Err(error) if error.is_input() => {

@@ -12,7 +12,7 @@ use crate::http::problem::Problem;
 use crate::http::reached::Id;
 use crate::plots::gait_tiles;
 use crate::store::allocations::Sided;
-use crate::store::presentations::{self, Presentation, Said};
+use crate::store::presentations::{self, Judgement, Presentation};
 use crate::store::studies::FeedbackMode;
 use crate::store::{Connection, StudyId, commit, consents, gaits, members, studies};
 use crate::studies::blind::{self, RaterAnswer};
@@ -53,7 +53,7 @@ struct Saved {
 impl Saved {
     /// Whether it was taken back, or the program took it away.
     fn is_withdrawn(&self) -> bool {
-        self.words == Said::Withdrawn.as_str()
+        self.words == Judgement::Withdrawn.as_str()
     }
 }
 
@@ -207,7 +207,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
 /// The form of a pair.
 #[derive(Debug, Deserialize)]
 pub(super) struct Submitted {
-    answer: Said,
+    answer: Judgement,
     #[serde(default)]
     note: String,
     #[serde(default)]
@@ -229,7 +229,7 @@ pub(super) async fn answer(
         if before != Some(given.answer) {
             blind::answer(&mut writer, &may.caller, &token, &given).await?;
             commit(writer).await?;
-            app.director.changed();
+            app.scheduler.changed();
         }
         Ok(())
     };
@@ -247,7 +247,7 @@ pub(super) async fn take_back(
         let mut writer = app.write().await?;
         blind::take_back(&mut writer, &may.caller, &token).await?;
         commit(writer).await?;
-        app.director.changed();
+        app.scheduler.changed();
         Ok(())
     };
     let taken_back = taken_back.await;

@@ -21,6 +21,6 @@ pub(super) async fn post(
     let mut writer = app.write().await?;
     safety_review::give(&mut writer, &may.caller, id, &form).await?;
     commit(writer).await?;
-    app.director.changed();
+    app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}")))
 }

@@ -17,7 +17,7 @@ use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
 use crate::studies::belief::Beliefs;
 use crate::studies::choice::MANY;
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::TunedBounds;
@@ -85,7 +85,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(
 
 /// A study as read.
 pub(super) struct Side {
-    pub(super) standing: Standing,
+    pub(super) snapshot: StudySnapshot,
     subject: String,
     counts: TrialCounts,
 }
@@ -96,25 +96,25 @@ impl Side {
         consents::may_be_shown(db, id).await?;
         let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
         let counts = trials::counts(db, id).await?;
-        let standing = if counts.total as usize >= MANY {
-            Standing::newest(db, study, OFFERED).await?
+        let snapshot = if counts.total as usize >= MANY {
+            StudySnapshot::newest(db, study, OFFERED).await?
         } else {
-            Standing::read(db, study).await?
+            StudySnapshot::read(db, study).await?
         };
-        Ok(Self { standing, subject, counts })
+        Ok(Self { snapshot, subject, counts })
     }
 
     pub(super) fn figures(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Figures, Error> {
-        figures(pool, &self.standing, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+        figures(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
     }
 
     /// What the study is, and what it found.
     fn rows(&self, figures: &Figures) -> Vec<(String, String)> {
-        let plan = &self.standing.study.plan;
-        let best = figures.best.and_then(|id| self.standing.trial(id));
-        let seconds: f64 = self.standing.trials.iter().filter_map(|trial| trial.seconds_total).sum();
+        let plan = &self.snapshot.study.plan;
+        let best = figures.best.and_then(|id| self.snapshot.trial(id));
+        let seconds: f64 = self.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
         let mut rows = vec![
-            ("State".to_owned(), words(self.standing.study.state.as_str())),
+            ("State".to_owned(), words(self.snapshot.study.state.as_str())),
             ("Subject".to_owned(), self.subject.clone()),
             ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
             ("Answers by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
@@ -138,17 +138,17 @@ impl Side {
 
 fn compare(pool: &OnPool, a: Side, b: Side, beliefs: &Beliefs) -> Result<Compared, Error> {
     let (of_a, of_b) = (a.figures(pool, beliefs)?, b.figures(pool, beliefs)?);
-    let chart = course(&[(&a.standing, &of_a), (&b.standing, &of_b)]).map(|chart| {
-        let files = format!("/api/v1/studies/{}/figures", a.standing.study.id);
-        Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.standing.study.id))
+    let chart = course(&[(&a.snapshot, &of_a), (&b.snapshot, &of_b)]).map(|chart| {
+        let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
+        Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
     });
     let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
     let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, figures)| figures.course().is_empty());
     Ok(Compared {
         rows: rows.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
-        without_course: without_course.map(|(side, _)| side.standing.study.plan.name.clone()).collect(),
+        without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
         chart,
-        a: a.standing.study,
-        b: b.standing.study,
+        a: a.snapshot.study,
+        b: b.snapshot.study,
     })
 }

@@ -305,7 +305,7 @@ pub(super) async fn end_session(
     let own = session.filter(|session| Some(session.user_id) == caller.user).ok_or_else(missing)?;
     sign_in::end(&mut writer, &caller.actor, &own).await?;
     commit(writer).await?;
-    app.director.changed();
+    app.scheduler.changed();
     Ok(Redirect::to("/account#sessions").into_response())
 }
 

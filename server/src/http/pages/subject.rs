@@ -270,9 +270,9 @@ async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) ->
     let (_, cancelled) = consent::withdraw(&mut writer, &may.caller.actor, id, why).await?;
     commit(writer).await?;
     for trial in cancelled {
-        app.director.cancel_solve(trial).await;
+        app.scheduler.cancel_solve(trial).await;
     }
-    app.director.changed();
+    app.scheduler.changed();
     Ok(())
 }
 

@@ -9,7 +9,7 @@ mod lot;
 pub use lot::Lot;
 
 use super::audit::Actor;
-use super::presentations::{Presentation, SELECT, Said};
+use super::presentations::{Judgement, Presentation, SELECT};
 use super::{Connection, Instant, LabDeviceFileId, LabSessionId, PresentationId, StoreResult, StudyId, TrialId, now};
 use lot::Place;
 use serde::Serialize;
@@ -209,12 +209,12 @@ impl Sided {
     }
 
     /// What was said of the sides, about the pair; and the other way round.
-    pub fn turned(&self, said: Said) -> Said {
+    pub fn turned(&self, said: Judgement) -> Judgement {
         if self.swapped { said.swapped() } else { said }
     }
 
     /// The answer, about the sides.
-    pub fn answer(&self) -> Option<Said> {
+    pub fn answer(&self) -> Option<Judgement> {
         self.presentation.answer.map(|said| self.turned(said))
     }
 }

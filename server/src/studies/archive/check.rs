@@ -6,7 +6,7 @@ use crate::access::Reach;
 use crate::error::Error;
 use crate::printable;
 use crate::store::archive::Definition;
-use crate::store::feedback::{FeedbackRow, Said, Source};
+use crate::store::feedback::{FeedbackContent, FeedbackRow, Source};
 use crate::store::quarantine::Quarantine;
 use crate::store::row::{Cell, Row};
 use crate::store::studies::{FeedbackMode, Study, StudyPlan};
@@ -261,7 +261,7 @@ async fn answers(db: &mut Connection, study: &Study, trials: &[Trial]) -> Result
     let mut labelled = 0;
     for row in &rows {
         at(format!("feedback {} ({})", row.seq, row.id), heard(row, study, &by_id))?;
-        labelled += usize::from(matches!(row.said, Said::Label { .. }));
+        labelled += usize::from(matches!(row.said, FeedbackContent::Label { .. }));
     }
     let results = trials.iter().filter(|trial| trial.state.is_result()).count();
     if labelled != results {
@@ -283,11 +283,11 @@ fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
     if a < b { (a, b) } else { (b, a) }
 }
 
-fn pair(said: &Said) -> Option<(TrialId, TrialId)> {
+fn pair(said: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     match *said {
-        Said::Preference { winner, loser } => Some(sorted(winner, loser)),
-        Said::Tie { a, b } => Some(sorted(a, b)),
-        Said::Label { .. } | Said::Suggestion { .. } => None,
+        FeedbackContent::Preference { winner, loser } => Some(sorted(winner, loser)),
+        FeedbackContent::Tie { a, b } => Some(sorted(a, b)),
+        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }
 
@@ -295,7 +295,7 @@ fn pair(said: &Said) -> Option<(TrialId, TrialId)> {
 fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
     let trial = |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} is not of this study"));
     match row.said {
-        Said::Label { trial: id, category } => {
+        FeedbackContent::Label { trial: id, category } => {
             let state = trial(id)?.state;
             let converged = state == TrialState::Converged;
             if !state.is_result() || category != u32::from(converged) {
@@ -305,7 +305,7 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                 return Err(format!("a label by {}", row.source.as_str()));
             }
         }
-        Said::Preference { winner: a, loser: b } | Said::Tie { a, b } => {
+        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
             let (a, b) = (trial(a)?, trial(b)?);
             if a.state != TrialState::Converged || b.state != TrialState::Converged {
                 return Err("it compares a trial that did not converge".to_owned());
@@ -322,7 +322,7 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                     let expected = by_gait_rmse((a.id, one), (b.id, other));
                     if pair(&expected) != pair(&row.said)
                         || std::mem::discriminant(&expected) != std::mem::discriminant(&row.said)
-                        || matches!((expected, row.said), (Said::Preference { winner, .. }, Said::Preference { winner: told, .. }) if winner != told)
+                        || matches!((expected, row.said), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
                     {
                         return Err("Gait RMSE says otherwise".to_owned());
                     }
@@ -330,7 +330,7 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                 Source::Subject | Source::Clinician | Source::Script => {}
             }
         }
-        Said::Suggestion { suggested, over } => {
+        FeedbackContent::Suggestion { suggested, over } => {
             trial(over)?;
             if suggested.0 >= study.plan.search_space.len() {
                 return Err(format!("action {} is not in the search space", suggested.0));

@@ -1,7 +1,7 @@
 //! The draw: which pair a rater is shown next. A pure function of what the study asks, what the rater was shown before and
 //! a lot of the operating system. On which side a gait is shown is drawn apart, in `store::allocations`.
 
-use crate::store::presentations::{Kind, Presentation, Said};
+use crate::store::presentations::{Judgement, Kind, Presentation};
 use crate::store::{PresentationId, TrialId};
 
 /// One in so many presentations repeats an earlier pair.
@@ -23,7 +23,7 @@ pub struct Drawn {
 /// Draws what a rater is shown next. `question`: the newer and the older trial of the pair that the study asks for;
 /// `before`: what this rater was shown, in order; `closed`: trials that nobody may be shown.
 pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
-    let taken_back = before.last().filter(|last| last.answer == Some(Said::Withdrawn) && last.kind != Kind::Null);
+    let taken_back = before.last().filter(|last| last.answer == Some(Judgement::Withdrawn) && last.kind != Kind::Null);
     if let Some(last) = taken_back.filter(|last| !last.has_one_of(closed)) {
         // Whoever mistook one side for the other must not find them exchanged.
         let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
@@ -59,8 +59,8 @@ fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> O
 }
 
 /// Whether an answer compares the two gaits.
-pub(super) fn is_plain(said: Said) -> bool {
-    matches!(said, Said::First | Said::Second | Said::NoDifference)
+pub(super) fn is_plain(said: Judgement) -> bool {
+    matches!(said, Judgement::First | Judgement::Second | Judgement::NoDifference)
 }
 
 /// Whether two pairs are of the same gaits.
@@ -86,7 +86,7 @@ mod tests {
             repeats: drawn.repeats,
             unblinded: false,
             created_at: now(),
-            answer: Some(Said::First),
+            answer: Some(Judgement::First),
             answered_at: Some(now()),
         }
     }
@@ -118,7 +118,7 @@ mod tests {
             let asked = question();
             let earlier = shown(1, draw(1, question(), &[], &[]));
             let drawn = draw(lot, asked, std::slice::from_ref(&earlier), &[]);
-            let taken_back = Presentation { answer: Some(Said::Withdrawn), ..shown(2, drawn) };
+            let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(2, drawn) };
             let id = taken_back.id;
             let again = draw(3, asked, &[earlier, taken_back], &[]);
             assert_eq!(again, Drawn { again: Some(id), ..drawn });
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_question_that_the_study_asks_no_more_does_not_come_again() {
-        let taken_back = Presentation { answer: Some(Said::Withdrawn), ..shown(1, draw(1, question(), &[], &[])) };
+        let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(1, draw(1, question(), &[], &[])) };
         let asked = question();
         assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);
     }

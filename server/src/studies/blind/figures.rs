@@ -2,7 +2,7 @@
 
 use super::draw::{is_plain, is_same_pair};
 use crate::store::allocations::Sided;
-use crate::store::presentations::{Kind, Presentation, Said};
+use crate::store::presentations::{Judgement, Kind, Presentation};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -70,14 +70,14 @@ fn of_rater(rater: &str, all: &[Presentation], sides: &[Sided]) -> RaterFigures 
     let count = |wanted: &dyn Fn(&Presentation) -> bool| {
         u32::try_from(own.iter().filter(|shown| wanted(shown)).count()).unwrap_or(u32::MAX)
     };
-    let is_unsafe = |shown: &Presentation| shown.answer.is_some_and(Said::is_about_safety);
+    let is_unsafe = |shown: &Presentation| shown.answer.is_some_and(Judgement::is_about_safety);
     RaterFigures {
         rater: rater.to_owned(),
         shown: count(&|_| true),
-        answered: count(&|shown| shown.answer.is_some_and(|said| said != Said::Withdrawn)),
+        answered: count(&|shown| shown.answer.is_some_and(|said| said != Judgement::Withdrawn)),
         first_preferred: first_preferred(rater, sides),
         repeats_agree: repeats_agree(&own),
-        cannot_tell: count(&|s| s.answer == Some(Said::CannotTell)),
+        cannot_tell: count(&|s| s.answer == Some(Judgement::CannotTell)),
         unsafe_gaits: count(&is_unsafe),
         unblinded: count(&|s| s.unblinded),
     }
@@ -87,9 +87,9 @@ fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
     let mut own = sides.iter().filter(|sided| sided.presentation.rater == rater).peekable();
     own.peek()?;
     let blind = own.filter(|sided| !sided.presentation.unblinded && sided.presentation.kind != Kind::Null);
-    let answers: Vec<Said> = blind.filter_map(Sided::answer).collect();
+    let answers: Vec<Judgement> = blind.filter_map(Sided::answer).collect();
     let count = |said| u32::try_from(answers.iter().filter(|answer| **answer == said).count()).unwrap_or(u32::MAX);
-    let (first, second) = (count(Said::First), count(Said::Second));
+    let (first, second) = (count(Judgement::First), count(Judgement::Second));
     Some(Share::new(first, first.saturating_add(second)))
 }
 
@@ -102,7 +102,7 @@ fn repeats_agree(own: &[&Presentation]) -> Share {
     for (place, shown) in answered.iter().enumerate() {
         let before = answered[..place].iter().rfind(|other| is_same_pair(other.pair(), shown.pair()));
         let Some(before) = before else { continue };
-        let turned = if before.pair() == shown.pair() { before.answer } else { before.answer.map(Said::swapped) };
+        let turned = if before.pair() == shown.pair() { before.answer } else { before.answer.map(Judgement::swapped) };
         of += 1;
         agree += u32::from(turned == shown.answer);
     }

@@ -8,7 +8,7 @@ use crate::printable;
 use crate::store::allocations::{self, Lot, Sided};
 use crate::store::audit;
 use crate::store::feedback::{self, Source, Voice};
-use crate::store::presentations::{self, Kind, NewAnswer, NewPresentation, Presentation, Said};
+use crate::store::presentations::{self, Judgement, Kind, NewAnswer, NewPresentation, Presentation};
 use crate::store::studies::{FeedbackMode, StudyState};
 use crate::store::{
     Connection, Instant, LentWriter, PresentationId, Store, StudyId, TrialId, Writer, consents, events, members,
@@ -17,8 +17,8 @@ use crate::store::{
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
 use crate::studies::objections::Objections;
-use crate::studies::preference::{self, Again, Statement};
-use crate::studies::standing::Standing;
+use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -29,7 +29,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 pub struct RaterAnswer {
     /// What the rater says; `withdrawn` is the program's own word.
-    pub answer: Said,
+    pub answer: Judgement,
     /// How long the rater took, ms.
     #[serde(default)]
     #[schema(minimum = 0)]
@@ -57,9 +57,9 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
     if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
         return Ok(None);
     }
-    let standing = Standing::read(&mut db, study).await?;
+    let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let found = store.compute(move |pool| open_question(pool, &standing)).await?;
+    let found = store.compute(move |pool| open_question(pool, &snapshot)).await?;
     // What the learner says names bounds: it is logged, and the rater hears that the program failed.
     let found = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
     Ok(found.trials())
@@ -117,7 +117,7 @@ pub async fn next<'a>(
 
 async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
     let withdrawn = NewAnswer {
-        said: Said::Withdrawn,
+        said: Judgement::Withdrawn,
         response_ms: None,
         note: "",
         feedback: None,
@@ -144,7 +144,7 @@ pub async fn answer(
 ) -> Result<(StudyId, Answered), Error> {
     let sided = own(writer, caller, token).await?;
     let shown = &sided.presentation;
-    if given.answer == Said::Withdrawn {
+    if given.answer == Judgement::Withdrawn {
         return Err(Error::invalid("answer", "withdrawn", "what a rater can say"));
     }
     printable::note("note", &given.note, 2000)?;
@@ -162,7 +162,7 @@ pub async fn answer(
         let fields = ("first", "second");
         let (study, pair) = (shown.study_id, shown.pair());
         // The server drew the pair; that this rater is asked again is meant.
-        let statement = Statement { study, pair, fields, said, voice, again: Again::Meant };
+        let statement = GivenJudgement { study, pair, fields, said, voice, again: Again::Meant };
         preference::hear(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
@@ -187,9 +187,9 @@ fn without_gaits(error: Error) -> Error {
 }
 
 /// Why a second answer is not taken, and what counts.
-fn answered_already(before: Option<Said>) -> String {
+fn answered_already(before: Option<Judgement>) -> String {
     match before {
-        Some(Said::Withdrawn) => "this pair was answered already, and that answer counts no more".to_owned(),
+        Some(Judgement::Withdrawn) => "this pair was answered already, and that answer counts no more".to_owned(),
         Some(said) => {
             let said = said.as_str().replace('_', " ");
             format!(
@@ -226,7 +226,10 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
 pub(crate) async fn can_be_taken_back(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
     let all = presentations::of_study(db, shown.study_id).await?;
     let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
-    let stands = matches!(shown.answer, Some(Said::First | Said::Second | Said::NoDifference | Said::CannotTell));
+    let stands = matches!(
+        shown.answer,
+        Some(Judgement::First | Judgement::Second | Judgement::NoDifference | Judgement::CannotTell)
+    );
     Ok(last && stands)
 }
 
@@ -273,7 +276,7 @@ pub struct UnblindedPair {
     /// When it was drawn.
     pub created_at: Instant,
     /// What the rater said of what was shown; none: nothing yet.
-    pub answer: Option<Said>,
+    pub answer: Option<Judgement>,
     /// When.
     pub answered_at: Option<Instant>,
 }

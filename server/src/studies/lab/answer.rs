@@ -11,9 +11,9 @@ use crate::store::audit::Actor;
 use crate::store::feedback::{Source, Voice};
 use crate::store::lab_answers::{self, LabAnswer};
 use crate::store::lab_sessions::{Act, LabSession};
-use crate::store::presentations::Said;
+use crate::store::presentations::Judgement;
 use crate::store::{Instant, LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
-use crate::studies::preference::{self, Again, Statement};
+use crate::studies::preference::{self, Again, GivenJudgement};
 use crate::studies::remark;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -29,7 +29,7 @@ pub struct AnswerView {
     /// 1; a further one when the one before was taken back.
     pub number: u32,
     /// What was said; first is walk 2, the first one with the device.
-    pub answer: Said,
+    pub answer: Judgement,
     /// Free text.
     pub note: String,
     /// Who wrote it down.
@@ -64,7 +64,7 @@ pub struct NewAnswer {
     #[schema(minimum = 1)]
     pub number: u32,
     /// What the person says; first is walk 2, second is walk 3. `withdrawn` is the program's own word.
-    pub answer: Said,
+    pub answer: Judgement,
     /// Free text, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -92,7 +92,7 @@ pub(super) fn can_be_taken_back(session: &LabSession) -> bool {
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] before every walk was recorded and when another answer stands.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
-    if new.answer == Said::Withdrawn {
+    if new.answer == Judgement::Withdrawn {
         return Err(Error::invalid("answer", "withdrawn", "what a person can say"));
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
@@ -147,7 +147,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
     let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
     let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
-    let statement = Statement {
+    let statement = GivenJudgement {
         study: study.id,
         pair: walked,
         fields: ("walk 2", "walk 3"),
@@ -171,7 +171,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
     }
 }
 
-async fn heard_as_preference(writer: &mut Writer, statement: Statement<'_>) -> Result<(), Error> {
+async fn heard_as_preference(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<(), Error> {
     let heard = preference::hear(writer, statement).await?;
     Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": heard })).await?)
 }

@@ -258,7 +258,7 @@ pub(super) async fn post(
     let refused = match make(&mut writer, &may.caller, &fields, &editor).await {
         Ok(study) => {
             commit(writer).await?;
-            app.director.changed();
+            app.scheduler.changed();
             return Ok(Redirect::to(&format!("/studies/{}", study.id)).into_response());
         }
         Err(error) => as_refusal(error, &fields)?,

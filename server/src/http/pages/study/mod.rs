@@ -19,7 +19,7 @@ use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, Node, Stroke, Tree};
 use crate::store::devices::{self, Device};
-use crate::store::feedback::{self, FeedbackRow, Retraction, Said, Source};
+use crate::store::feedback::{self, FeedbackContent, FeedbackRow, Retraction, Source};
 use crate::store::imports::{self, Import};
 use crate::store::remarks::{self, Remark};
 use crate::store::studies::{Evaluation, FeedbackMode, Study, StudyState};
@@ -35,9 +35,9 @@ use crate::studies::choice::{MANY, last_believed, ranking_to_show};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
-use crate::studies::objections::{Closed, Statement};
+use crate::studies::objections::{Closed, SafetyReportSource};
 use crate::studies::recommended::{self, CertificateState, Judged};
-use crate::studies::standing::Standing;
+use crate::studies::snapshot::StudySnapshot;
 use crate::studies::{command, lifecycle};
 use crate::workers::Track;
 use askama::Template;
@@ -99,7 +99,7 @@ struct Live {
     people_answer: bool,
     chart: Option<Drawn>,
     table: TrialsTable,
-    /// Which gait grew out of which.
+    /// Warm-start tree.
     tree: Option<Drawn>,
     answers: Vec<AnswerRow>,
     unsafe_gaits: Vec<UnsafeGait>,
@@ -158,8 +158,8 @@ impl Best {
         self.judged.verdict == CertificateState::Passed
     }
 
-    fn is_being_examined(&self) -> bool {
-        self.judged.verdict == CertificateState::BeingExamined
+    fn is_being_certified(&self) -> bool {
+        self.judged.verdict == CertificateState::BeingCertified
     }
 }
 
@@ -254,7 +254,7 @@ pub(super) async fn running(
     Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, PageError> {
     let trial = trials::get(&mut *app.read().await?, id).await?;
-    let Some(track) = app.director.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
+    let Some(track) = app.scheduler.board().track(id) else { return Ok(StatusCode::NO_CONTENT.into_response()) };
     Ok(page(&Running { row: running_row(&trial, Some(&track)) })?.into_response())
 }
 
@@ -289,9 +289,9 @@ pub(super) async fn post(
     };
     commit(writer).await?;
     for trial in cancelled {
-        app.director.cancel_solve(trial).await;
+        app.scheduler.cancel_solve(trial).await;
     }
-    app.director.changed();
+    app.scheduler.changed();
     Ok(Redirect::to(&format!("/studies/{id}")))
 }
 
@@ -310,7 +310,7 @@ fn button(act: Act) -> Option<ActButton> {
     }
 }
 
-/// What is computed from the standing: CPU work.
+/// What is computed from the snapshot: CPU work.
 #[derive(Default)]
 pub(super) struct Figures {
     /// People are to answer and nobody has: what the learner believes then is only what it began with.
@@ -342,41 +342,41 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
     // The learner's time grows with the answers, too.
     let heard = feedback::count(&mut reader, id).await? as usize;
     let large = counts.total as usize >= MANY || heard > MOST_ANSWERS;
-    let standing = if large {
-        Standing::newest(&mut reader, study, SHOWN).await?
+    let snapshot = if large {
+        StudySnapshot::newest(&mut reader, study, SHOWN).await?
     } else {
-        Standing::read(&mut reader, study).await?
+        StudySnapshot::read(&mut reader, study).await?
     };
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
     let remarks = remarks::of_study(&mut reader, id).await?;
     drop(reader);
     let beliefs = Arc::clone(&app.beliefs);
     let draw = move |pool: &OnPool| {
-        let figures = figures(pool, &standing, large, &beliefs);
-        (standing, figures)
+        let figures = figures(pool, &snapshot, large, &beliefs);
+        (snapshot, figures)
     };
-    let (standing, figures) = app.compute(draw).await?;
+    let (snapshot, figures) = app.compute(draw).await?;
     let mut figures = figures.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
     figures.judged = recommended::judged(&mut reader, &figures.ranking).await?;
-    figures.without_gait = WithoutGait::of(&standing.trials, &explanations::in_common(&mut reader, id).await?);
+    figures.without_gait = WithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
     if let Some(best) = figures.best {
         figures.has_gait = gaits::is_here(&mut reader, best).await?;
     }
     drop(reader);
-    if let Some(next) = figures.judged.unexamined {
-        figures.judged.examined_by_service(app.director.is_examining(id, next));
+    if let Some(next) = figures.judged.without_certificate {
+        figures.judged.certified_by_service(app.scheduler.is_certifying(id, next));
     }
-    let running = standing
+    let running = snapshot
         .trials
         .iter()
         .filter(|trial| trial.state == TrialState::Running)
-        .map(|trial| running_row(trial, app.director.board().track(trial.id).as_ref()))
+        .map(|trial| running_row(trial, app.scheduler.board().track(trial.id).as_ref()))
         .collect();
-    let mut answers = answers(&standing, &remarks);
+    let mut answers = answers(&snapshot, &remarks);
     answers.truncate(SHOWN as usize);
-    let is_queued = standing.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let mut live = view(standing, counts, &figures, running, table, answers, caller.may(Run::NEEDED));
+    let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
+    let mut live = view(snapshot, counts, &figures, running, table, answers, caller.may(Run::NEEDED));
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
         live.pace = waits_for_a_worker(jobs::depth(&mut *app.read().await?).await?);
     }
@@ -385,25 +385,25 @@ async fn read_live(app: &mut AppState, caller: &Caller, id: StudyId, choice: Cho
 
 pub(super) fn figures(
     pool: &OnPool,
-    standing: &Standing,
+    snapshot: &StudySnapshot,
     large: bool,
     beliefs: &Beliefs,
 ) -> Result<Figures, gait_learner::LearnerError> {
     if large {
         // Of many trials not all were read: what the learner last believed stands for the posterior.
-        let best = last_believed(standing);
-        let (ranking, history) = (best.into_iter().collect(), history::known(standing));
-        let question = standing.study.state == StudyState::Waiting;
+        let best = last_believed(snapshot);
+        let (ranking, history) = (best.into_iter().collect(), history::known(snapshot));
+        let question = snapshot.study.state == StudyState::Waiting;
         return Ok(Figures { best, ranking, history, question, ..Figures::default() });
     }
-    let question = standing.study.plan.feedback_mode != FeedbackMode::Automatic
-        && open_question(pool, standing)?.trials().is_some();
-    if standing.waits_for_first_answer() {
+    let question = snapshot.study.plan.feedback_mode != FeedbackMode::Automatic
+        && open_question(pool, snapshot)?.trials().is_some();
+    if snapshot.waits_for_first_answer() {
         return Ok(Figures { unanswered: true, question, ..Figures::default() });
     }
-    let ranking = ranking_to_show(pool, standing, beliefs)?;
+    let ranking = ranking_to_show(pool, snapshot, beliefs)?;
     let best = ranking.first().copied();
-    let history = history::of(standing, best);
+    let history = history::of(snapshot, best);
     Ok(Figures { best, ranking, history, question, ..Figures::default() })
 }
 
@@ -428,7 +428,7 @@ fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
 }
 
 fn view(
-    standing: Standing,
+    snapshot: StudySnapshot,
     counts: TrialCounts,
     figures: &Figures,
     running: Vec<RunningRow>,
@@ -436,7 +436,7 @@ fn view(
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let best = figures.best.and_then(|id| standing.trial(id)).map(|trial| Best {
+    let best = figures.best.and_then(|id| snapshot.trial(id)).map(|trial| Best {
         id: trial.id,
         number: trial.number,
         rmse: format::figure(trial.gait_rmse_rad),
@@ -444,7 +444,7 @@ fn view(
         bounds: format::bounds(&trial.action),
         has_gait: figures.has_gait,
         by_script: trial.asked_by.is_some(),
-        passing: figures.judged.passing.and_then(|id| standing.trial(id)).map(|trial| Passing {
+        passing: figures.judged.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,
             rmse: format::figure(trial.gait_rmse_rad),
@@ -452,65 +452,65 @@ fn view(
         judged: figures.judged.clone(),
     });
     let unsafe_gait = |closed: &Closed| {
-        let number = standing.trial(closed.trial)?.number;
+        let number = snapshot.trial(closed.trial)?.number;
         let reviewed = closed.review.is_some();
         Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at, reviewed })
     };
-    let unsafe_gaits = standing.grounds.objections.closed.iter().filter_map(unsafe_gait).collect();
-    let converged = standing.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
-    let files = format!("/api/v1/studies/{}/figures", standing.study.id);
-    let acts = if may_run { acts_of_people(standing.study.state) } else { Vec::new() };
+    let unsafe_gaits = snapshot.grounds.objections.closed.iter().filter_map(unsafe_gait).collect();
+    let converged = snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
+    let files = format!("/api/v1/studies/{}/figures", snapshot.study.id);
+    let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };
     Live {
-        state: words(standing.study.state.as_str()),
+        state: words(snapshot.study.state.as_str()),
         may_stop: acts.contains(&Act::Stop),
         may_extend: acts.contains(&Act::Extend),
         acts: acts.into_iter().filter_map(button).collect(),
-        pace: pace(&standing, counts),
+        pace: pace(&snapshot, counts),
         without_gait: figures.without_gait.clone(),
-        progress: [counts.results(), standing.study.plan.trial_budget].map(|trials| format::count(trials.into())),
+        progress: [counts.results(), snapshot.study.plan.trial_budget].map(|trials| format::count(trials.into())),
         counts,
         running,
         best,
         unanswered: figures.unanswered,
-        people_answer: standing.study.plan.feedback_mode == FeedbackMode::Human,
-        chart: course(&[(&standing, figures)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
+        people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
+        chart: course(&[(&snapshot, figures)]).map(|chart| Drawn::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
-        tree: warm_starts(&standing, figures.best).map(|figure| Drawn::of(&figure, &files, "")),
+        tree: warm_starts(&snapshot, figures.best).map(|figure| Drawn::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
-        question: figures.question && standing.study.state != StudyState::Stopped,
+        question: figures.question && snapshot.study.state != StudyState::Stopped,
         can_compare: converged >= 2,
-        study: standing.study,
+        study: snapshot.study,
     }
 }
 
-/// Which gait grew out of which; none before anything did.
-pub(super) fn warm_starts(standing: &Standing, best: Option<TrialId>) -> Option<Figure> {
-    let places: HashMap<TrialId, usize> = standing.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
+/// Warm-start tree; none before anything did.
+pub(super) fn warm_starts(snapshot: &StudySnapshot, best: Option<TrialId>) -> Option<Figure> {
+    let places: HashMap<TrialId, usize> = snapshot.trials.iter().enumerate().map(|(i, trial)| (trial.id, i)).collect();
     let node = |trial: &Trial| Node {
         parent: trial.warm_started_from.and_then(|from| places.get(&from).copied()),
         label: format!("trial {}", trial.number),
         link: format!("/trials/{}", trial.id),
         class: if best == Some(trial.id) { "best" } else { trial.state.as_str() },
     };
-    let nodes: Vec<Node> = standing.trials.iter().map(node).collect();
-    let title = format!("Warm starts of {}", standing.study.plan.name);
+    let nodes: Vec<Node> = snapshot.trials.iter().map(node).collect();
+    let title = format!("Warm starts of {}", snapshot.study.plan.name);
     nodes.iter().any(|node| node.parent.is_some()).then(|| Figure::tree(Tree { title, nodes }))
 }
 
 /// What people said, the newest first; what Gait RMSE says is in the table of trials already.
-fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
+fn answers(snapshot: &StudySnapshot, remarks: &[Remark]) -> Vec<AnswerRow> {
     let of_remark = |id| remarks.iter().any(|remark| remark.feedback_id == Some(id));
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
     let why = |retraction: &Option<Retraction>| Some(format!("taken back: {}", retraction.as_ref()?.reason));
     let lifted = |id| {
-        let of_it = |closed: &&Closed| closed.said == Statement::Staff(id);
-        let review = standing.grounds.objections.lifted.iter().find(of_it)?.review.as_ref()?;
+        let of_it = |closed: &&Closed| closed.said == SafetyReportSource::Staff(id);
+        let review = snapshot.grounds.objections.lifted.iter().find(of_it)?.review.as_ref()?;
         Some(format!("may be walked with again, {}: {}", review.author, review.reason))
     };
     let preference = |row: &FeedbackRow| {
         Some(AnswerRow {
-            text: answer_in_words(row, standing)?,
+            text: answer_in_words(row, snapshot)?,
             by: format!("{}, {}", format::source(row), row.author),
             note: row.note.clone(),
             undone: why(&row.retraction),
@@ -519,14 +519,14 @@ fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
     };
     let remark = |remark: &Remark| {
         Some(AnswerRow {
-            text: remark_in_words(remark, standing)?,
+            text: remark_in_words(remark, snapshot)?,
             by: format!("{}, {}", format::person(remark.source), remark.author),
             note: remark.note.clone(),
             undone: why(&remark.retraction).or_else(|| lifted(remark.id)),
             at: remark.created_at,
         })
     };
-    let preferences = standing.feedback.iter().filter(by_people).filter(|row| !of_remark(row.id));
+    let preferences = snapshot.feedback.iter().filter(by_people).filter(|row| !of_remark(row.id));
     let mut rows: Vec<AnswerRow> =
         preferences.filter_map(preference).chain(remarks.iter().filter_map(remark)).collect();
     rows.reverse();
@@ -535,23 +535,23 @@ fn answers(standing: &Standing, remarks: &[Remark]) -> Vec<AnswerRow> {
 }
 
 /// `trial 3 over trial 2`.
-pub(super) fn answer_in_words(row: &FeedbackRow, standing: &Standing) -> Option<String> {
-    let name = |id| standing.trial(id).map(|trial| format!("trial {}", trial.number));
+pub(super) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Option<String> {
+    let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
     match row.said {
-        Said::Preference { winner, loser } => Some(format!("{} over {}", name(winner)?, name(loser)?)),
-        Said::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
-        Said::Label { .. } | Said::Suggestion { .. } => None,
+        FeedbackContent::Preference { winner, loser } => Some(format!("{} over {}", name(winner)?, name(loser)?)),
+        FeedbackContent::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
+        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }
 
 /// `trial 3 is unsafe`.
-pub(super) fn remark_in_words(remark: &Remark, standing: &Standing) -> Option<String> {
-    let name = |id| standing.trial(id).map(|trial| format!("trial {}", trial.number));
+pub(super) fn remark_in_words(remark: &Remark, snapshot: &StudySnapshot) -> Option<String> {
+    let name = |id| snapshot.trial(id).map(|trial| format!("trial {}", trial.number));
     let (first, second) = (name(remark.first)?, name(remark.second)?);
     Some(match remark.answer {
-        presentations::Said::UnsafeFirst => format!("{first} is unsafe (beside {second})"),
-        presentations::Said::UnsafeSecond => format!("{second} is unsafe (beside {first})"),
-        presentations::Said::UnsafeBoth => format!("{first} and {second} are unsafe"),
+        presentations::Judgement::UnsafeFirst => format!("{first} is unsafe (beside {second})"),
+        presentations::Judgement::UnsafeSecond => format!("{second} is unsafe (beside {first})"),
+        presentations::Judgement::UnsafeBoth => format!("{first} and {second} are unsafe"),
         _ => format!("cannot tell {first} from {second}"),
     })
 }
@@ -571,12 +571,12 @@ fn waits_for_a_worker((queued, running): (u32, u32)) -> String {
 }
 
 /// How long the study will go on by itself, as far as its own solves tell.
-fn pace(standing: &Standing, counts: TrialCounts) -> String {
-    let study = &standing.study;
+fn pace(snapshot: &StudySnapshot, counts: TrialCounts) -> String {
+    let study = &snapshot.study;
     if study.state != StudyState::Running {
         return String::new();
     }
-    let mut seconds: Vec<f64> = standing.trials.iter().filter_map(|trial| trial.seconds_total).collect();
+    let mut seconds: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
     seconds.sort_by(f64::total_cmp);
     let Some(median) = seconds.get(seconds.len() / 2) else {
         if counts.results() > 0 || study.plan.evaluation == Evaluation::Script {
@@ -594,16 +594,16 @@ pub(super) const COURSE: &str = "course";
 
 /// Gait RMSE of the best action by iteration: of one study with its trials, or of several beside each other; none before
 /// the first converged trial.
-pub(super) fn course(studies: &[(&Standing, &Figures)]) -> Option<Chart> {
+pub(super) fn course(studies: &[(&StudySnapshot, &Figures)]) -> Option<Chart> {
     let title = "Gait RMSE of the best action by iteration";
     let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad");
-    if let [(standing, figures)] = studies {
-        chart = chart.with("trial", 7, Stroke::Points, converged(standing));
+    if let [(snapshot, figures)] = studies {
+        chart = chart.with("trial", 7, Stroke::Points, converged(snapshot));
         chart = chart.with("best action so far", 0, Stroke::Steps, figures.course());
     } else {
-        for (place, (standing, figures)) in studies.iter().enumerate() {
+        for (place, (snapshot, figures)) in studies.iter().enumerate() {
             let stroke = if place == 0 { Stroke::Steps } else { Stroke::DashedSteps };
-            chart = chart.with(&standing.study.plan.name, place, stroke, figures.course());
+            chart = chart.with(&snapshot.study.plan.name, place, stroke, figures.course());
         }
     }
     chart.whole_x = true;
@@ -611,8 +611,8 @@ pub(super) fn course(studies: &[(&Standing, &Figures)]) -> Option<Chart> {
 }
 
 /// Gait RMSE of each converged trial by iteration.
-fn converged(standing: &Standing) -> Vec<(f64, f64)> {
-    history::results(standing)
+fn converged(snapshot: &StudySnapshot) -> Vec<(f64, f64)> {
+    history::results(snapshot)
         .into_iter()
         .zip(1_u32..)
         .filter(|(trial, _)| trial.state == TrialState::Converged)

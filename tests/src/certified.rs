@@ -1,8 +1,8 @@
-//! What an examination leaves, without one.
+//! What a certification leaves, without one.
 
 use gait_optimizer::certificate::{Certificate, FORMAT_VERSION};
 use gait_optimizer::{Gait, ModelError};
-use gaitwright::workers::Examine;
+use gaitwright::workers::Certify;
 use std::time::Duration;
 
 /// A certificate that passed, or one of a walker that falls.
@@ -20,16 +20,16 @@ pub fn certificate(passed: bool) -> Certificate {
     }
 }
 
-/// An examiner that takes its time, and passes the gaits that it is told to.
+/// A certifier that takes its time, and passes the gaits that it is told to.
 pub struct Verdicts<P> {
-    /// How long an examination takes.
+    /// How long a certification takes.
     pub pause: Duration,
     /// Which gaits pass.
     pub passes: P,
 }
 
-impl<P: Fn(&Gait) -> bool + Send + Sync + 'static> Examine for Verdicts<P> {
-    fn examine(&self, gait: &Gait) -> Result<Certificate, ModelError> {
+impl<P: Fn(&Gait) -> bool + Send + Sync + 'static> Certify for Verdicts<P> {
+    fn certify(&self, gait: &Gait) -> Result<Certificate, ModelError> {
         std::thread::sleep(self.pause);
         Ok(certificate((self.passes)(gait)))
     }

@@ -1,19 +1,19 @@
-//! The director: proposes, dispatches, records, for every study that goes on by itself.
+//! The scheduler: proposes, dispatches, records, for every study that goes on by itself.
 //!
 //! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
 //! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
 
 use super::belief::Beliefs;
-use super::examiner::Examiner;
+use super::certifier::Certifier;
 use super::explainer::Explainer;
 use super::explanation::Effort;
 use super::lifecycle::{self, Act};
 use super::next_step::{Step, next_step};
 use super::plans_under_way::Plans;
+use super::prefetch::{LikelyNext, PREPARED, Prefetches, Prepared};
 use super::record;
-use super::rehearsal::{LikelyNext, PREPARED, Prepared, Rehearsals};
+use super::snapshot::StudySnapshot;
 use super::solve_input::SolveInput;
-use super::standing::Standing;
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::jobs::Lease;
@@ -42,7 +42,7 @@ const TOGETHER: Duration = Duration::from_millis(10);
 
 /// Runs the studies of a record.
 #[derive(Debug, Clone)]
-pub struct Director(Arc<Inner>);
+pub struct Scheduler(Arc<Inner>);
 
 struct Inner {
     store: Store,
@@ -50,11 +50,11 @@ struct Inner {
     /// How far the running solves are.
     board: Arc<Board>,
     /// Solves that are run before anybody asked for them.
-    rehearsals: Rehearsals,
-    /// Where the studies stand that wait for an answer, as of the last plan: what may be rehearsed.
-    waiting: watch::Sender<Arc<[Arc<Standing>]>>,
-    /// What examines the best gaits of studies that ended, and what explains their trials without a gait.
-    after_solves: Option<(Examiner, Explainer)>,
+    prefetches: Prefetches,
+    /// Where the studies stand that wait for an answer, as of the last plan: what may be prefetched.
+    waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
+    /// What certifies the best gaits of studies that ended, and what explains their trials without a gait.
+    after_solves: Option<(Certifier, Explainer)>,
     beliefs: Arc<Beliefs>,
     /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
     /// where no job of a trial is.
@@ -67,22 +67,22 @@ struct Inner {
     pulse: watch::Sender<u64>,
     shutdown: CancellationToken,
     tasks: TaskTracker,
-    /// How the tasks of this director are.
+    /// How the tasks of this scheduler are.
     health: Tasks,
     leases_taken_back: OnceCell<()>,
 }
 
 impl fmt::Debug for Inner {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Director")
+        f.debug_struct("Scheduler")
             .field("engine", &self.engine.name())
             .field("only", &self.only)
             .finish_non_exhaustive()
     }
 }
 
-impl Director {
-    /// A director over a record; [`Self::run`] sets it to work. Without `after_solves`, a gait is examined when somebody asks,
+impl Scheduler {
+    /// A scheduler over a record; [`Self::run`] sets it to work. Without `after_solves`, a gait is certified when somebody asks,
     /// and nothing is explained.
     pub fn new(
         store: &Store,
@@ -93,8 +93,8 @@ impl Director {
         // What requests compute never holds up the planning.
         let store = store.with_own_pool();
         let beliefs = Arc::<Beliefs>::default();
-        let over_record = |AfterSolves { examine, explain }| {
-            (Examiner::new(store.clone(), examine, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
+        let over_record = |AfterSolves { certify, explain }| {
+            (Certifier::new(store.clone(), certify, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
         };
         Self(Arc::new(Inner {
             after_solves: after_solves.map(over_record),
@@ -102,7 +102,7 @@ impl Director {
             beliefs,
             engine,
             board: Arc::default(),
-            rehearsals: Rehearsals::default(),
+            prefetches: Prefetches::default(),
             waiting: watch::channel(Arc::default()).0,
             hand_over: Mutex::default(),
             only,
@@ -140,7 +140,7 @@ impl Director {
         self.0.pulse.subscribe()
     }
 
-    /// Ends when the director is told to stop: for streams that would otherwise go on for ever.
+    /// Ends when the scheduler is told to stop: for streams that would otherwise go on for ever.
     pub fn stopping(&self) -> CancellationToken {
         self.0.shutdown.clone()
     }
@@ -151,20 +151,20 @@ impl Director {
         self.0.wake.notify_one();
     }
 
-    /// Asks for the best gaits of a study to be examined, where the record has no certificate of `next`. `false`: that is done
+    /// Asks for the best gaits of a study to be certified, where the record has no certificate of `next`. `false`: that is done
     /// only when somebody asks for one gait.
-    pub fn examine(&self, study: StudyId, next: TrialId) -> bool {
-        self.0.after_solves.as_ref().is_some_and(|(examiner, _)| examiner.ask(study, next))
+    pub fn certify_best_of(&self, study: StudyId, next: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.ask(study, next))
     }
 
     /// Asks for the gait of one trial to be certified. `false`: this process certifies none.
     pub fn certify(&self, trial: TrialId) -> bool {
-        self.0.after_solves.as_ref().map(|(examiner, _)| examiner.ask_for(trial)).is_some()
+        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
     }
 
-    /// Whether a gait of a study is being examined, or waits for that.
-    pub fn is_examining(&self, study: StudyId, gait: TrialId) -> bool {
-        self.0.after_solves.as_ref().is_some_and(|(examiner, _)| examiner.is_at(study, gait))
+    /// Whether a gait of a study is being certified, or waits for that.
+    pub fn is_certifying(&self, study: StudyId, gait: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.is_at(study, gait))
     }
 
     /// What this process does about the explanation of a trial.
@@ -174,11 +174,11 @@ impl Director {
 
     /// Asks the solve of a trial to stop within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
-        self.0.engine.withdraw(self.0.rehearsals.name_of(trial)).await;
+        self.0.engine.withdraw(self.0.prefetches.name_of(trial)).await;
         self.0.board.close(trial);
     }
 
-    /// Keeps another task of the service running until the director is told to stop; [`Self::trouble`] speaks of it too.
+    /// Keeps another task of the service running until the scheduler is told to stop; [`Self::trouble`] speaks of it too.
     pub async fn keep<F>(&self, name: &'static str, begin: impl Fn(Task) -> F)
     where
         F: Future<Output = Result<(), Error>> + Send + 'static,
@@ -186,7 +186,7 @@ impl Director {
         self.0.health.keep(name, &self.0.shutdown, begin).await;
     }
 
-    /// Tells the director to stop; [`Self::run`] returns soon after.
+    /// Tells the scheduler to stop; [`Self::run`] returns soon after.
     pub fn stop(&self) {
         self.0.shutdown.cancel();
     }
@@ -197,26 +197,28 @@ impl Director {
     /// What the database reports at the end; a task that fails before is begun again, and [`Self::trouble`] says so.
     pub async fn run(&self) -> Result<(), Error> {
         let keep = |name, begin: fn(Self, Task) -> BoxFuture<'static, Result<(), Error>>| {
-            let director = self.clone();
+            let scheduler = self.clone();
             async move {
-                let begin = |task| begin(director.clone(), task);
-                director.0.health.keep(name, &director.0.shutdown, begin).await;
+                let begin = |task| begin(scheduler.clone(), task);
+                scheduler.0.health.keep(name, &scheduler.0.shutdown, begin).await;
             }
         };
         tokio::join!(
-            keep("planning", |director, task| Box::pin(async move { director.keep_planning(&task).await })),
-            keep("listening to workers", |director, task| Box::pin(
-                async move { director.keep_listening(&task).await }
+            keep("planning", |scheduler, task| Box::pin(async move { scheduler.keep_planning(&task).await })),
+            keep("listening to workers", |scheduler, task| Box::pin(
+                async move { scheduler.keep_listening(&task).await }
             )),
-            keep("preparing what comes next", |director, task| {
-                Box::pin(async move { director.keep_rehearsing(&task).await })
+            keep("preparing what comes next", |scheduler, task| {
+                Box::pin(async move { scheduler.keep_prefetching(&task).await })
             }),
-            keep("examining gaits", |director, task| Box::pin(async move { director.keep_examining(&task).await })),
-            keep("explaining trials", |director, task| Box::pin(async move { director.keep_explaining(&task).await })),
+            keep("certifying gaits", |scheduler, task| Box::pin(async move { scheduler.keep_certifying(&task).await })),
+            keep("explaining trials", |scheduler, task| Box::pin(
+                async move { scheduler.keep_explaining(&task).await }
+            )),
         );
         self.0.tasks.close();
         self.0.tasks.wait().await;
-        self.withdraw(self.0.rehearsals.forget_running()).await;
+        self.withdraw(self.0.prefetches.forget_running()).await;
         self.take_back_leases().await
     }
 
@@ -225,11 +227,11 @@ impl Director {
         self.0.health.trouble().or_else(|| self.0.engine.trouble())
     }
 
-    /// Examines what solves gave, for ever.
-    async fn keep_examining(&self, task: &Task) -> Result<(), Error> {
-        let Some((examiner, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+    /// Certifies what solves gave, for ever.
+    async fn keep_certifying(&self, task: &Task) -> Result<(), Error> {
+        let Some((certifier, explainer)) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
-        examiner.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
+        certifier.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
         Ok(())
     }
 
@@ -255,8 +257,8 @@ impl Director {
             tokio::pin!(looked);
             loop {
                 tokio::select! {
-                    Some((study, standing)) = plans.next() => {
-                        let again = plans.ended(study, standing?);
+                    Some((study, snapshot)) = plans.next() => {
+                        let again = plans.ended(study, snapshot?);
                         self.0.waiting.send_replace(plans.waiting());
                         self.dispatch().await?;
                         if again {
@@ -303,16 +305,16 @@ impl Director {
     /// Begins a plan of each active study. Each is made apart: what is computed for a large study holds up no other.
     async fn begin_plans(&self, plans: &mut Plans) -> Result<(), Error> {
         let active = studies::active(&mut *self.0.store.read().await?).await?;
-        self.withdraw(self.0.rehearsals.forget(|id| active.iter().any(|study| study.id == id))).await;
+        self.withdraw(self.0.prefetches.forget(|id| active.iter().any(|study| study.id == id))).await;
         plans.keep(|id| active.iter().any(|study| study.id == id));
         for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
-            let director = self.clone();
+            let scheduler = self.clone();
             plans.begin(study.id, async move {
-                match director.plan(study.clone()).await {
+                match scheduler.plan(study.clone()).await {
                     Err(error) if error.is_of_machine() => Err(error),
                     // It would fail again: somebody has to see it.
-                    Err(error) => director.hold(&study, &error).await.map(|()| None),
-                    standing => standing,
+                    Err(error) => scheduler.hold(&study, &error).await.map(|()| None),
+                    snapshot => snapshot,
                 }
             });
         }
@@ -340,27 +342,27 @@ impl Director {
 
     /// Proposes trials until the study has as many open ones as it may, or moves it to another state. Gives where it
     /// stands when it waits for an answer.
-    async fn plan(&self, mut study: Study) -> Result<Option<Standing>, Error> {
+    async fn plan(&self, mut study: Study) -> Result<Option<StudySnapshot>, Error> {
         let mut store = self.0.store.clone();
         loop {
             let mut reader = store.read().await?;
-            let standing = Standing::read(&mut reader, study.clone()).await?;
+            let snapshot = StudySnapshot::read(&mut reader, study.clone()).await?;
             drop(reader);
-            self.certify_for_people(&standing);
+            self.certify_for_people(&snapshot);
             let beliefs = Arc::clone(&self.0.beliefs);
             let decide = move |pool: &OnPool| {
-                let step = next_step(pool, &standing, &beliefs);
-                (standing, step)
+                let step = next_step(pool, &snapshot, &beliefs);
+                (snapshot, step)
             };
-            let (standing, step) = store.compute(decide).await?;
+            let (snapshot, step) = store.compute(decide).await?;
             match step? {
-                Step::Nothing => return Ok(Some(standing).filter(|s| s.study.state == StudyState::Waiting)),
-                Step::Act(act, reason) => match self.act(&standing.study, act, &reason).await? {
+                Step::Nothing => return Ok(Some(snapshot).filter(|s| s.study.state == StudyState::Waiting)),
+                Step::Act(act, reason) => match self.act(&snapshot.study, act, &reason).await? {
                     Some(changed) => study = changed,
                     None => return Ok(None),
                 },
                 Step::Try(new) => {
-                    if !self.propose(&standing, &new).await? {
+                    if !self.propose(&snapshot, &new).await? {
                         return Ok(None);
                     }
                 }
@@ -369,9 +371,9 @@ impl Director {
     }
 
     /// Has the gaits certified that people will be asked about: nobody is asked before.
-    fn certify_for_people(&self, standing: &Standing) {
-        if standing.study.plan.feedback_mode != FeedbackMode::Automatic {
-            for trial in standing.trials.iter().filter(|trial| standing.waits_for_certificate(trial)) {
+    fn certify_for_people(&self, snapshot: &StudySnapshot) {
+        if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+            for trial in snapshot.trials.iter().filter(|trial| snapshot.waits_for_certificate(trial)) {
                 self.certify(trial.id);
             }
         }
@@ -398,15 +400,15 @@ impl Director {
     }
 
     /// Writes trial and job in one transaction, if the record is still what the choice was made from.
-    async fn propose(&self, standing: &Standing, new: &NewTrial) -> Result<bool, Error> {
-        let study = standing.study.id;
+    async fn propose(&self, snapshot: &StudySnapshot, new: &NewTrial) -> Result<bool, Error> {
+        let study = snapshot.study.id;
         let mut writer = self.0.store.write().await?;
         if let Err(shortage) = writer.room() {
             tracing::warn!(%study, %shortage, "no trial is planned");
             return Ok(false);
         }
         let current = studies::get(&mut writer, study).await?;
-        if current.state != StudyState::Running || !standing.is_current(&mut writer).await? {
+        if current.state != StudyState::Running || !snapshot.is_current(&mut writer).await? {
             self.0.wake.notify_one();
             return Ok(false);
         }
@@ -453,7 +455,7 @@ impl Director {
         };
         let attempt = assignment.attempt;
         let hand_over = self.0.hand_over.lock().await;
-        match self.0.rehearsals.claim(&assignment) {
+        match self.0.prefetches.claim(&assignment) {
             Prepared::Nothing => {}
             Prepared::Running => return self.started(attempt, PREPARED).await,
             Prepared::Done(finding) => {
@@ -465,7 +467,7 @@ impl Director {
             }
         }
         if self.busy().await? > self.0.engine.size() {
-            self.withdraw(self.0.rehearsals.forget_running()).await;
+            self.withdraw(self.0.prefetches.forget_running()).await;
         }
         if let Err(error) = self.0.engine.submit(assignment).await {
             // The lease runs out, and the job is handed over again.
@@ -477,34 +479,34 @@ impl Director {
     /// How many solves are out, also those that nobody asked for.
     async fn busy(&self) -> Result<usize, Error> {
         let (_, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
-        Ok(leased as usize + self.0.rehearsals.running())
+        Ok(leased as usize + self.0.prefetches.running())
     }
 
     /// Runs what studies will need next, whatever the answers that they wait for, where no worker is needed for others.
-    async fn keep_rehearsing(&self, task: &Task) -> Result<(), Error> {
+    async fn keep_prefetching(&self, task: &Task) -> Result<(), Error> {
         task.works();
         let mut waiting = self.0.waiting.subscribe();
         let mut likely = LikelyNext::default();
-        // The sender lives as long as this director.
+        // The sender lives as long as this scheduler.
         while waiting.changed().await.is_ok() {
-            let standings = Arc::clone(&waiting.borrow_and_update());
-            likely.keep(|study| standings.iter().any(|standing| standing.study.id == study));
-            for standing in standings.iter() {
-                if let Err(error) = self.rehearse(&mut likely, standing).await {
-                    tracing::warn!(study = %standing.study.id, %error, "what comes next cannot be prepared");
+            let snapshots = Arc::clone(&waiting.borrow_and_update());
+            likely.keep(|study| snapshots.iter().any(|snapshot| snapshot.study.id == study));
+            for snapshot in snapshots.iter() {
+                if let Err(error) = self.prefetch(&mut likely, snapshot).await {
+                    tracing::warn!(study = %snapshot.study.id, %error, "what comes next cannot be prepared");
                 }
             }
         }
         Ok(())
     }
 
-    async fn rehearse(&self, likely: &mut LikelyNext, standing: &Standing) -> Result<(), Error> {
-        let study = &standing.study;
-        if !likely.knows(standing) {
-            self.withdraw(self.0.rehearsals.forget(|other| other != study.id)).await;
+    async fn prefetch(&self, likely: &mut LikelyNext, snapshot: &StudySnapshot) -> Result<(), Error> {
+        let study = &snapshot.study;
+        if !likely.knows(snapshot) {
+            self.withdraw(self.0.prefetches.forget(|other| other != study.id)).await;
         }
         let mut store = self.0.store.clone();
-        for new in likely.of(&mut store, standing).await? {
+        for new in likely.of(&mut store, snapshot).await? {
             if self.busy().await? >= self.0.engine.size() {
                 return Ok(());
             }
@@ -516,10 +518,10 @@ impl Director {
             let assignment = assigned(attempt, new.number, input);
             let _hand_over = self.0.hand_over.lock().await;
             if self.busy().await? < self.0.engine.size()
-                && self.0.rehearsals.begin(study.id, &assignment)
+                && self.0.prefetches.begin(study.id, &assignment)
                 && let Err(error) = self.0.engine.submit(assignment).await
             {
-                self.withdraw(self.0.rehearsals.forget_running()).await;
+                self.withdraw(self.0.prefetches.forget_running()).await;
                 return Err(error.into());
             }
         }
@@ -537,7 +539,7 @@ impl Director {
         task.works();
         let mut written: HashMap<TrialId, Instant> = HashMap::new();
         loop {
-            let news = match self.0.rehearsals.hear(self.0.engine.next().await) {
+            let news = match self.0.prefetches.hear(self.0.engine.next().await) {
                 Ok(news) => news,
                 Err(receipt) => {
                     receipt.sign().await;
@@ -561,14 +563,14 @@ impl Director {
                 }
                 News::Ended { attempt, worker, finding, receipt } => {
                     written.remove(&attempt.trial);
-                    let director = self.clone();
+                    let scheduler = self.clone();
                     self.0.tasks.spawn(async move {
-                        match director.ended(attempt, &worker, finding).await {
+                        match scheduler.ended(attempt, &worker, finding).await {
                             Ok(()) => receipt.sign().await,
                             // Not signed for: it comes again, or the lease runs out.
                             Err(error) => tracing::error!(trial = %attempt.trial, %error, "cannot record a trial"),
                         }
-                        director.changed();
+                        scheduler.changed();
                     });
                     Ok(())
                 }
@@ -596,7 +598,7 @@ impl Director {
         Ok(())
     }
 
-    /// The lease of an attempt. `None`: the record has no such trial; what was rehearsed in vain speaks of one.
+    /// The lease of an attempt. `None`: the record has no such trial; what was prefetched in vain speaks of one.
     async fn lease_of(&self, attempt: Attempt) -> Result<Option<Lease>, Error> {
         match jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await {
             Err(StoreError::Missing { .. }) => {

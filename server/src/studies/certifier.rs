@@ -1,32 +1,32 @@
-//! What the service examines by itself: the best gaits of studies that have ended, and of those whose recommendation was
+//! What the service certifies by itself: the best gaits of studies that have ended, and of those whose recommendation was
 //! asked for, until one passes.
 //!
 //! Which gait comes next follows from the record alone, so a process that is killed goes on where it was.
 
 use super::belief::Beliefs;
 use super::choice::ranking_to_show;
-use super::standing::Standing;
-use super::{examination, recommended};
+use super::snapshot::StudySnapshot;
+use super::{certification, recommended};
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::Actor;
 use crate::store::{Store, StoreResult, StudyId, TrialId, consents, events, studies};
-use crate::workers::Examine;
+use crate::workers::Certify;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{Notify, watch};
 
-/// Examines gaits one after the other, beside the solves.
-pub(super) struct Examiner {
+/// Certifies gaits one after the other, beside the solves.
+pub(super) struct Certifier {
     store: Store,
-    examine: Arc<dyn Examine>,
+    certify: Arc<dyn Certify>,
     beliefs: Arc<Beliefs>,
     state: Mutex<State>,
     asked: Notify,
 }
 
-/// What is examined next.
+/// What is certified next.
 enum Next {
     Trial(TrialId),
     Study(StudyId),
@@ -42,14 +42,14 @@ struct State {
     refused: BTreeSet<TrialId>,
 }
 
-impl Examiner {
+impl Certifier {
     /// Over a record; [`Self::run`] sets it to work.
-    pub(super) fn new(store: Store, examine: Arc<dyn Examine>, beliefs: Arc<Beliefs>) -> Self {
-        Self { store, examine, beliefs, state: Mutex::default(), asked: Notify::new() }
+    pub(super) fn new(store: Store, certify: Arc<dyn Certify>, beliefs: Arc<Beliefs>) -> Self {
+        Self { store, certify, beliefs, state: Mutex::default(), asked: Notify::new() }
     }
 
     /// Asks for the best gaits of a study; `next` is the one that the record has no certificate of. `false`: that one cannot
-    /// be examined.
+    /// be certified.
     pub(super) fn ask(&self, study: StudyId, next: TrialId) -> bool {
         let mut state = self.state();
         if state.refused.contains(&next) {
@@ -68,14 +68,14 @@ impl Examiner {
         }
     }
 
-    /// Whether a gait of a study is being examined, or waits for that.
+    /// Whether a gait of a study is being certified, or waits for that.
     pub(super) fn is_at(&self, study: StudyId, gait: TrialId) -> bool {
         let state = self.state();
         state.waiting.contains(&study) && !state.refused.contains(&gait)
     }
 
     /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was, `through` that a
-    /// study has no gait left to examine.
+    /// study has no gait left to certify.
     pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
         // Beginning with every study that ended before this process did.
         let mut heard = 0;
@@ -101,13 +101,13 @@ impl Examiner {
                     continue;
                 }
             };
-            match self.examine_next(study).await {
+            match self.certify_next(study).await {
                 Ok(true) => {
                     changed();
                     continue;
                 }
                 Ok(false) => {}
-                Err(error) => tracing::error!(%study, %error, "cannot examine the gaits of a study"),
+                Err(error) => tracing::error!(%study, %error, "cannot certify the gaits of a study"),
             }
             self.state().waiting.remove(&study);
             through(study);
@@ -138,34 +138,34 @@ impl Examiner {
         }
     }
 
-    /// Certifies the gait of a trial. What cannot be examined has failed, and its certificate says why.
+    /// Certifies the gait of a trial. What cannot be certified has failed, and its certificate says why.
     async fn certify(&self, trial: TrialId) -> Result<(), Error> {
-        match examination::aside(&self.store, &Actor::program(), trial, &self.examine).await {
+        match certification::aside(&self.store, &Actor::program(), trial, &self.certify).await {
             // There is nothing to certify, or the subject withdrew meanwhile.
             Err(Error::Conflict(_) | Error::NotFound { .. }) => Ok(()),
             other => other,
         }
     }
 
-    /// Examines the next gait of a study. `false`: there is none.
-    async fn examine_next(&self, id: StudyId) -> Result<bool, Error> {
+    /// Certifies the next gait of a study. `false`: there is none.
+    async fn certify_next(&self, id: StudyId) -> Result<bool, Error> {
         let mut store = self.store.clone();
         let mut reader = store.read().await?;
         if consents::is_withdrawn(&mut reader, id).await? {
             return Ok(false);
         }
         let study = studies::get(&mut reader, id).await?;
-        let standing = Standing::read(&mut reader, study).await?;
+        let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
-        if standing.waits_for_first_answer() {
+        if snapshot.waits_for_first_answer() {
             // Nothing is recommended yet.
             return Ok(false);
         }
         let beliefs = Arc::clone(&self.beliefs);
-        let rank = move |pool: &OnPool| ranking_to_show(pool, &standing, &beliefs);
+        let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &beliefs);
         let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let refused = self.state().refused.clone();
-        let next = recommended::next_to_examine(&mut *self.store.read().await?, &ranking, &refused).await?;
+        let next = recommended::next_to_certify(&mut *self.store.read().await?, &ranking, &refused).await?;
         let Some(trial) = next else { return Ok(false) };
         self.certify(trial).await?;
         Ok(true)
@@ -177,8 +177,8 @@ impl Examiner {
     }
 }
 
-impl fmt::Debug for Examiner {
+impl fmt::Debug for Certifier {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Examiner").field("state", &self.state).finish_non_exhaustive()
+        f.debug_struct("Certifier").field("state", &self.state).finish_non_exhaustive()
     }
 }

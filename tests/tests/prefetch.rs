@@ -5,7 +5,7 @@
 use gaitwright::store::results;
 use gaitwright::store::studies::{FeedbackMode, StudyState};
 use gaitwright::studies::comparison::open_question;
-use gaitwright::studies::standing::Standing;
+use gaitwright::studies::snapshot::StudySnapshot;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -24,11 +24,11 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
             break;
         }
         tokio::time::sleep(thinks).await;
-        let standing = Standing::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
-        let there = standing.clone();
+        let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
+        let there = snapshot.clone();
         let question = service.store.clone().compute(move |pool| open_question(pool, &there)).await.unwrap();
         let Some((a, b)) = question.unwrap().trials() else { continue };
-        let rmse = |id| standing.trial(id).unwrap().gait_rmse_rad.unwrap();
+        let rmse = |id| snapshot.trial(id).unwrap().gait_rmse_rad.unwrap();
         let answer = json!({"trial_a": a, "trial_b": b, "answer": if rmse(a) < rmse(b) { "a" } else { "b" }});
         let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
         assert!(given.status.is_success(), "{}", given.text);

@@ -1,23 +1,23 @@
-//! The seam between the service and the examination of a gait.
+//! The seam between the service and the certification of a gait.
 
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::{Gait, ModelError};
 
-/// Examines a gait on the calling thread.
-pub trait Examine: Send + Sync + 'static {
+/// Certifies a gait on the calling thread.
+pub trait Certify: Send + Sync + 'static {
     /// The certificate of a gait: the same for the same gait, to the last bit.
     ///
     /// # Errors
     /// [`ModelError`] when it is no gait of the walker.
-    fn examine(&self, gait: &Gait) -> Result<Certificate, ModelError>;
+    fn certify(&self, gait: &Gait) -> Result<Certificate, ModelError>;
 }
 
 /// The real thing: `gait_optimizer::certificate::certify`.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct GaitExaminer;
+pub struct GaitCertifier;
 
-impl Examine for GaitExaminer {
-    fn examine(&self, gait: &Gait) -> Result<Certificate, ModelError> {
+impl Certify for GaitCertifier {
+    fn certify(&self, gait: &Gait) -> Result<Certificate, ModelError> {
         certify(gait)
     }
 }

@@ -4,7 +4,7 @@
 //! changes nothing but the wait; the record and the learner hear of a solve only when a trial asks for it.
 
 use super::next_step::likely_next;
-use super::standing::Standing;
+use super::snapshot::StudySnapshot;
 use crate::error::Error;
 use crate::store::feedback::LogVersion;
 use crate::store::trials::NewTrial;
@@ -18,10 +18,10 @@ pub(super) const PREPARED: &str = "prepared";
 
 /// The solves of all studies that nobody asked for yet, by the name under which they run: that of no trial.
 #[derive(Debug, Default)]
-pub(super) struct Rehearsals(Mutex<HashMap<TrialId, Rehearsal>>);
+pub(super) struct Prefetches(Mutex<HashMap<TrialId, Prefetch>>);
 
 #[derive(Debug)]
-struct Rehearsal {
+struct Prefetch {
     study: StudyId,
     assignment: Assignment,
     /// What came of it; `None`: it runs. What failed is not tried again here, but when a trial asks for it.
@@ -41,14 +41,14 @@ pub(super) enum Prepared {
     Done(Finding),
 }
 
-impl Rehearsals {
+impl Prefetches {
     /// Notes that a solve is run for a study. `false`: it is there, or runs, already.
     pub(super) fn begin(&self, study: StudyId, assignment: &Assignment) -> bool {
         let mut all = self.all();
         if all.values().any(|one| same_solve(&one.assignment, assignment)) {
             return false;
         }
-        let one = Rehearsal { study, assignment: assignment.clone(), finding: None, promised_to: None };
+        let one = Prefetch { study, assignment: assignment.clone(), finding: None, promised_to: None };
         all.insert(assignment.attempt.trial, one);
         true
     }
@@ -89,7 +89,7 @@ impl Rehearsals {
         self.remove(|one| one.finding.is_none())
     }
 
-    fn remove(&self, goes: impl Fn(&Rehearsal) -> bool) -> Vec<TrialId> {
+    fn remove(&self, goes: impl Fn(&Prefetch) -> bool) -> Vec<TrialId> {
         let mut running = Vec::new();
         self.all().retain(|name, one| {
             let stays = one.promised_to.is_some() || !goes(one);
@@ -104,7 +104,7 @@ impl Rehearsals {
     /// The name under which the solve of a trial runs.
     pub(super) fn name_of(&self, trial: TrialId) -> TrialId {
         let all = self.all();
-        let promised = |one: &Rehearsal| one.promised_to.is_some_and(|attempt| attempt.trial == trial);
+        let promised = |one: &Prefetch| one.promised_to.is_some_and(|attempt| attempt.trial == trial);
         all.iter().find(|(_, one)| promised(one)).map_or(trial, |(name, _)| *name)
     }
 
@@ -132,7 +132,7 @@ impl Rehearsals {
         }
     }
 
-    fn all(&self) -> MutexGuard<'_, HashMap<TrialId, Rehearsal>> {
+    fn all(&self) -> MutexGuard<'_, HashMap<TrialId, Prefetch>> {
         // The map is whole between any two statements that hold the lock.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -149,21 +149,21 @@ impl LikelyNext {
     }
 
     /// Whether it is computed for what the study has heard by now.
-    pub(super) fn knows(&self, standing: &Standing) -> bool {
-        self.0.get(&standing.study.id).is_some_and(|(heard, _)| *heard == standing.version)
+    pub(super) fn knows(&self, snapshot: &StudySnapshot) -> bool {
+        self.0.get(&snapshot.study.id).is_some_and(|(heard, _)| *heard == snapshot.version)
     }
 
     /// The trials that a study would propose next.
     ///
     /// # Errors
     /// What the learner reports.
-    pub(super) async fn of(&mut self, store: &mut Store, standing: &Standing) -> Result<Vec<NewTrial>, Error> {
-        if !self.knows(standing) {
-            let there = standing.clone();
+    pub(super) async fn of(&mut self, store: &mut Store, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
+        if !self.knows(snapshot) {
+            let there = snapshot.clone();
             let likely = store.compute(move |pool| likely_next(pool, &there)).await??;
-            self.0.insert(standing.study.id, (standing.version, likely));
+            self.0.insert(snapshot.study.id, (snapshot.version, likely));
         }
-        Ok(self.0.get(&standing.study.id).map(|(_, likely)| likely.clone()).unwrap_or_default())
+        Ok(self.0.get(&snapshot.study.id).map(|(_, likely)| likely.clone()).unwrap_or_default())
     }
 }
 

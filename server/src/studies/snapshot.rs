@@ -1,7 +1,7 @@
 //! Where a study stands, as its learner sees it: the log of results and answers, by action.
 
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
-use crate::store::feedback::{FeedbackRow, LogVersion, Said, Source};
+use crate::store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use crate::store::safety_reviews::{self, SafetyVersion};
 use crate::store::studies::{FeedbackMode, Study};
 use crate::store::trials::{Trial, TrialState};
@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 
 /// Everything that the next decision of a study depends on, read in one go.
 #[derive(Debug, Clone)]
-pub struct Standing {
+pub struct StudySnapshot {
     /// The study.
     pub study: Study,
     /// Its trials, by number.
@@ -26,8 +26,8 @@ pub struct Standing {
     pub grounds: Grounds,
 }
 
-impl Standing {
-    /// Reads the standing of a study.
+impl StudySnapshot {
+    /// Reads the snapshot of a study.
     ///
     /// # Errors
     /// What the database reports.
@@ -137,7 +137,7 @@ impl Standing {
         let action = |id: TrialId| by_id.get(&id).map(|trial| trial.action_index);
         let mut log = FeedbackLog::default();
         for row in &self.feedback {
-            if let Said::Label { trial, .. } = row.said
+            if let FeedbackContent::Label { trial, .. } = row.said
                 && let Some(trial) = by_id.get(&trial)
             {
                 log.visited.push(trial.action_index);
@@ -156,14 +156,16 @@ impl Standing {
 }
 
 /// An answer about trials as an answer about actions. `None` when it speaks of one action only.
-fn heard(said: &Said, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
+fn heard(said: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
     let feedback = match *said {
-        Said::Label { trial, category } => {
+        FeedbackContent::Label { trial, category } => {
             Feedback::Label { action: action(trial)?, category: usize::try_from(category).ok()? }
         }
-        Said::Preference { winner, loser } => Feedback::Preference { winner: action(winner)?, loser: action(loser)? },
-        Said::Tie { a, b } => Feedback::Tie { a: action(a)?, b: action(b)? },
-        Said::Suggestion { suggested, over } => Feedback::Suggestion { suggested, over: action(over)? },
+        FeedbackContent::Preference { winner, loser } => {
+            Feedback::Preference { winner: action(winner)?, loser: action(loser)? }
+        }
+        FeedbackContent::Tie { a, b } => Feedback::Tie { a: action(a)?, b: action(b)? },
+        FeedbackContent::Suggestion { suggested, over } => Feedback::Suggestion { suggested, over: action(over)? },
     };
     match feedback.actions() {
         (a, Some(b)) if a == b => None,
