@@ -449,7 +449,7 @@ async fn what_a_script_told_without_a_gait_offers_no_gait() {
     service.wait_for(study, &[StudyState::Finished]).await;
     for page in [format!("/studies/{study}"), format!("/trials/{trial}")] {
         let shown = service.fetch(&page).await.text;
-        assert!(shown.contains("the gait itself is not here"), "{shown}");
+        assert!(shown.contains("the gait itself is not stored here"), "{shown}");
         for offered in
             ["See this gait walk", "/gait.csv", "/controller.json", "/certify", "This gait has no certificate yet"]
         {

@@ -91,7 +91,7 @@ async fn nothing_is_recommended_silently_whose_certificate_failed() {
     assert_eq!((&failed["objections"], &failed["passing"]), (&json!(["the simulated walker falls"]), &Value::Null));
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("This gait failed its") && shown.contains("the simulated walker falls"), "{shown}");
-    assert!(shown.contains("The next best that nobody certified"), "{shown}");
+    assert!(shown.contains("The next best gait without a certificate"), "{shown}");
     assert!(service.fetch(&format!("/trials/{best}")).await.text.contains("read why before it is walked with"));
     let table = service.fetch(&format!("/api/v1/studies/{study}/recommendation.csv")).await.text;
     assert!(table.starts_with("bound,value,unit,limits,certificate_of_the_gait\n"), "{table}");

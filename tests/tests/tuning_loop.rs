@@ -221,7 +221,11 @@ async fn higher_priorities_go_first_and_equal_ones_share() {
         let study = trials::get(&mut service.store.read().await.unwrap(), attempt.trial).await.unwrap().study_id;
         order.push(studies.iter().position(|known| *known == study).unwrap());
     }
-    assert_eq!(order, [2, 2, 0, 1, 0, 1], "by priority, then whoever has the fewest");
+    assert_eq!(order[..2], [2, 2], "by priority");
+    // Which of two equal studies comes first depends on whose plan was made first: they are planned apart.
+    for turn in order[2..].chunks(2) {
+        assert!(turn == [0, 1] || turn == [1, 0], "whoever has the fewest: {order:?}");
+    }
     service.stop().await;
 }
 

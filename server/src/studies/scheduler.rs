@@ -248,22 +248,29 @@ impl Scheduler {
         self.0.leases_taken_back.get_or_try_init(|| self.take_back_leases()).await?;
         let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
         let mut plans = Plans::default();
+        // Since when there may be something to hand out.
+        let mut since = None;
         loop {
             self.look_after_leases().await?;
             self.begin_plans(&mut plans).await?;
-            self.dispatch().await?;
+            since.get_or_insert_with(Instant::now);
             task.works();
             let looked = tokio::time::sleep(pause);
             tokio::pin!(looked);
             loop {
+                let hand_out_at = since.map(|since| plans.hand_out_at(since));
                 tokio::select! {
                     Some((study, snapshot)) = plans.next() => {
                         let again = plans.ended(study, snapshot?);
                         self.0.waiting.send_replace(plans.waiting());
-                        self.dispatch().await?;
+                        since.get_or_insert_with(Instant::now);
                         if again {
                             break;
                         }
+                    }
+                    () = tokio::time::sleep_until(hand_out_at.unwrap_or_else(Instant::now).into()), if since.is_some() => {
+                        self.dispatch().await?;
+                        since = None;
                     }
                     // Nothing new for so long, or something new; what comes close together is planned with once.
                     () = &mut looked => break,
