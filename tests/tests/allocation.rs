@@ -572,7 +572,10 @@ async fn an_archive_leaves_out_orders_that_are_blind_and_a_session_without_one_c
     let refused = there.post(&unblind, &json!({"reason": "walked"})).await;
     assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);
     let page = there.fetch(&format!("/lab-sessions/{}", ids[1])).await.text;
-    assert!(page.contains("its archive left the order out") && !page.contains("Unblind this session"), "{page}");
+    assert!(
+        page.contains("its archive does not contain the allocation") && !page.contains("Unblind this session"),
+        "{page}"
+    );
     there.stop().await;
 }
 

@@ -348,7 +348,7 @@ async fn a_trial_is_cancelled_and_run_again() {
 async fn pages_answer_and_let_nothing_in_from_elsewhere() {
     let (_folder, service) = service().await;
     let empty = service.fetch("/").await;
-    assert!(empty.text.contains("There is no study yet"));
+    assert!(empty.text.contains("No studies yet"));
     let study = finished(&service, 4).await;
     let trial = service.trials(study).await[2].id;
     for path in [

@@ -215,7 +215,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     assert!(said.contains("no difference between trial"), "{said}");
     // The next comparison comes by itself.
     page.wait_for("input[name=answer]").await;
-    assert!(page.text(".notice.good").await.contains("The next comparison stands below"));
+    assert!(page.text(".notice.good").await.contains("The next comparison is below"));
 
     while site.service.trials(study).await.len() < 3 {
         tokio::time::sleep(Duration::from_millis(10)).await;
