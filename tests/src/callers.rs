@@ -4,6 +4,7 @@ use crate::analytic::Analytic;
 use crate::service::{Answer, Service};
 use axum::body::Body;
 use axum::extract::ConnectInfo;
+use axum::http::request::Builder;
 use axum::http::{Method, Request, header};
 use gaitwright::access::people::{self, NewUser};
 use gaitwright::access::tokens::{self, NewToken};
@@ -87,15 +88,25 @@ pub async fn rater_of(service: &Service, studies: &[StudyId]) -> As {
 
 /// Sends a request as somebody.
 pub async fn send(service: &Service, who: &As, method: &Method, path: &str, kind: &str, body: &str) -> Answer {
-    let mut request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, kind);
-    request = match who {
+    let request = Request::builder().method(method).uri(path).header(header::CONTENT_TYPE, kind);
+    service.send(of(who, request).body(Body::from(body.to_owned())).unwrap()).await
+}
+
+/// Fetches something as somebody, in one of the forms that it has.
+pub async fn send_accepting(service: &Service, who: &As, path: &str, form: &str) -> Answer {
+    let request = Request::builder().uri(path).header(header::ACCEPT, form);
+    service.send(of(who, request).body(Body::empty()).unwrap()).await
+}
+
+/// The request with what shows who sends it.
+fn of(who: &As, request: Builder) -> Builder {
+    match who {
         As::Nobody => request,
         As::Session(secret) => request
             .header(header::COOKIE, format!("gaitwright_session={secret}"))
             .header("sec-fetch-site", "same-origin"),
         As::Token(secret) => request.header(header::AUTHORIZATION, format!("Bearer {secret}")),
-    };
-    service.send(request.body(Body::from(body.to_owned())).unwrap()).await
+    }
 }
 
 /// The session that an answer begins.

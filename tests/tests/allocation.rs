@@ -13,7 +13,7 @@ use gaitwright::store::{Connection, LabSessionId, Store, StudyId, TokenId, Trial
 use gaitwright::studies::lab::{self, NewSession};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
-use gaitwright_tests::callers::{self, As, FORM, rater_of, send, signed_in, token};
+use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
 use gaitwright_tests::consistent::Consistent;
 use gaitwright_tests::orders::{gait_one_first, sides};
 use gaitwright_tests::service::{Answer, Service};
@@ -392,14 +392,20 @@ async fn exchange_orders(database: &Path) {
 /// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a side.
 async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str) -> Vec<(String, String)> {
     let document: Value = serde_json::from_str(&gaitwright::http::openapi::text().unwrap()).unwrap();
-    let mut paths: Vec<String> = Vec::new();
+    // Each address, in every form that it can be asked for.
+    let mut paths: Vec<(String, Option<String>)> = vec![("/health".to_owned(), None), ("/ready".to_owned(), None)];
     for (path, item) in document["paths"].as_object().unwrap() {
         if item["get"].is_object() {
-            paths.push(path.clone());
+            paths.push((path.clone(), None));
+            let forms = item["get"]["responses"]["200"]["content"].as_object();
+            let forms = forms.into_iter().flat_map(|forms| forms.keys()).filter(|_| forms.is_some_and(|f| f.len() > 1));
+            paths.extend(forms.map(|form| (path.clone(), Some(form.clone()))));
         }
     }
+    let forms: Vec<&str> = paths.iter().filter_map(|(_, form)| form.as_deref()).collect();
+    assert!(forms.contains(&"text/csv"), "{forms:?}");
     for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains("get(")) {
-        paths.extend(line.split('"').nth(1).map(str::to_owned));
+        paths.extend(line.split('"').nth(1).map(|path| (path.to_owned(), None)));
     }
     // These differ from one call to the next, or are the sides as the rater sees them.
     let left_out = [
@@ -413,7 +419,7 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
         "/api/v1/studies/{id}/archive",
     ];
     let mut all = Vec::new();
-    for path in paths.iter().filter(|path| !left_out.contains(&path.as_str())) {
+    for (path, form) in paths.iter().filter(|(path, _)| !left_out.contains(&path.as_str())) {
         let sides = ["/rate/pair/", "/blind/"].iter().any(|part| path.contains(part));
         for id in if path.contains("{id}") { ids } else { &ids[..1] } {
             for (place, who) in callers.iter().enumerate() {
@@ -421,10 +427,17 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
                     continue;
                 }
                 let address = path.replace("{id}", id).replace("{token}", own).replace("{file}", "rmse.csv");
-                let answer = get(service, who, &address).await;
+                let answer = match form {
+                    Some(form) => send_accepting(service, who, &address, form).await,
+                    None => get(service, who, &address).await,
+                };
+                let form = form.as_deref().unwrap_or_default();
                 let text =
                     answer.text.lines().filter(|line| !is_about_the_request(line)).collect::<Vec<_>>().join("\n");
-                all.push((format!("{place} {address}"), format!("{} {}", answer.status, without_request(&text))));
+                all.push((
+                    format!("{place} {address} {form}"),
+                    format!("{} {}", answer.status, without_request(&text)),
+                ));
             }
         }
     }

@@ -73,6 +73,9 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let trials = service.trials(finished).await;
     let (heard, tried) = (service.feedback(finished).await, service.trials(running).await.len());
     let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});
+    let other =
+        if service.get(finished).await.plan.search_space.values(trials[0].action_index)[5] == 0.3 { 0.2 } else { 0.3 };
+    let suggestion = json!({"over": trials[0].id, "bounds": {"a6": other}});
     let ended = |trial: &gaitwright::store::trials::Trial| trial.state.as_str() == "cancelled";
     let cancelled = service.trials(running).await.into_iter().find(ended).unwrap().id;
     for (path, body) in [
@@ -80,6 +83,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
         (format!("/api/v1/studies/{finished}/fork"), json!({})),
         (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 310})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
+        (format!("/api/v1/studies/{finished}/suggestions"), suggestion),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
         (format!("/api/v1/studies/{human}/blind/next"), json!({})),
         (format!("/api/v1/blind/{token}/answer"), json!({"answer": "first"})),

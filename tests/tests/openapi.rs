@@ -142,6 +142,7 @@ async fn settings_at_the_ends_of_their_described_ranges_are_accepted() {
         let schema = &document["components"]["schemas"]["NewStudy"]["properties"][group];
         assert_eq!(schema["additionalProperties"], false, "{group}");
         for (name, field) in schema["properties"].as_object().unwrap() {
+            assert_ne!(field["type"], "string", "{group}.{name}: its words are not named");
             let ends = [&field["minimum"], &field["maximum"]].into_iter().filter(|end| end.is_number());
             for end in ends.cloned().chain(field["enum"].as_array().cloned().into_iter().flatten()) {
                 let integer = field["type"] == "integer";

@@ -75,7 +75,7 @@ enum Command {
     Sweep(sweep::Sweep),
     /// Certify a gait independently of its optimisation: residuals, closed loop, stability.
     Certify(certify::Certify),
-    /// Write a gait for OpenSim or for the device.
+    /// Write a gait as a table, an OpenSim motion or a picture.
     Convert(convert::Convert),
     /// Make a reference gait from a recording.
     Reference(reference::Reference),

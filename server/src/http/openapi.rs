@@ -9,7 +9,7 @@ use serde_json::Value;
 use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{ObjectBuilder, Type};
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityScheme};
-use utoipa::openapi::{ContentBuilder, OpenApi, Ref, Required, ResponseBuilder};
+use utoipa::openapi::{ContentBuilder, OpenApi, Ref, RefOr, Required, ResponseBuilder};
 use utoipa::{OpenApi as _, PartialSchema, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 
@@ -82,7 +82,12 @@ fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
         problems.push(("401", "Sign in first"));
         problems.push(("403", "Not allowed"));
     }
-    if names_something || changes {
+    let names_several = operation
+        .parameters
+        .iter()
+        .flatten()
+        .any(|parameter| matches!(parameter, RefOr::T(parameter) if parameter.name == "ids"));
+    if names_something || names_several || changes {
         problems.push(("404", "Not found"));
     }
     if changes || operation.parameters.is_some() {

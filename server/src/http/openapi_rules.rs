@@ -338,11 +338,12 @@ fn range_in(error: &Error) -> Option<(f64, f64)> {
     Some((least.trim().parse().ok()?, most.parse().ok()?))
 }
 
-/// The words that a refused field accepts: `a, b, c`.
+/// The words that a refused field accepts: `a, b, c`, or `a or b`.
 fn words_in(error: &Error) -> Vec<String> {
     let (Error::Invalid(field) | Error::Unreadable(field)) = error else { return Vec::new() };
     let allowed = field.allowed.as_deref().unwrap_or_default().trim_start_matches("one of ");
-    let words: Vec<String> = allowed.split(", ").map(|word| word.trim_matches(['`', '"', ' ']).to_owned()).collect();
+    let words = allowed.split(", ").flat_map(|words| words.split(" or "));
+    let words: Vec<String> = words.map(|word| word.trim_matches(['`', '"', ' ']).to_owned()).collect();
     let plain = |word: &String| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if words.iter().all(plain) { words } else { Vec::new() }
 }

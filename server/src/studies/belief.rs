@@ -5,7 +5,7 @@ use super::snapshot::StudySnapshot;
 use crate::compute::OnPool;
 use crate::store::StudyId;
 use crate::store::feedback::{FeedbackContent, FeedbackRow, LogVersion};
-use gait_learner::{ActionIndex, Agreement, BestProbability, LearnerError, Marginal, Posterior, posterior};
+use gait_learner::{ActionIndex, Agreement, BestProbability, Learner, LearnerError, Marginal, Posterior};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,6 +15,10 @@ const DRAWS: usize = 1000;
 pub const MOST_ANSWERS: usize = 1500;
 /// So many studies are kept.
 const KEPT: usize = 16;
+/// Of so many studies the learner's state is kept, from which the next posterior is an update.
+const KEPT_LEARNERS: usize = 4;
+/// The state of a study with more trials is not kept: its memory grows with their second power, here to about 100 MB.
+const MOST_KEPT_TRIALS: usize = 2000;
 
 /// What the learner believes after a log.
 #[derive(Debug)]
@@ -74,11 +78,12 @@ fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex
     }
 }
 
-/// The beliefs that were computed last.
+/// The beliefs that were computed last, and the learners that computed them.
 #[derive(Debug, Default)]
 pub struct Beliefs {
+    learners: Mutex<VecDeque<(StudyId, Arc<Mutex<Learner>>)>>,
     posteriors: Kept<Posterior>,
-    beliefs: Kept<Belief>,
+    shown: Kept<Belief>,
 }
 
 impl Beliefs {
@@ -88,7 +93,31 @@ impl Beliefs {
     /// When the learner refuses the log.
     pub fn posterior(&self, _: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Posterior>, LearnerError> {
         let plan = &snapshot.study.plan;
-        self.posteriors.get_or(snapshot, || posterior(&plan.search_space, &snapshot.log(), &plan.learner))
+        let learner = self.learner(snapshot.study.id);
+        // Whoever asks for the same study meanwhile waits for this result instead of computing it again.
+        let mut learner = learner.lock().unwrap_or_else(|poisoned| {
+            let mut learner = poisoned.into_inner();
+            *learner = Learner::default();
+            learner
+        });
+        let posterior =
+            self.posteriors.get_or(snapshot, || learner.posterior(&plan.search_space, &snapshot.log(), &plan.learner));
+        if snapshot.trials.len() > MOST_KEPT_TRIALS {
+            *learner = Learner::default();
+        }
+        posterior
+    }
+
+    /// The learner of a study, new where none is kept.
+    fn learner(&self, study: StudyId) -> Arc<Mutex<Learner>> {
+        let mut learners = self.learners.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = learners.iter().position(|(id, _)| *id == study).and_then(|at| learners.remove(at));
+        let (study, learner) = kept.unwrap_or_else(|| (study, Arc::default()));
+        learners.push_back((study, Arc::clone(&learner)));
+        if learners.len() > KEPT_LEARNERS {
+            learners.pop_front();
+        }
+        learner
     }
 
     /// The belief of a study, computed where the log has changed since: CPU work.
@@ -96,7 +125,7 @@ impl Beliefs {
     /// # Errors
     /// When the learner refuses the log.
     pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
-        self.beliefs.get_or(snapshot, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
+        self.shown.get_or(snapshot, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
     }
 }
 
