@@ -165,7 +165,7 @@ impl Default for LearnerSettings {
 }
 
 impl LearnerSettings {
-    /// The recommended settings of a method; the README of this crate has the measurements behind them.
+    /// The recommended settings of a method; docs/benchmarks/learner.md has the measurements behind them.
     pub fn of(method: Method) -> Self {
         match method {
             Method::Eubo => Self {

@@ -1,4 +1,4 @@
-//! The learner learns: its regret on instances that no figure of the README is about, held well below that of random
+//! The learner learns: its regret on instances that no published figure is about, held well below that of random
 //! search. The figures themselves take the `regret` example.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs, unreachable_pub, dead_code)]

@@ -20,8 +20,16 @@ fn repository() -> PathBuf {
 
 /// Every Markdown file of the repository, with its text.
 fn documents() -> BTreeMap<PathBuf, String> {
-    let folders =
-        ["", "docs", "optimizer", "optimizer/data", "optimizer/benches/casadi", "learner", "server/clients/python"];
+    let folders = [
+        "",
+        "docs",
+        "docs/benchmarks",
+        "optimizer",
+        "optimizer/data",
+        "optimizer/benches/casadi",
+        "learner",
+        "server/clients/python",
+    ];
     let mut found = BTreeMap::new();
     for folder in folders {
         let Ok(entries) = std::fs::read_dir(repository().join(folder)) else { continue };

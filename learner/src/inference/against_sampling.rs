@@ -1,6 +1,6 @@
 //! Both approximations against long elliptical slice sampling of the exact posterior (Murray, Adams and MacKay 2010).
 //!
-//! `cargo test --release -p gait-learner sampling -- --nocapture` prints the table of the README.
+//! `cargo test --release -p gait-learner sampling -- --nocapture` prints the table of docs/benchmarks/learner.md.
 
 use super::{Approximate, ExpectationPropagation, Laplace};
 use crate::belief::{Answer, Chain, Process};
@@ -79,7 +79,7 @@ fn both_approximations_against_long_sampling() {
     let space = SearchSpace::new(dimensions).unwrap();
     let kernel = Kernel::new(&space, &crate::posterior::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 3]));
     println!("data                        error of mean (EP, Laplace)   sd (sampled, EP, Laplace)");
-    // The bounds for EP are those of its own error; Laplace's are wide because its error is (see the README).
+    // The bounds for EP are those of its own error; Laplace's are wide because its error is (docs/benchmarks/learner.md).
     for (name, noise, ties, bounds) in [
         ("preferences, noise 0.02", 0.02, false, [0.04, 0.5]),
         ("preferences, noise 0.3", 0.3, false, [0.04, 0.4]),

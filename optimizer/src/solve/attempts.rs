@@ -98,7 +98,7 @@ impl Tried {
 
 /// Tries a warm start, its bounds tightened as they were there. It has the iterations that any attempt has: what goes
 /// nowhere for long may converge all the same, and where no gait is found from it none is found soon otherwise
-/// (optimizer/README.md, warm starts that fail).
+/// (docs/benchmarks/optimizer.md, warm starts that fail).
 pub(super) fn try_warm(
     context: &Context<'_>,
     start: Start,
