@@ -277,7 +277,7 @@ pub struct GaitSettings {
     pub limits: GaitLimits,
     /// Regularisation of the objective.
     pub regularisation: Regularisation,
-    /// Wishes beyond the paper.
+    /// Naturalness terms beyond the paper.
     #[serde(skip_serializing_if = "Naturalness::is_off")]
     pub naturalness: Naturalness,
     /// How the subject's muscles differ from the published table.

@@ -25,8 +25,8 @@ async fn converged(service: &Service, study: StudyId) -> Vec<TrialId> {
     trials.iter().filter(|trial| trial.state == TrialState::Converged).map(|trial| trial.id).collect()
 }
 
-async fn objections(service: &Service, study: StudyId) -> Vec<Value> {
-    let all = service.fetch(&format!("/api/v1/studies/{study}/objections")).await.json();
+async fn safety_reports(service: &Service, study: StudyId) -> Vec<Value> {
+    let all = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.json();
     all.as_array().unwrap().clone()
 }
 
@@ -44,7 +44,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
     let pair = service.post(&format!("/api/v1/studies/{study}/blind/next"), &json!({})).await.json();
     let answer = format!("/api/v1/blind/{}/answer", pair["pair"]["token"].as_str().unwrap());
     assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::CREATED);
-    let said = objections(&service, study).await;
+    let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");
     assert_eq!((&said[0]["stands"], &said[0]["review"]), (&json!(true), &Value::Null));
     let gait = said[0]["trial_id"].as_str().unwrap().to_owned();
@@ -64,7 +64,7 @@ async fn what_a_rater_called_unsafe_is_lifted_by_staff_and_stays_in_the_record()
 
     let walkable = json!({"verdict": "walkable", "reason": "the video was cut", "author": "K2"});
     assert_eq!(decide(&service, &gait, &walkable).await.status, StatusCode::CREATED);
-    let said = objections(&service, study).await;
+    let said = safety_reports(&service, study).await;
     assert_eq!((&said[0]["stands"], &said[0]["review"]["reason"]), (&json!(false), &json!("the video was cut")));
     let shown = service.fetch(&format!("/trials/{gait}")).await.text;
     assert!(!shown.contains("do not walk with it") && shown.contains("lets it be walked with again"), "{shown}");
@@ -107,7 +107,7 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
     assert!(for_the_device.text.contains("nobody walks with it"), "{}", for_the_device.text);
-    let seen = objections(&service, study).await[0]["at"].clone();
+    let seen = safety_reports(&service, study).await[0]["at"].clone();
     tokio::time::sleep(std::time::Duration::from_millis(2)).await;
     service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
     let late = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r", "said_until": seen})).await;
@@ -152,7 +152,7 @@ async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
         service.post(&format!("/api/v1/lab/{id}/walks"), &json!({"walk": walk})).await;
     }
     service.post(&format!("/api/v1/lab/{id}/answers"), &json!({"number": 1, "answer": "unsafe_first"})).await;
-    assert_eq!(objections(&service, study).await.len(), 2, "which of the two would tell the order");
+    assert_eq!(safety_reports(&service, study).await.len(), 2, "which of the two would tell the order");
     for gait in &gaits[..2] {
         let lifted =
             decide(&service, gait, &json!({"verdict": "walkable", "reason": "he stumbled over a cable"})).await;
@@ -163,8 +163,8 @@ async fn what_was_lifted_in_the_lab_is_said_anew_when_the_order_is_told() {
     tokio::time::sleep(std::time::Duration::from_millis(2)).await;
     service.post(&format!("/api/v1/lab-sessions/{id}/unblind"), &json!({"reason": "walked"})).await;
     let row = lab_sessions::of_study(&mut service.store.read().await.unwrap(), study).await.unwrap().remove(0);
-    let mut snapshot = objections(&service, study).await;
-    snapshot.retain(|objection| objection["stands"] == json!(true));
+    let mut snapshot = safety_reports(&service, study).await;
+    snapshot.retain(|report| report["stands"] == json!(true));
     assert_eq!(snapshot.iter().map(|said| &said["trial_id"]).collect::<Vec<_>>(), [&json!(row.walked().unwrap().0)]);
     service.stop().await;
 }

@@ -239,7 +239,7 @@ impl DomainResiduals<'_> {
         worst.note(point, &TORQUE, self.limits.torque(u));
     }
 
-    /// Least force of contact row `c`: what the wish for gradual weight transfer leaves on the trailing foot, and what a
+    /// Least force of contact row `c`: what gradual weight transfer leaves on the trailing foot, and what a
     /// contact has until it lifts off, N.
     fn kept_load(&self, c: usize, row: ContactRow, share: f64) -> Option<f64> {
         let settings = &self.gait.settings;

@@ -1,4 +1,4 @@
-//! Wishes beyond the paper, all off by default: what makes a gait look natural, and is not asked for by its constraints.
+//! Naturalness terms beyond the paper, all off by default: what makes a gait look natural beyond its constraints.
 //!
 //! The speed band and the shortest double supports are limits ([`super::GaitLimits`]); `examples/naturalness.rs`
 //! measures what each of them does.
@@ -6,7 +6,7 @@
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// Wishes beyond the paper.
+/// Naturalness terms beyond the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Naturalness {
@@ -19,7 +19,7 @@ pub struct Naturalness {
 }
 
 impl Naturalness {
-    /// Whether nothing is wished.
+    /// Whether all terms are off.
     pub fn is_off(&self) -> bool {
         *self == Self::default()
     }

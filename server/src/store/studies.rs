@@ -346,7 +346,7 @@ pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -
 ///
 /// # Errors
 /// What the database reports.
-pub async fn with_objections(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(
         "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and ",

@@ -72,7 +72,7 @@ pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option
 /// # Errors
 /// As [`best_converged`].
 pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(snapshot, belief, |trial| !snapshot.grounds.objections.closes(trial.id))
+    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial.id))
 }
 
 /// Converged trials by posterior mean, the earliest of equals first.
@@ -111,7 +111,7 @@ pub fn ranking_to_show(
 /// tell.
 pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
     let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
-    (best.state == TrialState::Converged && !snapshot.grounds.objections.closes(best.id)).then_some(best.id)
+    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best.id)).then_some(best.id)
 }
 
 fn reason_in_words(reason: ProposalReason) -> String {

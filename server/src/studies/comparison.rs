@@ -86,7 +86,7 @@ pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, L
         comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
     let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
     let mut pairs = open.filter_map(|q| Some((snapshot.trial_of(q.action)?, snapshot.trial_of(q.against)?)));
-    let Some((first, second)) = pairs.find(|(a, b)| !snapshot.grounds.objections.is_skipped((a.id, b.id))) else {
+    let Some((first, second)) = pairs.find(|(a, b)| !snapshot.grounds.safety_reports.is_skipped((a.id, b.id))) else {
         return Ok(Question::None);
     };
     Ok(match (snapshot.walkable(first), snapshot.walkable(second)) {

@@ -80,7 +80,7 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
-    let both_open = [&first, &second].iter().all(|trial| !grounds.objections.closes(trial.id));
+    let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.closes(trial.id));
     let heard = said.heard(pair).filter(|_| both_open && !is_same_gait(&first, &second));
     match heard {
         Some(said) => Ok(Some(feedback::append(writer, study, &said, voice).await?)),

@@ -1,6 +1,6 @@
 //! Staff look at a gait that was called unsafe, and decide: one way in for the form and the REST interface.
 
-use super::objections::{Closed, Objections, SafetyReportSource};
+use super::safety_reports::{Closed, SafetyReportSource, SafetyReports};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -27,13 +27,13 @@ pub struct Decision {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
-    /// When the newest objection was made that the caller has seen: after a newer one the decision is refused. By default
-    /// every objection counts as seen.
+    /// When the newest safety report was made that the caller has seen: after a newer one the decision is refused. By default
+    /// every safety report counts as seen.
     #[serde(default)]
     pub said_until: Option<Instant>,
 }
 
-/// Writes a decision. Where the gait may be walked with again, what the learner heard of the objections is taken back.
+/// Writes a decision. Where the gait may be walked with again, what the learner heard of the safety reports is taken back.
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] when nobody calls the gait unsafe, when
@@ -48,7 +48,7 @@ pub async fn give(
     consents::may_be_shown(writer, trial.study_id).await?;
     let author = printable::name("author", decision.author.as_deref().unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", &decision.reason, ": why it is decided so")?;
-    let closed = Objections::read(writer, trial.study_id).await?.closing(id);
+    let closed = SafetyReports::read(writer, trial.study_id).await?.closing(id);
     let number = trial.number;
     let newest = closed.iter().max_by_key(|closed| closed.at);
     let newest =
@@ -67,7 +67,7 @@ pub async fn give(
     events::append(writer, trial.study_id, "safety_reviewed", &payload).await?;
     let said: Vec<_> = closed.iter().map(|closed| json!({ "by": closed.by, "at": closed.at })).collect();
     let detail = json!({
-        "study": trial.study_id, "verdict": verdict, "author": author, "reason": reason, "objections": said,
+        "study": trial.study_id, "verdict": verdict, "author": author, "reason": reason, "safety_reports": said,
     });
     audit::append(writer, &caller.actor, "gait.review", &format!("trial {id}"), &detail).await?;
     Ok(safety_reviews::get(writer, made).await?)

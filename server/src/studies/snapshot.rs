@@ -126,7 +126,8 @@ impl StudySnapshot {
     /// Actions whose gaits Gait RMSE compares: they exist, and no safety report against them is open. Nobody walks because
     /// of such a comparison, so it does not wait for certificates.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown = |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.objections.closes(trial.id);
+        let shown =
+            |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.closes(trial.id);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 

@@ -3,7 +3,7 @@
 //! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, planned session,
 //! comparison and recommendation takes one, so a way to a person that skips the rules does not compile.
 
-use super::objections::Objections;
+use super::safety_reports::SafetyReports;
 use crate::error::Error;
 use crate::store::certificates::{self, CertificateOnRecord};
 use crate::store::trials::{Trial, TrialState};
@@ -138,7 +138,7 @@ impl From<NotWalkable> for Error {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Grounds {
     /// Safety reports and what staff decided.
-    pub objections: Objections,
+    pub safety_reports: SafetyReports,
     /// Certificates of converged trials.
     pub certificates: HashMap<TrialId, CertificateOnRecord>,
     /// Whether the subject withdrew.
@@ -152,7 +152,7 @@ impl Grounds {
     /// What the database reports.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         Ok(Self {
-            objections: Objections::read(db, study).await?,
+            safety_reports: SafetyReports::read(db, study).await?,
             certificates: certificates::of_study(db, study).await?,
             withdrawn: consents::is_withdrawn(db, study).await?,
         })
@@ -169,7 +169,7 @@ impl Grounds {
             found.extend(certificates::of_trial(db, trial).await?.map(|certificate| (trial, certificate)));
         }
         Ok(Self {
-            objections: Objections::read(db, study).await?,
+            safety_reports: SafetyReports::read(db, study).await?,
             certificates: found,
             withdrawn: consents::is_withdrawn(db, study).await?,
         })
@@ -187,7 +187,7 @@ impl Grounds {
         if trial.state != TrialState::Converged {
             return Err(NotWalkable::NotConverged { number, state: trial.state.as_str() });
         }
-        if let Some(closed) = self.objections.closed.iter().find(|closed| closed.trial == trial.id) {
+        if let Some(closed) = self.safety_reports.closed.iter().find(|closed| closed.trial == trial.id) {
             return Err(NotWalkable::ReportedUnsafe { number, by: closed.by.clone() });
         }
         let certified = match self.certificates.get(&trial.id) {

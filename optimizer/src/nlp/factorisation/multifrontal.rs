@@ -6,7 +6,7 @@
 //! singular breaks the factorisation down (`None`), one that is nearly so shows in the residual, and either way the
 //! caller regularises or changes the method.
 //!
-//! Several threads ([`super::crew`]) factorise independent parts of the forest at once ([`super::schedule`]). Each front is
+//! Several threads ([`super::worker_threads`]) factorise independent parts of the forest at once ([`super::schedule`]). Each front is
 //! computed by one thread, from its own entries and then its children in fixed order, so the result is bit for bit that of
 //! one thread.
 
@@ -19,13 +19,13 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::aligned::Aligned;
 use super::bunch_kaufman::{self, Pivots};
-use super::crew::{Crew, Job};
 use super::dense_kernels::all_finite;
 use super::front::{ChildMap, Front, PivotKind, Place, RoomForDeferred};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
 use super::schedule::{Direction, Piece, Schedule};
 use super::substitution::{Space, Substitution};
+use super::worker_threads::{Job, WorkerThreads};
 use crate::nlp::status::NlpError;
 
 /// Operations below which starting threads costs more than it saves.
@@ -69,7 +69,7 @@ pub(super) struct Multifrontal {
     order: usize,
     forest: Arc<Forest>,
     /// The threads beside the caller's.
-    crew: Option<Crew>,
+    threads: Option<WorkerThreads>,
     /// Positions of the diagonals that stage 1 neglects.
     neglected: Vec<u32>,
 }
@@ -83,7 +83,7 @@ struct Forest {
     substitution: Substitution,
     /// By thread.
     workspaces: Vec<Mutex<(Workspace, Space)>>,
-    /// What the crew is called for.
+    /// What the threads are called for.
     call: RwLock<(Pass, Vec<f64>)>,
 }
 
@@ -158,8 +158,8 @@ impl Multifrontal {
             call: RwLock::new((Pass::Forward, Vec::with_capacity(if threads > 1 { longest } else { 0 }))),
             fronts,
         });
-        let crew = (threads > 1).then(|| Crew::new(&forest, threads - 1));
-        Ok(Self { order, forest, crew, neglected })
+        let threads = (threads > 1).then(|| WorkerThreads::new(&forest, threads - 1));
+        Ok(Self { order, forest, threads, neglected })
     }
 
     /// Multiplications and additions of a factorisation.
@@ -171,7 +171,7 @@ impl Multifrontal {
     fn go_over(&self, pass: Pass, numbers: &[f64]) -> bool {
         let forest = &self.forest;
         forest.schedule.begin(if matches!(pass, Pass::Backward) { Direction::Down } else { Direction::Up });
-        let Some(crew) = &self.crew else {
+        let Some(threads) = &self.threads else {
             forest.take_part_in(pass, numbers, 0);
             return true;
         };
@@ -181,7 +181,7 @@ impl Multifrontal {
             call.1.clear();
             call.1.extend_from_slice(numbers);
         }
-        crew.call(&**forest)
+        threads.call(&**forest)
     }
 }
 

@@ -21,11 +21,11 @@ mod lab_recordings;
 mod lab_sessions;
 mod members;
 mod motion;
-mod objections;
 mod preferences;
 mod recommendation;
 mod reference_gaits;
 mod remarks;
+mod safety_reports;
 mod scripts;
 mod sessions;
 mod studies;
@@ -141,8 +141,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(remarks::of_study, remarks::create))
         .routes(routes!(remarks::get))
         .routes(routes!(remarks::retract))
-        .routes(routes!(objections::of_study))
-        .routes(routes!(objections::review))
+        .routes(routes!(safety_reports::of_study))
+        .routes(routes!(safety_reports::review))
         // access
         .routes(routes!(users::me))
         .routes(routes!(users::list, users::create))

@@ -17,7 +17,7 @@ use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Instant, StoreError, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 use crate::studies::explanation::{self, ExplanationState};
-use crate::studies::objections::{Closed, Objections};
+use crate::studies::safety_reports::{Closed, SafetyReports};
 use askama::Template;
 use axum::extract::State;
 use gait_optimizer::walking::stick_figure::stick_figures;
@@ -58,7 +58,7 @@ struct GaitPage {
 }
 
 impl GaitPage {
-    /// When the newest of the objections was made.
+    /// When the newest of the safety reports was made.
     fn said_until(&self) -> Option<Instant> {
         self.unsafe_by.iter().map(|closed| closed.at).max()
     }
@@ -80,7 +80,7 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
         Err(error) => return Err(error.into()),
     };
     let iterations = if gait.is_some() { gaits::iterations(&mut reader, id).await? } else { Vec::new() };
-    let Objections { closed: mut unsafe_by, mut lifted, .. } = Objections::read(&mut reader, study.id).await?;
+    let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = SafetyReports::read(&mut reader, study.id).await?;
     for said in [&mut unsafe_by, &mut lifted] {
         said.retain(|closed| closed.trial == id);
     }

@@ -11,7 +11,7 @@ use crate::plots::sparkline;
 use crate::store::studies::{Study, StudyState};
 use crate::store::trials::TrialCounts;
 use crate::store::{Connection, StudyId, consents, studies, subjects, trials};
-use crate::studies::objections;
+use crate::studies::safety_reports;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -84,7 +84,7 @@ async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page 
     for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    let unsafe_gaits = objections::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
+    let unsafe_gaits = safety_reports::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
     let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
     let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;

@@ -16,8 +16,8 @@ use crate::store::{
 };
 use crate::studies::answer as answering;
 use crate::studies::comparison::open_question;
-use crate::studies::objections::Objections;
 use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::safety_reports::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use serde::{Deserialize, Serialize};
@@ -76,8 +76,8 @@ pub async fn next<'a>(
 ) -> Result<(LentWriter<'a>, Option<Sided>), Error> {
     let question = question(store, study).await?;
     let mut writer = store.write().await?;
-    let objections = Objections::read(&mut writer, study).await?;
-    let closed: Vec<TrialId> = objections.closed.iter().map(|closed| closed.trial).collect();
+    let safety_reports = SafetyReports::read(&mut writer, study).await?;
+    let closed: Vec<TrialId> = safety_reports.closed.iter().map(|closed| closed.trial).collect();
     let mut own = presentations::of_study(&mut writer, study).await?;
     own.retain(|shown| shown.rater == caller.name);
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
@@ -92,7 +92,7 @@ pub async fn next<'a>(
         withdraw(&mut writer, open).await?;
     }
     let is_closed = |pair: &(TrialId, TrialId)| {
-        closed.contains(&pair.0) || closed.contains(&pair.1) || objections.is_skipped(*pair)
+        closed.contains(&pair.0) || closed.contains(&pair.1) || safety_reports.is_skipped(*pair)
     };
     let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
     let lot = Lot::draw()?;

@@ -35,8 +35,8 @@ use crate::studies::choice::{MANY, last_believed, ranking_to_show};
 use crate::studies::comparison::open_question;
 use crate::studies::history::{self, Milestone};
 use crate::studies::lifecycle::{Act, acts_of_people};
-use crate::studies::objections::{Closed, SafetyReportSource};
 use crate::studies::recommended::{self, CertificateState, Judged};
+use crate::studies::safety_reports::{Closed, SafetyReportSource};
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::{command, lifecycle};
 use crate::workers::Track;
@@ -456,7 +456,7 @@ fn view(
         let reviewed = closed.review.is_some();
         Some(UnsafeGait { id: closed.trial, number, by: closed.by.clone(), at: closed.at, reviewed })
     };
-    let unsafe_gaits = snapshot.grounds.objections.closed.iter().filter_map(unsafe_gait).collect();
+    let unsafe_gaits = snapshot.grounds.safety_reports.closed.iter().filter_map(unsafe_gait).collect();
     let converged = snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged).count();
     let files = format!("/api/v1/studies/{}/figures", snapshot.study.id);
     let acts = if may_run { acts_of_people(snapshot.study.state) } else { Vec::new() };
@@ -505,7 +505,7 @@ fn answers(snapshot: &StudySnapshot, remarks: &[Remark]) -> Vec<AnswerRow> {
     let why = |retraction: &Option<Retraction>| Some(format!("taken back: {}", retraction.as_ref()?.reason));
     let lifted = |id| {
         let of_it = |closed: &&Closed| closed.said == SafetyReportSource::Staff(id);
-        let review = snapshot.grounds.objections.lifted.iter().find(of_it)?.review.as_ref()?;
+        let review = snapshot.grounds.safety_reports.lifted.iter().find(of_it)?.review.as_ref()?;
         Some(format!("may be walked with again, {}: {}", review.author, review.reason))
     };
     let preference = |row: &FeedbackRow| {

@@ -43,8 +43,8 @@ pub enum SafetyReportSource {
 /// What the database reports.
 pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
     let mut found = Vec::new();
-    for study in studies::with_objections(db, reach, limit).await? {
-        let closed = Objections::read(db, study.id).await?.closed.into_iter();
+    for study in studies::with_safety_reports(db, reach, limit).await? {
+        let closed = SafetyReports::read(db, study.id).await?.closed.into_iter();
         let waiting: HashSet<TrialId> = closed.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
         if !waiting.is_empty() {
             found.push((study, waiting.len()));
@@ -53,9 +53,9 @@ pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreRe
     Ok(found)
 }
 
-/// What was objected to in a study.
+/// The safety reports of a study, and the pairs that nobody is asked about again.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Objections {
+pub struct SafetyReports {
     /// Gaits that must not be walked.
     pub closed: Vec<Closed>,
     /// What closed a gait until staff let it be walked with again.
@@ -64,7 +64,7 @@ pub struct Objections {
     pub skipped: Vec<(TrialId, TrialId)>,
 }
 
-impl Objections {
+impl SafetyReports {
     /// Those that stand.
     ///
     /// # Errors

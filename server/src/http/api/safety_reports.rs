@@ -9,7 +9,7 @@ use crate::http::reached::Id;
 use crate::http::shown::Shown;
 use crate::store::safety_reviews::{SafetyReview, SafetyVerdict};
 use crate::store::{Instant, StudyId, TrialId, studies};
-use crate::studies::objections::{Closed, Objections};
+use crate::studies::safety_reports::{Closed, SafetyReports};
 use crate::studies::safety_review::{self, Decision};
 use axum::Json;
 use axum::extract::State;
@@ -20,7 +20,7 @@ use utoipa::ToSchema;
 
 /// That somebody called a gait unsafe.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Objection {
+pub(super) struct SafetyReport {
     /// The trial whose gait it is.
     trial_id: TrialId,
     /// Who said so.
@@ -33,7 +33,7 @@ pub(super) struct Objection {
     review: Option<SafetyReview>,
 }
 
-impl From<Closed> for Objection {
+impl From<Closed> for SafetyReport {
     fn from(closed: Closed) -> Self {
         let Closed { trial, by, at, review, .. } = closed;
         let stands = review.as_ref().is_none_or(|review| review.verdict == SafetyVerdict::Unsafe);
@@ -41,29 +41,29 @@ impl From<Closed> for Objection {
     }
 }
 
-/// `GET /studies/{id}/objections`: every time that a gait was called unsafe, also what was lifted since.
+/// `GET /studies/{id}/safety-reports`: every time that a gait was called unsafe, also what was lifted since.
 ///
 /// By raters, in remarks and in lab sessions; what its author took back is left out. Of a lab session whose order was not told
 /// both gaits are named.
 #[utoipa::path(
     get,
-    path = "/studies/{id}/objections",
+    path = "/studies/{id}/safety-reports",
     operation_id = "list_safety_reports",
     tag = "preferences",
     params(("id" = StudyId, Path, description = "The study")),
-    responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Vec<Objection>)),
+    responses((status = 200, description = "Every time that a gait was called unsafe, by time", body = Vec<SafetyReport>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
     _: May<Read>,
     State(app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
-) -> Result<Json<Vec<Objection>>, Error> {
+) -> Result<Json<Vec<SafetyReport>>, Error> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let Objections { closed, lifted, .. } = Objections::read(&mut reader, id).await?;
-    let mut all: Vec<Objection> = closed.into_iter().chain(lifted).map(Into::into).collect();
-    all.sort_by_key(|objection| objection.at);
+    let SafetyReports { closed, lifted, .. } = SafetyReports::read(&mut reader, id).await?;
+    let mut all: Vec<SafetyReport> = closed.into_iter().chain(lifted).map(Into::into).collect();
+    all.sort_by_key(|report| report.at);
     Ok(Json(all))
 }
 

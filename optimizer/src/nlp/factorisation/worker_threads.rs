@@ -9,7 +9,7 @@ use std::thread::{Builder, JoinHandle, park, yield_now};
 
 /// Work that several threads share.
 pub(super) trait Job: Send + Sync + 'static {
-    /// Takes part, as number `member` of the crew (the caller is 0), until nothing is left.
+    /// Takes part, as thread number `member` (the caller is 0), until nothing is left.
     fn take_part(&self, member: usize);
 }
 
@@ -29,12 +29,12 @@ struct Signal {
 }
 
 /// Threads beside the caller's.
-pub(super) struct Crew {
+pub(super) struct WorkerThreads {
     signal: Arc<Signal>,
     members: Vec<JoinHandle<()>>,
 }
 
-impl Crew {
+impl WorkerThreads {
     /// Threads for a job, as many as asked for beside the caller's, or as can be had.
     pub(super) fn new<J: Job>(job: &Arc<J>, others: usize) -> Self {
         let signal = Arc::new(Signal::default());
@@ -64,7 +64,7 @@ impl Crew {
     }
 }
 
-impl Drop for Crew {
+impl Drop for WorkerThreads {
     fn drop(&mut self) {
         self.signal.closed.store(true, Ordering::Release);
         for member in self.members.drain(..) {
@@ -75,7 +75,7 @@ impl Drop for Crew {
     }
 }
 
-/// What a member does until the crew is dropped.
+/// What a member does until [`WorkerThreads`] is dropped.
 fn serve(job: &impl Job, signal: &Signal, member: usize) {
     let (mut heard, mut looks) = (0, 0);
     while !signal.closed.load(Ordering::Acquire) {
@@ -132,10 +132,10 @@ mod tests {
     #[test]
     fn nlp_every_call_is_done_when_it_returns_also_after_a_sleep() {
         let job = count(3);
-        let crew = Crew::new(&job, 2);
+        let threads = WorkerThreads::new(&job, 2);
         for round in 1..=50 {
             job.left.store(100, Ordering::Release);
-            assert!(crew.call(&*job));
+            assert!(threads.call(&*job));
             assert_eq!(job.by_member.lock().map(|counts| counts.iter().sum::<usize>()).ok(), Some(100 * round));
             if round == 25 {
                 std::thread::sleep(std::time::Duration::from_millis(300));
@@ -146,12 +146,12 @@ mod tests {
     #[test]
     fn nlp_a_member_that_panics_is_told_of_and_not_waited_for() {
         let job = count(2);
-        let crew = Crew::new(&job, 1);
+        let threads = WorkerThreads::new(&job, 1);
         job.panics.store(true, Ordering::Relaxed);
         job.left.store(10, Ordering::Release);
-        assert!(!crew.call(&*job));
+        assert!(!threads.call(&*job));
         job.left.store(10, Ordering::Release);
-        assert!(crew.call(&*job), "the caller does it alone");
+        assert!(threads.call(&*job), "the caller does it alone");
         assert_eq!(job.left.load(Ordering::Acquire), 0);
     }
 }
