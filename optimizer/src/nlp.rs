@@ -4,11 +4,10 @@
 //! interior point with a filter line search (Wächter & Biegler, Math. Program. 106, 2006). The path of a solve:
 //!
 //! `solve` -> `formulation` (slacks, fixed variables, scaling) -> `interior_point` { `optimality`, `barrier`,
-//! `inertia_correction`, `newton` (assembly in `kkt`, `factorisation`), `line_search` with `filter`, and `feasibility` when the line search fails } -> `status::NlpResult`.
+//! `inertia_correction`, `newton` (assembly in `kkt`, `factorisation`), `line_search` with `filter`, and `restoration` when the line search fails } -> `status::NlpResult`.
 
 mod barrier;
 mod factorisation;
-mod feasibility;
 mod filter;
 mod formulation;
 mod inertia_correction;
@@ -18,6 +17,7 @@ mod line_search;
 mod newton;
 mod optimality;
 mod problem;
+mod restoration;
 mod settings;
 mod solve;
 mod start;

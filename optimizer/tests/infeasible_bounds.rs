@@ -1,4 +1,4 @@
-//! Bounds that no gait meets: how the solver ends on a spread of them. One fault of the linear algebra or of the feasibility phase
+//! Bounds that no gait meets: how the solver ends on a spread of them. One fault of the linear algebra or of the restoration phase
 //! shows here first, as ends that only gave up.
 
 #![allow(clippy::unwrap_used)]
@@ -64,7 +64,7 @@ fn nearly_every_start_on_bounds_without_a_gait_ends_at_a_stationary_point_of_the
 }
 
 /// Where bounds hardly leave a gait, a point that creeps towards the rows with steps of a hundredth (a thousand iterations with
-/// two per cent of what was left each) is helped by the feasibility phase.
+/// two per cent of what was left each) is helped by the restoration phase.
 #[test]
 fn long_a_start_at_the_edge_of_what_is_feasible_does_not_end_at_its_limit() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {

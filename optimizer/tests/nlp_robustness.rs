@@ -315,8 +315,8 @@ fn nlp_the_observer_sees_every_iterate_and_both_phases() {
     let r = r.unwrap();
     assert_eq!(numbers.first(), Some(&0));
     assert!(numbers.windows(2).all(|w| w[1] == w[0] || w[1] == w[0] + 1), "{numbers:?}");
-    assert!(phases.contains(&Phase::Feasibility));
-    assert_eq!(r.counts.regular_iterations + r.counts.feasibility_iterations, r.iterations);
+    assert!(phases.contains(&Phase::Restoration));
+    assert_eq!(r.counts.regular_iterations + r.counts.restoration_iterations, r.iterations);
 }
 
 #[test]

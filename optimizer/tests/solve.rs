@@ -127,7 +127,7 @@ fn bounds_that_leave_no_posture_are_tried_all_the_same() {
         "cold, direct, early rise, stride time 1.1 s, stride length 1.25 m",
         "cold, direct, more regularisation",
         "cold, direct, adaptive barrier",
-        "cold, direct, early elastic phase",
+        "cold, direct, early restoration",
         "cold, direct, rises early right, early left",
         "cold, direct, rises late right, early left",
         "cold, direct, rises late right, late left",

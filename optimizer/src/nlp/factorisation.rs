@@ -1,5 +1,5 @@
 //! Factorisations of the KKT matrix behind one trait (`kkt_solver`), chosen by structure and setting in `linear_solver`:
-//! `multifrontal` (`front`, `null_space`, `bunch_kaufman`, `substitution`; `schedule` and `worker_threads` share the work among threads), `supernodal` (faer) and
+//! `multifrontal` (`front`, `null_space`, `bunch_kaufman`, `substitution`; `schedule` and `thread_pool` share the work among threads), `supernodal` (faer) and
 //! `delayed_pivots`, the most trusted; fallbacks are analysed when they are needed (`lazy_solver`).
 
 mod aligned;
@@ -20,7 +20,7 @@ mod ordering;
 mod schedule;
 mod substitution;
 mod supernodal;
-mod worker_threads;
+mod thread_pool;
 
 pub(super) use dense_kernels::{all_finite, largest_magnitude};
 pub(super) use kkt_solver::{Change, Inertia, KktSolver};

@@ -1,11 +1,11 @@
 //! The problem in the form the interior point works on.
 //!
-//! minimise F(w) subject to c(w) = 0 and l <= w <= u, with w = (x, t). Each *attached* variable t_k occurs in
-//! exactly one row, with coefficient a_k = +1 or -1, and has no curvature, so it can be eliminated into the diagonal
+//! minimise F(w) subject to c(w) = 0 and l <= w <= u, with w = (x, t). Each *row variable* t_k, a slack or an
+//! elastic, occurs in exactly one row, with coefficient a_k = +1 or -1, and has no curvature, so it can be eliminated into the diagonal
 //! of its row:
 //!
 //! * an inequality row g_L <= g(x) <= g_U becomes g(x) - s = 0 with g_L <= s <= g_U;
-//! * in the feasibility phase every row carries elastics, g(x) - ... - p + n = 0 with p, n >= 0, and
+//! * in the restoration phase every row carries elastics, g(x) - ... - p + n = 0 with p, n >= 0, and
 //!   F(w) = rho sum(p + n) + zeta/2 |D (x - x_R)|^2 (WB06 section 3.3).
 //!
 //! Either way the KKT matrix has order n + m and the same pattern. Fixed variables (x_L = x_U) keep their index with
@@ -22,7 +22,7 @@ use super::status::NlpError;
 pub(super) enum RowKind {
     /// g_i(x) = target.
     Equality(f64),
-    /// g_i(x) = slack, the attached variable with this index.
+    /// g_i(x) = slack, the row variable with this index.
     Inequality(usize),
     /// No bounds at all.
     Free,
@@ -30,7 +30,7 @@ pub(super) enum RowKind {
 
 /// A variable that occurs in one row only.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Attached {
+pub(super) struct RowVariable {
     pub row: usize,
     /// Its coefficient in that row, +1 or -1.
     pub sign: f64,
@@ -38,11 +38,11 @@ pub(super) struct Attached {
 
 /// The objective F.
 #[derive(Debug, Clone)]
-pub(super) enum Goal {
+pub(super) enum Objective {
     /// f(x), scaled.
     Program,
-    /// The elastic objective; elastics are the attached variables from `first` on.
-    Feasibility { first: usize, rho: f64, zeta: f64, reference: Vec<f64>, weight: Vec<f64> },
+    /// The elastic objective; elastics are the row variables from `first` on.
+    Restoration { first: usize, rho: f64, zeta: f64, reference: Vec<f64>, weight: Vec<f64> },
 }
 
 /// Time and number of evaluations.
@@ -61,13 +61,13 @@ pub(super) struct Formulation<'p> {
     pub m: usize,
     pub fixed: Vec<Option<f64>>,
     pub rows: Vec<RowKind>,
-    pub attached: Vec<Attached>,
+    pub row_variables: Vec<RowVariable>,
     /// Relaxed l and u of w, infinite where there is none.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
     pub objective_scale: f64,
     pub row_scale: Vec<f64>,
-    pub goal: Goal,
+    pub objective: Objective,
     pub tally: EvaluationTally,
     jacobian_zeros: Vec<usize>,
     hessian_zeros: Vec<usize>,
@@ -95,7 +95,7 @@ impl<'p> Formulation<'p> {
                 upper[j] = f64::INFINITY;
             }
         }
-        let mut attached = Vec::new();
+        let mut row_variables = Vec::new();
         let mut rows = Vec::with_capacity(m);
         for i in 0..m {
             rows.push(if row_lower[i] == row_upper[i] {
@@ -103,10 +103,10 @@ impl<'p> Formulation<'p> {
             } else if row_lower[i].is_infinite() && row_upper[i].is_infinite() {
                 RowKind::Free
             } else {
-                attached.push(Attached { row: i, sign: -1.0 });
+                row_variables.push(RowVariable { row: i, sign: -1.0 });
                 lower.push(row_lower[i]);
                 upper.push(row_upper[i]);
-                RowKind::Inequality(attached.len() - 1)
+                RowKind::Inequality(row_variables.len() - 1)
             });
         }
         let jacobian = program.jacobian_pattern();
@@ -123,12 +123,12 @@ impl<'p> Formulation<'p> {
             m,
             fixed,
             rows,
-            attached,
+            row_variables,
             lower,
             upper,
             objective_scale: 1.0,
             row_scale: vec![1.0; m],
-            goal: Goal::Program,
+            objective: Objective::Program,
             tally: EvaluationTally::default(),
             jacobian_zeros,
             hessian_zeros,
@@ -181,19 +181,19 @@ impl<'p> Formulation<'p> {
 
     /// Length of w.
     pub(super) fn length(&self) -> usize {
-        self.n + self.attached.len()
+        self.n + self.row_variables.len()
     }
 
     /// F(w); NaN or infinite when it cannot be evaluated.
     pub(super) fn objective(&mut self, w: &[f64]) -> f64 {
-        match &self.goal {
-            Goal::Program => {
+        match &self.objective {
+            Objective::Program => {
                 let clock = Instant::now();
                 let value = self.objective_scale * self.program.objective(&w[..self.n]);
                 self.tally.seconds += clock.elapsed().as_secs_f64();
                 value
             }
-            Goal::Feasibility { first, rho, zeta, reference, weight } => {
+            Objective::Restoration { first, rho, zeta, reference, weight } => {
                 let elastic: f64 = w[self.n + first..].iter().sum();
                 let drift: f64 = (0..self.n).map(|j| (weight[j] * (w[j] - reference[j])).powi(2)).sum();
                 rho * elastic + 0.5 * zeta * drift
@@ -205,8 +205,8 @@ impl<'p> Formulation<'p> {
     pub(super) fn gradient(&mut self, w: &[f64], gradient: &mut [f64]) {
         let n = self.n;
         gradient.fill(0.0);
-        match &self.goal {
-            Goal::Program => {
+        match &self.objective {
+            Objective::Program => {
                 let clock = Instant::now();
                 self.program.gradient(&w[..n], &mut gradient[..n]);
                 for j in 0..n {
@@ -214,7 +214,7 @@ impl<'p> Formulation<'p> {
                 }
                 self.tally.seconds += clock.elapsed().as_secs_f64();
             }
-            Goal::Feasibility { first, rho, zeta, reference, weight } => {
+            Objective::Restoration { first, rho, zeta, reference, weight } => {
                 for j in 0..n {
                     gradient[j] = zeta * weight[j] * weight[j] * (w[j] - reference[j]);
                 }
@@ -234,7 +234,7 @@ impl<'p> Formulation<'p> {
                 RowKind::Free => 0.0,
             };
         }
-        for (a, t) in self.attached.iter().zip(&w[self.n..]) {
+        for (a, t) in self.row_variables.iter().zip(&w[self.n..]) {
             c[a.row] += a.sign * t;
         }
         self.tally.seconds += clock.elapsed().as_secs_f64();
@@ -263,9 +263,9 @@ impl<'p> Formulation<'p> {
                 self.scaled_multipliers[i] = y[i] * self.row_scale[i];
             }
         }
-        let sigma = match self.goal {
-            Goal::Program => self.objective_scale,
-            Goal::Feasibility { .. } => 0.0,
+        let sigma = match self.objective {
+            Objective::Program => self.objective_scale,
+            Objective::Restoration { .. } => 0.0,
         };
         self.program.hessian(&w[..self.n], sigma, &self.scaled_multipliers, values);
         for &q in &self.hessian_zeros {
@@ -276,7 +276,7 @@ impl<'p> Formulation<'p> {
 
     /// Adds the diagonal of the Hessian of F that is not in the pattern.
     pub(super) fn add_curvature(&self, diagonal: &mut [f64]) {
-        if let Goal::Feasibility { zeta, weight, .. } = &self.goal {
+        if let Objective::Restoration { zeta, weight, .. } = &self.objective {
             for (d, weight) in diagonal[..self.n].iter_mut().zip(weight) {
                 *d += zeta * weight * weight;
             }
@@ -285,7 +285,7 @@ impl<'p> Formulation<'p> {
 
     /// out += that diagonal times d.
     pub(super) fn add_curvature_product(&self, d: &[f64], out: &mut [f64]) {
-        if let Goal::Feasibility { zeta, weight, .. } = &self.goal {
+        if let Objective::Restoration { zeta, weight, .. } = &self.objective {
             for ((out, d), weight) in out[..self.n].iter_mut().zip(d).zip(weight) {
                 *out += zeta * weight * weight * d;
             }
@@ -312,7 +312,7 @@ impl<'p> Formulation<'p> {
             }
             out[j] += sum;
         }
-        for (k, a) in self.attached.iter().enumerate() {
+        for (k, a) in self.row_variables.iter().enumerate() {
             out[self.n + k] += a.sign * y[a.row];
         }
     }
@@ -336,7 +336,7 @@ impl<'p> Formulation<'p> {
             }
             out_w[j] += sum;
         }
-        for (k, a) in self.attached.iter().enumerate() {
+        for (k, a) in self.row_variables.iter().enumerate() {
             out_w[self.n + k] += a.sign * y[a.row];
             out_y[a.row] += a.sign * w[self.n + k];
         }

@@ -1,17 +1,17 @@
 //! The interior-point iteration on one formulation (WB06 algorithm A), used for the problem itself and, with elastics,
-//! for its feasibility phase.
+//! for its restoration phase.
 
 use std::time::Instant;
 
 use super::barrier::{self, DAMPING};
 use super::factorisation::Change;
-use super::feasibility;
 use super::filter::Filter;
-use super::formulation::{Formulation, Goal, RowKind};
+use super::formulation::{Formulation, Objective, RowKind};
 use super::inertia_correction::InertiaCorrection;
 use super::line_search::Search;
 use super::newton::{Linearisation, NewtonSystem, PrimalDual, largest};
 use super::optimality::Optimality;
+use super::restoration;
 use super::settings::{BarrierStrategy, NlpSettings};
 use super::status::{Counts, NlpIteration, Phase};
 
@@ -41,7 +41,7 @@ pub(super) struct StepRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ending {
     Converged,
-    /// The feasibility phase reached a point the caller accepts.
+    /// The restoration phase reached a point the caller accepts.
     Left,
     Infeasible,
     Stalled,
@@ -88,7 +88,7 @@ fn unscaled_violation(c: &[f64], scale: &[f64]) -> f64 {
     c.iter().zip(scale).fold(0.0, |v: f64, (c, s)| if c.is_nan() { f64::INFINITY } else { v.max(c.abs() / s) })
 }
 
-/// Whether a feasibility phase may end at this w.
+/// Whether a restoration phase may end at this w.
 pub(super) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
 
 /// The refusal in one iteration at which the factorisation is asked whether its count of eigenvalues can be trusted: most
@@ -215,9 +215,9 @@ impl<'p> Run<'p> {
 
     /// Largest violation of the program's own rows, unscaled, elastics left out.
     pub(super) fn program_violation(&mut self) -> f64 {
-        let Goal::Feasibility { first, .. } = self.form.goal else { return self.largest_violation() };
+        let Objective::Restoration { first, .. } = self.form.objective else { return self.largest_violation() };
         self.own_rows.copy_from_slice(&self.c);
-        for (a, t) in self.form.attached.iter().zip(&self.point.w[self.form.n..]).skip(first) {
+        for (a, t) in self.form.row_variables.iter().zip(&self.point.w[self.form.n..]).skip(first) {
             self.own_rows[a.row] -= a.sign * t;
         }
         unscaled_violation(&self.own_rows, &self.form.row_scale)
@@ -247,7 +247,7 @@ impl<'p> Run<'p> {
         self.mu = mu;
         self.filter.clear();
         self.search.end_watch();
-        if let Goal::Feasibility { zeta, .. } = &mut self.form.goal {
+        if let Objective::Restoration { zeta, .. } = &mut self.form.objective {
             *zeta = mu.sqrt();
             self.objective = self.form.objective(&self.point.w);
             self.form.gradient(&self.point.w, &mut self.gradient);
@@ -289,7 +289,7 @@ impl<'p> Run<'p> {
         let settings = session.settings;
         if !self.rows_curve {
             self.rows_curve =
-                self.phase() == Phase::Feasibility || self.largest_violation() <= settings.curvature_from_violation;
+                self.phase() == Phase::Restoration || self.largest_violation() <= settings.curvature_from_violation;
         }
         let multipliers = self.rows_curve.then_some(self.point.y.as_slice());
         self.form.hessian(&self.point.w, multipliers, &mut self.at.hessian);
@@ -392,9 +392,9 @@ impl<'p> Run<'p> {
     }
 
     fn report(&mut self, session: &mut Session, now: &Optimality) {
-        let objective = match self.form.goal {
-            Goal::Program => self.objective / self.form.objective_scale,
-            Goal::Feasibility { .. } => self.form.program.objective(&self.point.w[..self.form.n]),
+        let objective = match self.form.objective {
+            Objective::Program => self.objective / self.form.objective_scale,
+            Objective::Restoration { .. } => self.form.program.objective(&self.point.w[..self.form.n]),
         };
         let step = session.last_step;
         (session.observer)(&NlpIteration {
@@ -414,9 +414,9 @@ impl<'p> Run<'p> {
     }
 
     fn phase(&self) -> Phase {
-        match self.form.goal {
-            Goal::Program => Phase::Regular,
-            Goal::Feasibility { .. } => Phase::Feasibility,
+        match self.form.objective {
+            Objective::Program => Phase::Regular,
+            Objective::Restoration { .. } => Phase::Restoration,
         }
     }
 
@@ -425,7 +425,7 @@ impl<'p> Run<'p> {
         self.direction.w.iter().zip(&self.point.w).fold(0.0, |a: f64, (d, w)| a.max(d.abs() / (1.0 + w.abs())))
     }
 
-    /// Iterates until an ending. `leave` is asked after each step of a feasibility phase.
+    /// Iterates until an ending. `leave` is asked after each step of a restoration phase.
     pub(super) fn iterate(&mut self, session: &mut Session, mut leave: Option<Leave>) -> Ending {
         session.newton.fit(&self.form);
         let settings = session.settings;
@@ -459,7 +459,7 @@ impl<'p> Run<'p> {
             session.iterations += 1;
             match self.phase() {
                 Phase::Regular => session.counts.regular_iterations += 1,
-                Phase::Feasibility => session.counts.feasibility_iterations += 1,
+                Phase::Restoration => session.counts.restoration_iterations += 1,
             }
 
             let found = self.compute_direction(session);
@@ -477,7 +477,7 @@ impl<'p> Run<'p> {
                     && short_steps >= settings.short_step_limit
                     && self.phase() == Phase::Regular
                     && largest(&self.c) > settings.tolerance
-                    && session.counts.feasibility_phases < settings.max_feasibility_phases;
+                    && session.counts.restoration_phases < settings.max_restoration_phases;
                 if !crawls {
                     continue;
                 }
@@ -490,24 +490,24 @@ impl<'p> Run<'p> {
             self.search.end_watch();
             session.last_step = StepRecord::default();
             match self.phase() {
-                Phase::Feasibility => {
+                Phase::Restoration => {
                     elastic_resets += 1;
                     if elastic_resets > 2 {
                         return Ending::Stalled;
                     }
-                    if elastic_resets > 1 || !feasibility::reset_elastics(self) {
+                    if elastic_resets > 1 || !restoration::reset_elastics(self) {
                         self.recentre(session);
                     }
                 }
                 Phase::Regular => {
                     let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;
-                    if nearly_feasible || session.counts.feasibility_phases >= settings.max_feasibility_phases {
+                    if nearly_feasible || session.counts.restoration_phases >= settings.max_restoration_phases {
                         rescues += 1;
                         if rescues > 1 {
                             return Ending::Stalled;
                         }
                         self.recentre(session);
-                    } else if let Some(ending) = feasibility::restore(self, session) {
+                    } else if let Some(ending) = restoration::restore(self, session) {
                         return ending;
                     }
                 }
@@ -526,7 +526,7 @@ impl<'p> Run<'p> {
         self.estimate_multipliers(session);
     }
 
-    /// Slack of each row: the attached slack of an inequality, unscaled; the target of an equality.
+    /// Slack of each row: the slack of an inequality, unscaled; the target of an equality.
     pub(super) fn row_slacks(&self) -> Vec<f64> {
         (0..self.form.m)
             .map(|i| match self.form.rows[i] {

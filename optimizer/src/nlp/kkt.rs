@@ -5,7 +5,7 @@
 //! [     J        -diag(e)    ]
 //! ```
 //!
-//! d: barrier terms, objective curvature and delta_w of x; e: what the eliminated attached variables and delta_c
+//! d: barrier terms, objective curvature and delta_w of x; e: what the eliminated row variables and delta_c
 //! leave in a row, e_i = sum_k a_k^2 / d_k + delta_c.
 
 use super::factorisation::all_finite;
@@ -93,7 +93,7 @@ impl KktMatrix {
         }
     }
 
-    /// Sets the diagonal of what was assembled; `diagonal` has the length of w and must be positive on attached
+    /// Sets the diagonal of what was assembled; `diagonal` has the length of w and must be positive on row
     /// variables. Returns whether all values are finite.
     pub(super) fn set_diagonal(&mut self, form: &Formulation, diagonal: &[f64], delta_c: f64) -> bool {
         let values = &mut self.values;
@@ -104,7 +104,7 @@ impl KktMatrix {
         for (row, &q) in form.rows.iter().zip(of_rows) {
             values[q] = if *row == RowKind::Free { -1.0 } else { -delta_c };
         }
-        for (a, d) in form.attached.iter().zip(&diagonal[form.n..]) {
+        for (a, d) in form.row_variables.iter().zip(&diagonal[form.n..]) {
             values[of_rows[a.row]] -= 1.0 / d;
         }
         self.finite && self.diagonal_position.iter().all(|&q| values[q].is_finite())

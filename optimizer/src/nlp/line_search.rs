@@ -181,7 +181,7 @@ impl Run<'_> {
     }
 
     /// After a failed search: the longest step that respects the bounds, if it lowers the primal-dual error of the
-    /// barrier problem (the soft feasibility phase of IPOPT). Near a solution phi is noise and this is the better judge.
+    /// barrier problem (the soft restoration phase of IPOPT). Near a solution phi is noise and this is the better judge.
     pub(super) fn soft_step(&mut self, session: &mut Session) -> bool {
         let tau = barrier::boundary_fraction(session.settings, self.mu);
         let before = self.primal_dual_error();

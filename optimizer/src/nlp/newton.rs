@@ -7,7 +7,7 @@
 //!     -Z_U dw      + S_U dz_U             = r_U
 //! ```
 //!
-//! with S_L = w - l, S_U = u - w. The bound multipliers and the attached variables are eliminated, the rest is the
+//! with S_L = w - l, S_U = u - w. The bound multipliers and the row variables are eliminated, the rest is the
 //! matrix of `kkt`; the residual is always that of the full system above, which is not symmetric and not scaled by
 //! the eliminated slacks (WB06 section 3.10).
 
@@ -162,7 +162,7 @@ impl NewtonSystem {
         self.solver.distrust()
     }
 
-    /// Makes the work vectors fit the formulation (its feasibility form is longer).
+    /// Makes the work vectors fit the formulation (its restoration form is longer).
     pub(super) fn fit(&mut self, form: &Formulation) {
         self.diagonal = vec![0.0; form.length()];
         self.residual = PrimalDual::zeros(form);
@@ -280,13 +280,13 @@ impl NewtonSystem {
             self.rhs[j] = if form.fixed[j].is_some() { 0.0 } else { b[j] };
         }
         self.rhs[n..].copy_from_slice(c);
-        for (k, a) in form.attached.iter().enumerate() {
+        for (k, a) in form.row_variables.iter().enumerate() {
             self.rhs[n + a.row] -= a.sign * b[n + k] / self.diagonal[n + k];
         }
         self.solver.solve(&mut self.rhs);
         dw[..n].copy_from_slice(&self.rhs[..n]);
         dy.copy_from_slice(&self.rhs[n..]);
-        for (k, a) in form.attached.iter().enumerate() {
+        for (k, a) in form.row_variables.iter().enumerate() {
             dw[n + k] = (b[n + k] - a.sign * dy[a.row]) / self.diagonal[n + k];
         }
         self.tally.backsolves += 1;

@@ -71,7 +71,7 @@ pub struct NlpSettings {
     pub dual_tolerance: f64,
     /// Largest unscaled complementarity product of a converged point. Default 1e-4 (IPOPT `compl_inf_tol`).
     pub complementarity_tolerance: f64,
-    /// Iterations (feasibility phase included) before [`NlpStatus::IterationLimit`](super::NlpStatus). Default 1000.
+    /// Iterations (restoration phase included) before [`NlpStatus::IterationLimit`](super::NlpStatus). Default 1000.
     pub max_iterations: usize,
     /// Wall time in seconds before [`NlpStatus::TimeLimit`](super::NlpStatus). Default infinity (JSON: null). From 0.
     #[serde(with = "infinite_as_null")]
@@ -158,19 +158,19 @@ pub struct NlpSettings {
     /// Full steps the watchdog may try. Default 3 (IPOPT `watchdog_trial_iter_max`).
     pub watchdog_trials: usize,
     /// Steps in a row that may be taken for a lower primal-dual error alone when the line search fails, before the
-    /// feasibility phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
+    /// restoration phase. Default 10 (IPOPT `max_soft_resto_iters`); 0: none.
     pub max_soft_steps: usize,
 
-    /// Weight of the l1 violation in the feasibility phase. Default 1000 (WB06 rho). 1 to 1e12.
+    /// Weight of the l1 violation in the restoration phase. Default 1000 (WB06 rho). 1 to 1e12.
     pub elastic_weight: f64,
-    /// The feasibility phase ends when the violation has fallen to this share of its first value and the filter
+    /// The restoration phase ends when the violation has fallen to this share of its first value and the filter
     /// accepts. Default 0.9 (WB06 kappa_resto). 0 to 0.999999.
     pub required_reduction: f64,
-    /// Steps below 0.05 in a row after which the feasibility phase is entered without waiting for the line search to
+    /// Steps below 0.05 in a row after which the restoration phase is entered without waiting for the line search to
     /// fail: a point pressed against its bounds with growing multipliers rarely recovers by itself. Default 5; 0: never.
     pub short_step_limit: usize,
-    /// Feasibility phases before the solve is called stalled. Default 50.
-    pub max_feasibility_phases: usize,
+    /// Restoration phases before the solve is called stalled. Default 50.
+    pub max_restoration_phases: usize,
 
     /// Factorisation. Default auto.
     pub linear_solver: LinearSolver,
@@ -223,7 +223,7 @@ impl Default for NlpSettings {
             elastic_weight: 1000.0,
             required_reduction: 0.9,
             short_step_limit: 5,
-            max_feasibility_phases: 50,
+            max_restoration_phases: 50,
             linear_solver: LinearSolver::default(),
             threads: 1,
         }

@@ -9,7 +9,7 @@ use super::start::WarmPoint;
 pub enum NlpStatus {
     /// All tolerances are met.
     Converged,
-    /// The feasibility phase converged to a stationary point of the l1 violation, and the violation is above its
+    /// The restoration phase converged to a stationary point of the l1 violation, and the violation is above its
     /// tolerance there: no feasible point nearby. (A nonconvex problem may be feasible elsewhere.)
     Infeasible,
     /// No further progress, for a reason that proves nothing about the problem.
@@ -29,8 +29,8 @@ pub enum NlpStatus {
 pub enum Phase {
     /// The problem itself.
     Regular,
-    /// The l1-elastic feasibility problem.
-    Feasibility,
+    /// The restoration phase: the l1-elastic feasibility problem.
+    Restoration,
 }
 
 /// One iteration, as told to the observer. Violation and objective are unscaled and those of the problem itself in
@@ -94,10 +94,10 @@ pub struct Timing {
 pub struct Counts {
     /// Iterations of the problem itself.
     pub regular_iterations: usize,
-    /// Iterations of the feasibility phase.
-    pub feasibility_iterations: usize,
-    /// Entries into the feasibility phase.
-    pub feasibility_phases: usize,
+    /// Iterations of the restoration phase.
+    pub restoration_iterations: usize,
+    /// Entries into the restoration phase.
+    pub restoration_phases: usize,
     /// Numerical factorisations.
     pub factorisations: usize,
     /// Forward-backward substitutions.

@@ -68,8 +68,8 @@ pub enum CostStrategy {
     AdaptiveBarrier,
     /// Regularisation of the Hessian and the proximal term begin a hundred times as large: shorter steps.
     MoreRegularisation,
-    /// The feasibility phase is entered after two short steps and left when the violation has fallen to a tenth.
-    EarlyElasticPhase,
+    /// The restoration phase is entered after two short steps and left when the violation has fallen to a tenth.
+    EarlyRestoration,
 }
 
 impl CostStrategy {
@@ -84,7 +84,7 @@ impl CostStrategy {
                 proximal_first: 100.0 * usual.proximal_first,
                 ..*usual
             },
-            Self::EarlyElasticPhase => NlpSettings { short_step_limit: 2, required_reduction: 0.1, ..*usual },
+            Self::EarlyRestoration => NlpSettings { short_step_limit: 2, required_reduction: 0.1, ..*usual },
         }
     }
 
@@ -93,7 +93,7 @@ impl CostStrategy {
             Self::Usual => None,
             Self::AdaptiveBarrier => Some("adaptive barrier"),
             Self::MoreRegularisation => Some("more regularisation"),
-            Self::EarlyElasticPhase => Some("early elastic phase"),
+            Self::EarlyRestoration => Some("early restoration"),
         }
     }
 }
@@ -150,7 +150,7 @@ impl ColdGuess {
         Self { stride_time_s: 1.1, stride_length_m: 1.25, ..Self::EARLY_RISE },
         Self { strategy: CostStrategy::MoreRegularisation, ..Self::NATURAL },
         Self { strategy: CostStrategy::AdaptiveBarrier, ..Self::NATURAL },
-        Self { strategy: CostStrategy::EarlyElasticPhase, ..Self::NATURAL },
+        Self { strategy: CostStrategy::EarlyRestoration, ..Self::NATURAL },
         Self { timing: GuessTiming::Rises { right: 0.0, left: 0.0 }, ..Self::NATURAL },
         Self { timing: GuessTiming::Rises { right: 1.0, left: 0.0 }, ..Self::NATURAL },
         Self { timing: GuessTiming::Rises { right: 1.0, left: 1.0 }, ..Self::NATURAL },

@@ -135,7 +135,7 @@ impl Retraction {
 
 /// Who says something.
 #[derive(Debug, Clone, Copy)]
-pub struct Voice<'a> {
+pub struct Attribution<'a> {
     /// Where it comes from.
     pub source: Source,
     /// Who.
@@ -152,7 +152,7 @@ pub async fn append(
     db: &mut Connection,
     study: StudyId,
     said: &FeedbackContent,
-    voice: Voice<'_>,
+    attribution: Attribution<'_>,
 ) -> StoreResult<FeedbackId> {
     let id = FeedbackId::fresh();
     let (kind, a, b, category, suggested) = match *said {
@@ -174,9 +174,9 @@ pub async fn append(
     .bind(b)
     .bind(category)
     .bind(suggested)
-    .bind(voice.source.as_str())
-    .bind(voice.author)
-    .bind(voice.note)
+    .bind(attribution.source.as_str())
+    .bind(attribution.author)
+    .bind(attribution.note)
     .bind(now())
     .execute(db)
     .await?;

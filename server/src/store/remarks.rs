@@ -1,6 +1,6 @@
 //! Remarks: what staff say of two gaits that is no preference.
 
-use super::feedback::{Retraction, Source, Voice};
+use super::feedback::{Attribution, Retraction, Source};
 use super::presentations::Judgement;
 use super::{Connection, FeedbackId, Instant, RemarkId, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::Serialize;
@@ -52,7 +52,7 @@ pub struct NewRemark<'a> {
     /// What is said of them.
     pub said: Judgement,
     /// Who says so.
-    pub voice: Voice<'a>,
+    pub attribution: Attribution<'a>,
     /// What the learner hears of it.
     pub feedback: Option<FeedbackId>,
 }
@@ -72,9 +72,9 @@ pub async fn insert(db: &mut Connection, new: &NewRemark<'_>) -> StoreResult<Rem
     .bind(new.pair.0)
     .bind(new.pair.1)
     .bind(new.said.as_str())
-    .bind(new.voice.source.as_str())
-    .bind(new.voice.author)
-    .bind(new.voice.note)
+    .bind(new.attribution.source.as_str())
+    .bind(new.attribution.author)
+    .bind(new.attribution.note)
     .bind(new.feedback)
     .bind(now())
     .execute(db)

@@ -4,7 +4,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit;
-use crate::store::feedback::{FeedbackContent, FeedbackRow, Source, Voice};
+use crate::store::feedback::{Attribution, FeedbackContent, FeedbackRow, Source};
 use crate::store::presentations::Judgement;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies};
@@ -56,7 +56,7 @@ pub struct Answer {
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
 pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
     let study = studies::get(writer, study).await?;
-    let voice = voice(caller, answer.source, answer.author.as_deref(), &answer.note)?;
+    let attribution = attribution(caller, answer.source, answer.author.as_deref(), &answer.note)?;
     let (a, b) = (answer.trial_a, answer.trial_b);
     let said = match answer.answer {
         PairAnswer::A => Judgement::First,
@@ -64,12 +64,12 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
         PairAnswer::NoDifference => Judgement::NoDifference,
     };
     let fields = ("trial_a", "trial_b");
-    let statement = GivenJudgement { study: study.id, pair: (a, b), fields, said, voice, again: Again::Refused };
+    let statement = GivenJudgement { study: study.id, pair: (a, b), fields, said, attribution, again: Again::Refused };
     let heard = preference::hear(writer, statement).await?;
     let id = heard.ok_or_else(|| Error::Internal("a preference was not heard".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail =
-        json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": voice.author });
+        json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": attribution.author });
     audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
     Ok(id)
 }
@@ -78,12 +78,12 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
 ///
 /// # Errors
 /// [`Error::Invalid`] for `source`, `author` or `note`.
-pub fn voice<'a>(
+pub fn attribution<'a>(
     caller: &'a Caller,
     source: Option<Source>,
     author: Option<&'a str>,
     note: &'a str,
-) -> Result<Voice<'a>, Error> {
+) -> Result<Attribution<'a>, Error> {
     let source = source.unwrap_or_else(|| caller.source());
     if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
@@ -94,7 +94,7 @@ pub fn voice<'a>(
         return Err(Error::invalid("author", author, &format!("{}, who is signed in, or absent", caller.name)));
     }
     printable::note("note", note, 2000)?;
-    Ok(Voice { source, author, note })
+    Ok(Attribution { source, author, note })
 }
 
 /// So many answers of others are told.

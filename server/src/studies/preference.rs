@@ -4,7 +4,7 @@
 use super::walkable::{self, Grounds, NotWalkable, WalkablePair, is_same_gait, trial_of_study};
 use crate::error::Error;
 use crate::printable;
-use crate::store::feedback::{self, FeedbackContent, Source, Voice};
+use crate::store::feedback::{self, Attribution, FeedbackContent, Source};
 use crate::store::presentations::Judgement;
 use crate::store::trials::{Trial, TrialState};
 use crate::store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, remarks};
@@ -34,7 +34,7 @@ pub struct GivenJudgement<'a> {
     /// What the person says.
     pub said: Judgement,
     /// Who says it.
-    pub voice: Voice<'a>,
+    pub attribution: Attribution<'a>,
     /// Whether this person may have answered before.
     pub again: Again,
 }
@@ -49,9 +49,9 @@ pub struct GivenJudgement<'a> {
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after a withdrawal and for a second answer.
 pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let GivenJudgement { study, pair, fields, said, voice, again } = statement;
-    if !matches!(voice.source, Source::Subject | Source::Clinician | Source::Script) {
-        return Err(Error::invalid("source", voice.source.as_str(), "subject, clinician, script"));
+    let GivenJudgement { study, pair, fields, said, attribution, again } = statement;
+    if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
+        return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician, script"));
     }
     if pair.0 == pair.1 {
         let allowed = format!("another trial than {}: a gait cannot be compared with itself", fields.0);
@@ -62,10 +62,10 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
     }
     let pair = walkable::admit_pair(writer, study, fields, pair).await?;
     if again == Again::Refused {
-        refuse_second_answer(writer, study, &pair, voice.author).await?;
+        refuse_second_answer(writer, study, &pair, attribution.author).await?;
     }
     match said.heard(pair.trials()) {
-        Some(said) => Ok(Some(feedback::append(writer, study, &said, voice).await?)),
+        Some(said) => Ok(Some(feedback::append(writer, study, &said, attribution).await?)),
         None => Ok(None),
     }
 }
@@ -73,7 +73,7 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
 /// A safety report names gaits of this study that exist. What the learner hears of it says nothing of a gait that was
 /// reported before.
 async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
-    let GivenJudgement { study, pair, fields, said, voice, .. } = statement;
+    let GivenJudgement { study, pair, fields, said, attribution, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
     let second = converged(writer, study, fields.1, pair.1).await?;
     let grounds = Grounds::read_for(writer, study, &[first.id, second.id]).await?;
@@ -83,7 +83,7 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
     let both_open = [&first, &second].iter().all(|trial| !grounds.safety_reports.closes(trial.id));
     let heard = said.heard(pair).filter(|_| both_open && !is_same_gait(&first, &second));
     match heard {
-        Some(said) => Ok(Some(feedback::append(writer, study, &said, voice).await?)),
+        Some(said) => Ok(Some(feedback::append(writer, study, &said, attribution).await?)),
         None => Ok(None),
     }
 }
@@ -152,13 +152,13 @@ pub(super) async fn suggest(
     writer: &mut Writer,
     over: &Trial,
     suggested: ActionIndex,
-    voice: Voice<'_>,
+    attribution: Attribution<'_>,
 ) -> Result<FeedbackId, Error> {
     if consents::is_withdrawn(writer, over.study_id).await? {
         return Err(NotWalkable::Withdrawn.into());
     }
     let said = FeedbackContent::Suggestion { suggested, over: over.id };
-    Ok(feedback::append(writer, over.study_id, &said, voice).await?)
+    Ok(feedback::append(writer, over.study_id, &said, attribution).await?)
 }
 
 /// Tells the learner the result of a trial, and what Gait RMSE answers about it.
@@ -172,11 +172,11 @@ pub(super) async fn compute(
     answers: &[FeedbackContent],
     author: &str,
 ) -> Result<(), Error> {
-    let voice = |source| Voice { source, author, note: "" };
+    let attribution = |source| Attribution { source, author, note: "" };
     let label = FeedbackContent::Label { trial, category: u32::from(state == TrialState::Converged) };
-    feedback::append(writer, study, &label, voice(Source::Convergence)).await?;
+    feedback::append(writer, study, &label, attribution(Source::Convergence)).await?;
     for answer in answers {
-        feedback::append(writer, study, answer, voice(Source::GaitRmse)).await?;
+        feedback::append(writer, study, answer, attribution(Source::GaitRmse)).await?;
     }
     Ok(())
 }

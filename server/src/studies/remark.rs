@@ -1,6 +1,6 @@
 //! What staff say of two gaits that is no preference: one way in for the form and the REST interface.
 
-use super::answer::voice;
+use super::answer::attribution;
 use super::preference::{self, Again, GivenJudgement};
 use crate::access::Caller;
 use crate::error::Error;
@@ -51,17 +51,17 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
             "cannot_tell, unsafe_first, unsafe_second, unsafe_both",
         ));
     }
-    let voice = voice(caller, new.source, new.author.as_deref(), &new.note)?;
+    let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
     let statement = GivenJudgement {
         study: study.id,
         pair: (new.first, new.second),
         fields: ("first", "second"),
         said: new.answer,
-        voice,
+        attribution,
         again: Again::Refused,
     };
     let id = write(writer, statement).await?;
-    let (first, second, author) = (new.first, new.second, voice.author);
+    let (first, second, author) = (new.first, new.second, attribution.author);
     let detail = json!({ "study": study.id, "first": first, "second": second, "answer": new.answer, "author": author });
     audit::append(writer, &caller.actor, "remark.give", &format!("remark {id}"), &detail).await?;
     Ok(id)
@@ -73,8 +73,8 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
 /// As [`preference::hear`].
 pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<RemarkId, Error> {
     let heard = preference::hear(writer, statement).await?;
-    let GivenJudgement { study, pair, said, voice, .. } = statement;
-    let id = remarks::insert(writer, &remarks::NewRemark { study, pair, said, voice, feedback: heard }).await?;
+    let GivenJudgement { study, pair, said, attribution, .. } = statement;
+    let id = remarks::insert(writer, &remarks::NewRemark { study, pair, said, attribution, feedback: heard }).await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "remark_id": id })).await?;
     Ok(id)
 }

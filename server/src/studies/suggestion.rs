@@ -1,6 +1,6 @@
 //! Coactive feedback: "with these bounds it would have been better than in that trial".
 
-use super::answer::{comparable, voice};
+use super::answer::{attribution, comparable};
 use super::preference;
 use crate::access::Caller;
 use crate::error::Error;
@@ -44,10 +44,10 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Su
     let study = studies::get(writer, study).await?;
     let trial = comparable(writer, study.id, "over", new.over).await?;
     let suggested = action(&study, &trial, &new.bounds)?;
-    let voice = voice(caller, new.source, new.author.as_deref(), &new.note)?;
-    let id = preference::suggest(writer, &trial, suggested, voice).await?;
+    let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
+    let id = preference::suggest(writer, &trial, suggested, attribution).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
-    let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": voice.author });
+    let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": attribution.author });
     audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;
     Ok(id)
 }

@@ -6,7 +6,7 @@
 //! singular breaks the factorisation down (`None`), one that is nearly so shows in the residual, and either way the
 //! caller regularises or changes the method.
 //!
-//! Several threads ([`super::worker_threads`]) factorise independent parts of the forest at once ([`super::schedule`]). Each front is
+//! Several threads ([`super::thread_pool`]) factorise independent parts of the forest at once ([`super::schedule`]). Each front is
 //! computed by one thread, from its own entries and then its children in fixed order, so the result is bit for bit that of
 //! one thread.
 
@@ -23,9 +23,9 @@ use super::dense_kernels::all_finite;
 use super::front::{ChildMap, Front, PivotKind, Place, RoomForDeferred};
 use super::kkt_solver::{Change, Inertia, KktSolver};
 use super::null_space::{self, LARGEST_DIAGONAL, NullSpace, Workspace};
-use super::schedule::{Direction, Piece, Schedule};
+use super::schedule::{Direction, Schedule, SubtreeTask};
 use super::substitution::{Space, Substitution};
-use super::worker_threads::{Job, WorkerThreads};
+use super::thread_pool::{Job, ThreadPool};
 use crate::nlp::status::NlpError;
 
 /// Operations below which starting threads costs more than it saves.
@@ -36,7 +36,7 @@ const WORTH_A_THREAD: f64 = 8e6;
 pub(super) struct Factor {
     /// What solves need.
     pub numbers: Aligned,
-    /// The Schur complement, where its parent is done by another piece of the schedule; the others wait on a stack.
+    /// The Schur complement, where its parent is done by another task of the schedule; the others wait on a stack.
     schur: Vec<f64>,
     pub null_space: NullSpace,
     /// Subdiagonal of B and order of the slots, of stage 2.
@@ -69,7 +69,7 @@ pub(super) struct Multifrontal {
     order: usize,
     forest: Arc<Forest>,
     /// The threads beside the caller's.
-    threads: Option<WorkerThreads>,
+    threads: Option<ThreadPool>,
     /// Positions of the diagonals that stage 1 neglects.
     neglected: Vec<u32>,
 }
@@ -101,12 +101,12 @@ impl Forest {
         let Self { architecture, fronts, factors, schedule, substitution, workspaces, .. } = self;
         let Some(workspace) = workspaces.get(member) else { return };
         let (work, space) = &mut *lock(workspace);
-        schedule.take_part(|piece| match pass {
+        schedule.take_part(|task| match pass {
             Pass::Factor(change) => {
-                architecture.dispatch(FactorPiece { fronts, values: numbers, change, piece, factors, work });
+                architecture.dispatch(FactorSubtree { fronts, values: numbers, change, task, factors, work });
             }
-            Pass::Forward => substitution.forward(*architecture, fronts, factors, piece, numbers, space),
-            Pass::Backward => substitution.backward(*architecture, fronts, factors, piece, space),
+            Pass::Forward => substitution.forward(*architecture, fronts, factors, task, numbers, space),
+            Pass::Backward => substitution.backward(*architecture, fronts, factors, task, space),
         });
     }
 }
@@ -143,7 +143,7 @@ impl Multifrontal {
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
         let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
         let schedule = Schedule::new(&fronts, threads);
-        for root in schedule.pieces.iter().map(|piece| piece.end - 1) {
+        for root in schedule.tasks.iter().map(|task| task.end - 1) {
             factors[root].schur = vec![0.0; fronts[root].schur_length()];
         }
         let neglected = fronts.iter().flat_map(Front::neglected).collect();
@@ -158,7 +158,7 @@ impl Multifrontal {
             call: RwLock::new((Pass::Forward, Vec::with_capacity(if threads > 1 { longest } else { 0 }))),
             fronts,
         });
-        let threads = (threads > 1).then(|| WorkerThreads::new(&forest, threads - 1));
+        let threads = (threads > 1).then(|| ThreadPool::new(&forest, threads - 1));
         Ok(Self { order, forest, threads, neglected })
     }
 
@@ -302,24 +302,24 @@ fn analyse(
     Some(fronts)
 }
 
-/// Factorises a piece: a subtree, or one front whose children are done.
-struct FactorPiece<'a> {
+/// Factorises a task: a subtree, or one front whose children are done.
+struct FactorSubtree<'a> {
     fronts: &'a [Front],
     values: &'a [f64],
     change: Change,
-    piece: &'a Piece,
+    task: &'a SubtreeTask,
     factors: &'a [Mutex<Factor>],
     work: &'a mut Workspace,
 }
 
-impl WithSimd for FactorPiece<'_> {
+impl WithSimd for FactorSubtree<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { fronts, values, change, piece, factors, work } = self;
+        let Self { fronts, values, change, task, factors, work } = self;
         work.stack.clear();
-        for f in piece.start..piece.end {
+        for f in task.start..task.end {
             let own = &mut *lock(&factors[f]);
             let mut numbers = std::mem::take(&mut work.numbers);
             let front = &fronts[f];
@@ -334,7 +334,7 @@ impl WithSimd for FactorPiece<'_> {
                 || !factor_front(simd, front, scratch, own, same_rows, work);
             if !own.broke_down {
                 front.keep(scratch, front.first_slot(own.null_space.rank), &mut own.numbers);
-                if f + 1 == piece.end {
+                if f + 1 == task.end {
                     let mut at = 0;
                     for column in schur_columns(front, scratch) {
                         own.schur[at..at + column.len()].copy_from_slice(column);
@@ -356,7 +356,7 @@ fn schur_columns<'a>(front: &'a Front, numbers: &'a [f64]) -> impl Iterator<Item
     (front.pivot_slots()..end).map(move |c| &numbers[front.reduced + c * front.wide..][c..end])
 }
 
-/// Adds the Schur complements of the children of front `f`; false when one of them broke down. The first front of a piece
+/// Adds the Schur complements of the children of front `f`; false when one of them broke down. The first front of a task
 /// finds them with its children, the others on top of the stack.
 #[inline(always)]
 fn add_children(

@@ -1,6 +1,6 @@
-//! Who does which fronts: the forest in pieces, each a subtree or a single front near the roots, done by whoever is free.
+//! Who does which fronts: the forest in tasks, each a subtree or a single front near the roots, done by whoever is free.
 //!
-//! Going up, a piece may begin when those below it are done, going down when the one above it is. What a piece computes does
+//! Going up, a task may begin when those below it are done, going down when the one above it is. What a task computes does
 //! not depend on who does it or when, so the result does not depend on the number of threads.
 
 use std::hint::spin_loop;
@@ -11,11 +11,11 @@ use super::front::Front;
 
 /// Fronts that one thread does one after the other.
 #[derive(Debug, Clone)]
-pub(super) struct Piece {
+pub(super) struct SubtreeTask {
     /// Range of fronts; the last one is above the others.
     pub start: usize,
     pub end: usize,
-    /// The piece above, and those below.
+    /// The task above, and those below.
     parent: Option<usize>,
     children: Vec<usize>,
 }
@@ -33,34 +33,34 @@ pub(super) enum Direction {
 #[derive(Debug)]
 struct Round {
     direction: Direction,
-    /// Pieces that may begin, the next one last.
+    /// Tasks that may begin, the next one last.
     ready: Vec<usize>,
-    /// By piece: how many others it waits for.
+    /// By task: how many others it waits for.
     waits_for: Vec<usize>,
-    /// Pieces that are not done.
+    /// Tasks that are not done.
     left: usize,
 }
 
-/// The pieces of a forest.
+/// The tasks of a forest.
 #[derive(Debug)]
 pub(super) struct Schedule {
     /// By ascending front.
-    pub pieces: Vec<Piece>,
-    /// Pieces without others below them, the heaviest last; those without one above.
+    pub tasks: Vec<SubtreeTask>,
+    /// Tasks without others below them, the heaviest last; those without one above.
     leaves: Vec<usize>,
     roots: Vec<usize>,
     round: Mutex<Round>,
 }
 
 /// A subtree is split until it is no larger than a thread's share divided by this.
-const PIECES_PER_SHARE: usize = 4;
-/// Looks for a piece before a thread that finds none lets others have the processor.
+const TASKS_PER_SHARE: usize = 4;
+/// Looks for a task before a thread that finds none lets others have the processor.
 const LOOKS: usize = 100;
 /// Pauses between two looks.
 const SPINS: usize = 20;
 
 impl Schedule {
-    /// Cuts the forest into pieces for that many threads: the heaviest subtree is split until none is larger than a part
+    /// Cuts the forest into tasks for that many threads: the heaviest subtree is split until none is larger than a part
     /// of a thread's share.
     pub(super) fn new(fronts: &[Front], threads: usize) -> Self {
         let count = fronts.len();
@@ -77,7 +77,7 @@ impl Schedule {
         let mut subtrees: Vec<usize> = (0..count).filter(|&f| parent[f].is_none()).collect();
         let mut single = Vec::new();
         if threads > 1 {
-            let limit = subtrees.iter().map(|&f| weight[f]).sum::<f64>() / (PIECES_PER_SHARE * threads) as f64;
+            let limit = subtrees.iter().map(|&f| weight[f]).sum::<f64>() / (TASKS_PER_SHARE * threads) as f64;
             while let Some(k) = subtrees.iter().position(|&f| weight[f] > limit && !fronts[f].children.is_empty()) {
                 let f = subtrees.swap_remove(k);
                 single.push(f);
@@ -89,26 +89,31 @@ impl Schedule {
         last.extend(subtrees.iter().map(|&f| (f, start[f])));
         last.sort_unstable();
         let piece_of = |f: usize| last.binary_search_by_key(&f, |(end, _)| *end).ok();
-        let mut pieces: Vec<Piece> = last
+        let mut tasks: Vec<SubtreeTask> = last
             .iter()
-            .map(|&(f, start)| Piece { start, end: f + 1, parent: parent[f].and_then(piece_of), children: Vec::new() })
+            .map(|&(f, start)| SubtreeTask {
+                start,
+                end: f + 1,
+                parent: parent[f].and_then(piece_of),
+                children: Vec::new(),
+            })
             .collect();
-        for k in 0..pieces.len() {
-            if let Some(parent) = pieces[k].parent {
-                pieces[parent].children.push(k);
+        for k in 0..tasks.len() {
+            if let Some(parent) = tasks[k].parent {
+                tasks[parent].children.push(k);
             }
         }
-        let mut leaves: Vec<usize> = (0..pieces.len()).filter(|&k| pieces[k].children.is_empty()).collect();
-        let heaviness = |k: &usize| weight[pieces[*k].end - 1];
+        let mut leaves: Vec<usize> = (0..tasks.len()).filter(|&k| tasks[k].children.is_empty()).collect();
+        let heaviness = |k: &usize| weight[tasks[*k].end - 1];
         leaves.sort_by(|a, b| heaviness(a).total_cmp(&heaviness(b)));
-        let roots = (0..pieces.len()).filter(|&k| pieces[k].parent.is_none()).collect();
+        let roots = (0..tasks.len()).filter(|&k| tasks[k].parent.is_none()).collect();
         let round = Round {
             direction: Direction::Up,
-            ready: Vec::with_capacity(pieces.len()),
-            waits_for: vec![0; pieces.len()],
+            ready: Vec::with_capacity(tasks.len()),
+            waits_for: vec![0; tasks.len()],
             left: 0,
         };
-        Self { pieces, leaves, roots, round: Mutex::new(round) }
+        Self { tasks, leaves, roots, round: Mutex::new(round) }
     }
 
     fn round(&self) -> MutexGuard<'_, Round> {
@@ -119,17 +124,17 @@ impl Schedule {
     pub(super) fn begin(&self, direction: Direction) {
         let mut round = self.round();
         round.direction = direction;
-        round.left = self.pieces.len();
+        round.left = self.tasks.len();
         round.ready.clear();
         round.ready.extend(if direction == Direction::Up { &self.leaves } else { &self.roots });
-        for (waits_for, piece) in round.waits_for.iter_mut().zip(&self.pieces) {
+        for (waits_for, task) in round.waits_for.iter_mut().zip(&self.tasks) {
             *waits_for =
-                if direction == Direction::Up { piece.children.len() } else { usize::from(piece.parent.is_some()) };
+                if direction == Direction::Up { task.children.len() } else { usize::from(task.parent.is_some()) };
         }
     }
 
-    /// Does pieces of the present round until none is left. Several threads may do so at once.
-    pub(super) fn take_part(&self, mut work: impl FnMut(&Piece)) {
+    /// Does tasks of the present round until none is left. Several threads may do so at once.
+    pub(super) fn take_part(&self, mut work: impl FnMut(&SubtreeTask)) {
         let mut looks = 0;
         loop {
             let taken = {
@@ -148,28 +153,28 @@ impl Schedule {
                 }
                 continue;
             };
-            // Whatever becomes of the piece, nobody waits for it for ever.
-            let done = Done { schedule: self, piece: k };
-            work(&self.pieces[k]);
+            // Marks the task done when it is dropped, so that a panic cannot keep its dependents waiting.
+            let done = Done { schedule: self, task: k };
+            work(&self.tasks[k]);
             drop(done);
         }
     }
 }
 
-/// Notes that a piece is done when it is dropped.
+/// Notes that a task is done when it is dropped.
 struct Done<'a> {
     schedule: &'a Schedule,
-    piece: usize,
+    task: usize,
 }
 
 impl Drop for Done<'_> {
     fn drop(&mut self) {
-        let piece = &self.schedule.pieces[self.piece];
+        let task = &self.schedule.tasks[self.task];
         let mut round = self.schedule.round();
         round.left -= 1;
         let next = match round.direction {
-            Direction::Up => piece.parent.as_slice(),
-            Direction::Down => piece.children.as_slice(),
+            Direction::Up => task.parent.as_slice(),
+            Direction::Down => task.children.as_slice(),
         };
         for &k in next {
             round.waits_for[k] -= 1;

@@ -18,7 +18,7 @@ use super::dense_kernels::{LANES, dot, padded, subtract_range};
 use super::front::Front;
 use super::multifrontal::{Factor, lock};
 use super::null_space::NullSpace;
-use super::schedule::Piece;
+use super::schedule::SubtreeTask;
 
 /// Values at a front: half-way between the two substitutions first, the solution then.
 #[derive(Debug)]
@@ -71,29 +71,29 @@ impl Substitution {
         Self { values: fronts.iter().map(|front| Mutex::new(values(front))).collect() }
     }
 
-    /// Forward substitution over a piece whose children are done.
+    /// Forward substitution over a task whose children are done.
     pub(super) fn forward(
         &self,
         architecture: Arch,
         fronts: &[Front],
         factors: &[Mutex<Factor>],
-        piece: &Piece,
+        task: &SubtreeTask,
         rhs: &[f64],
         space: &mut Space,
     ) {
-        architecture.dispatch(Forward { fronts, factors, piece, values: &self.values, rhs, space });
+        architecture.dispatch(Forward { fronts, factors, task, values: &self.values, rhs, space });
     }
 
-    /// Backward substitution over a piece whose parent is done.
+    /// Backward substitution over a task whose parent is done.
     pub(super) fn backward(
         &self,
         architecture: Arch,
         fronts: &[Front],
         factors: &[Mutex<Factor>],
-        piece: &Piece,
+        task: &SubtreeTask,
         space: &mut Space,
     ) {
-        architecture.dispatch(Backward { fronts, factors, piece, values: &self.values, space });
+        architecture.dispatch(Backward { fronts, factors, task, values: &self.values, space });
     }
 
     /// Writes the solution.
@@ -112,11 +112,11 @@ impl Substitution {
     }
 }
 
-/// Forward substitution over a piece.
+/// Forward substitution over a task.
 struct Forward<'a> {
     fronts: &'a [Front],
     factors: &'a [Mutex<Factor>],
-    piece: &'a Piece,
+    task: &'a SubtreeTask,
     values: &'a [Mutex<Values>],
     rhs: &'a [f64],
     space: &'a mut Space,
@@ -127,8 +127,8 @@ impl WithSimd for Forward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { fronts, factors, piece, values, rhs, space } = self;
-        for f in piece.start..piece.end {
+        let Self { fronts, factors, task, values, rhs, space } = self;
+        for f in task.start..task.end {
             let own = &mut *lock(&values[f]);
             collect(fronts, f, rhs, values, own);
             eliminate(simd, &fronts[f], &lock(&factors[f]), rhs, own, space);
@@ -136,11 +136,11 @@ impl WithSimd for Forward<'_> {
     }
 }
 
-/// Backward substitution over a piece.
+/// Backward substitution over a task.
 struct Backward<'a> {
     fronts: &'a [Front],
     factors: &'a [Mutex<Factor>],
-    piece: &'a Piece,
+    task: &'a SubtreeTask,
     values: &'a [Mutex<Values>],
     space: &'a mut Space,
 }
@@ -150,8 +150,8 @@ impl WithSimd for Backward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { fronts, factors, piece, values, space } = self;
-        for f in (piece.start..piece.end).rev() {
+        let Self { fronts, factors, task, values, space } = self;
+        for f in (task.start..task.end).rev() {
             let own = &mut *lock(&values[f]);
             substitute(simd, &fronts[f], &lock(&factors[f]), own, space);
             distribute(fronts, f, own, values);

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::store::allocations::{self, Lot, Sided};
 use crate::store::audit;
-use crate::store::feedback::{self, Source, Voice};
+use crate::store::feedback::{self, Attribution, Source};
 use crate::store::presentations::{self, Judgement, Kind, NewAnswer, NewPresentation, Presentation};
 use crate::store::studies::{FeedbackMode, StudyState};
 use crate::store::{
@@ -152,7 +152,7 @@ pub async fn answer(
         return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));
     }
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
-    let voice = Voice { source, author: &caller.name, note: &given.note };
+    let attribution = Attribution { source, author: &caller.name, note: &given.note };
     // From here on it is about the pair and not about its sides.
     let said = sided.turned(given.answer);
     // An earlier version showed the same gait twice, of which there is nothing to hear.
@@ -162,7 +162,7 @@ pub async fn answer(
         let fields = ("first", "second");
         let (study, pair) = (shown.study_id, shown.pair());
         // The server drew the pair; that this rater is asked again is meant.
-        let statement = GivenJudgement { study, pair, fields, said, voice, again: Again::Meant };
+        let statement = GivenJudgement { study, pair, fields, said, attribution, again: Again::Meant };
         preference::hear(writer, statement).await.map_err(without_gaits)?
     };
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;

@@ -8,7 +8,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::store::audit::Actor;
-use crate::store::feedback::{Source, Voice};
+use crate::store::feedback::{Attribution, Source};
 use crate::store::lab_answers::{self, LabAnswer};
 use crate::store::lab_sessions::{Act, LabSession};
 use crate::store::presentations::Judgement;
@@ -152,7 +152,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
         pair: walked,
         fields: ("walk 2", "walk 3"),
         said: given.said,
-        voice: Voice { source: Source::Subject, author: &author, note: &given.note },
+        attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
         // The same two gaits may be walked with in several sessions.
         again: Again::Meant,
     };

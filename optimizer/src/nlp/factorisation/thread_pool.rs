@@ -29,12 +29,12 @@ struct Signal {
 }
 
 /// Threads beside the caller's.
-pub(super) struct WorkerThreads {
+pub(super) struct ThreadPool {
     signal: Arc<Signal>,
     members: Vec<JoinHandle<()>>,
 }
 
-impl WorkerThreads {
+impl ThreadPool {
     /// Threads for a job, as many as asked for beside the caller's, or as can be had.
     pub(super) fn new<J: Job>(job: &Arc<J>, others: usize) -> Self {
         let signal = Arc::new(Signal::default());
@@ -64,7 +64,7 @@ impl WorkerThreads {
     }
 }
 
-impl Drop for WorkerThreads {
+impl Drop for ThreadPool {
     fn drop(&mut self) {
         self.signal.closed.store(true, Ordering::Release);
         for member in self.members.drain(..) {
@@ -75,7 +75,7 @@ impl Drop for WorkerThreads {
     }
 }
 
-/// What a member does until [`WorkerThreads`] is dropped.
+/// What a member does until the [`ThreadPool`] is dropped.
 fn serve(job: &impl Job, signal: &Signal, member: usize) {
     let (mut heard, mut looks) = (0, 0);
     while !signal.closed.load(Ordering::Acquire) {
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn nlp_every_call_is_done_when_it_returns_also_after_a_sleep() {
         let job = count(3);
-        let threads = WorkerThreads::new(&job, 2);
+        let threads = ThreadPool::new(&job, 2);
         for round in 1..=50 {
             job.left.store(100, Ordering::Release);
             assert!(threads.call(&*job));
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn nlp_a_member_that_panics_is_told_of_and_not_waited_for() {
         let job = count(2);
-        let threads = WorkerThreads::new(&job, 1);
+        let threads = ThreadPool::new(&job, 1);
         job.panics.store(true, Ordering::Relaxed);
         job.left.store(10, Ordering::Release);
         assert!(!threads.call(&*job));

@@ -1,11 +1,11 @@
-//! The feasibility phase: minimise rho |c(w)|_1 + zeta/2 |D (x - x_R)|^2 over the bounds, by elastics
-//! c(w) - p + n = 0, p, n >= 0 (WB06 section 3.3), on the same KKT pattern: p and n are attached variables.
+//! The restoration phase: minimise rho |c(w)|_1 + zeta/2 |D (x - x_R)|^2 over the bounds, by elastics
+//! c(w) - p + n = 0, p, n >= 0 (WB06 section 3.3), on the same KKT pattern: p and n are row variables.
 //!
 //! It returns to the problem when the violation has fallen enough and the filter accepts. Converging to a point that
 //! still violates proves local infeasibility; anything else proves nothing.
 
 use super::barrier;
-use super::formulation::{Attached, EvaluationTally, Formulation, Goal, RowKind};
+use super::formulation::{EvaluationTally, Formulation, Objective, RowKind, RowVariable};
 use super::interior_point::{Ending, Run, Session};
 use super::newton::{PrimalDual, largest};
 use super::settings::BoundMultiplierStart;
@@ -32,11 +32,11 @@ fn best_elastics(c: f64, mu: f64, rho: f64) -> (f64, f64) {
 fn elastic_formulation<'p>(base: &Formulation<'p>, w: &[f64], mu: f64, rho: f64) -> Formulation<'p> {
     let mut form = base.clone();
     form.tally = EvaluationTally::default();
-    let first = form.attached.len();
+    let first = form.row_variables.len();
     for i in 0..form.m {
         if form.rows[i] != RowKind::Free {
             for sign in [-1.0, 1.0] {
-                form.attached.push(Attached { row: i, sign });
+                form.row_variables.push(RowVariable { row: i, sign });
                 form.lower.push(0.0);
                 form.upper.push(f64::INFINITY);
             }
@@ -44,23 +44,23 @@ fn elastic_formulation<'p>(base: &Formulation<'p>, w: &[f64], mu: f64, rho: f64)
     }
     let reference = w[..form.n].to_vec();
     let weight = reference.iter().map(|x| 1.0 / x.abs().max(1.0)).collect();
-    form.goal = Goal::Feasibility { first, rho, zeta: mu.sqrt(), reference, weight };
+    form.objective = Objective::Restoration { first, rho, zeta: mu.sqrt(), reference, weight };
     form
 }
 
 /// Sets p and n to their best values for the present x and slacks; false when that changes nothing.
 pub(super) fn reset_elastics(run: &mut Run) -> bool {
-    let Goal::Feasibility { first, rho, .. } = run.form.goal else { return false };
+    let Objective::Restoration { first, rho, .. } = run.form.objective else { return false };
     let (n, mu) = (run.form.n, run.mu);
     if run.theta() <= 10.0 * f64::EPSILON {
         return false;
     }
     let mut own = run.c.clone();
-    for (a, t) in run.form.attached.iter().zip(&run.point.w[n..]).skip(first) {
+    for (a, t) in run.form.row_variables.iter().zip(&run.point.w[n..]).skip(first) {
         own[a.row] -= a.sign * t;
     }
-    for k in first..run.form.attached.len() {
-        let a = run.form.attached[k];
+    for k in first..run.form.row_variables.len() {
+        let a = run.form.row_variables[k];
         let (p, q) = best_elastics(own[a.row], mu, rho);
         run.point.w[n + k] = if a.sign < 0.0 { p } else { q };
         run.point.zl[n + k] = mu / run.point.w[n + k];
@@ -70,11 +70,11 @@ pub(super) fn reset_elastics(run: &mut Run) -> bool {
     run.is_finite()
 }
 
-/// Runs the feasibility phase from the present point. `None`: back with a point the filter accepts; otherwise how
+/// Runs the restoration phase from the present point. `None`: back with a point the filter accepts; otherwise how
 /// the solve ends (the point is then the phase's last one).
 pub(super) fn restore(run: &mut Run, session: &mut Session) -> Option<Ending> {
     let settings = session.settings;
-    session.counts.feasibility_phases += 1;
+    session.counts.restoration_phases += 1;
     let (theta, phi) = (run.theta(), run.phi());
     run.filter.add(theta, phi);
 
@@ -88,7 +88,7 @@ pub(super) fn restore(run: &mut Run, session: &mut Session) -> Option<Ending> {
         point.zl[j] = run.point.zl[j].min(rho);
         point.zu[j] = run.point.zu[j].min(rho);
     }
-    for (k, a) in form.attached.iter().enumerate().skip(length - form.n) {
+    for (k, a) in form.row_variables.iter().enumerate().skip(length - form.n) {
         let (p, q) = best_elastics(run.c[a.row], mu, rho);
         let t = if a.sign < 0.0 { p } else { q };
         point.w[form.n + k] = t;
