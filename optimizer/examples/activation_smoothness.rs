@@ -1,5 +1,5 @@
 //! What the regularisation of activation and fibre velocity does: objective, cost and alternation of the activations
-//! from mesh point to mesh point with and without each.
+//! from node to node with and without each.
 //!
 //! `cargo run --release -p gait-optimizer --example activation_smoothness -- [--subject 1]`. Columns: the
 //! root-mean-square bend (second difference of neighbouring points), of the activations and of the fibre velocities

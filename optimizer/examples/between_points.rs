@@ -1,5 +1,5 @@
-//! What holds between the mesh points: certificates of gaits of random actions of Table I, as they are at their mesh
-//! points, and solved on with tightened bounds.
+//! What holds between the nodes: certificates of gaits of random actions of Table I, as they are at their nodes, and solved
+//! on with tightened bounds.
 //!
 //! `cargo run --release -p gait-optimizer --example between_points -- [--subject 1] [--muscles on] [--draws 20] [--seed 1]
 //! [--threads 1]`: one CSV row each, counts and medians at the end.
@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     eprintln!(
-        "{solved} of {draws} converged; certificates passed: {passed} at mesh points only, {passed_after} with bounds tightened; tightened: {}, of these in the median {} iterations more, {:.2} of the cold time, cost {:+.2} %",
+        "{solved} of {draws} converged; certificates passed: {passed} at nodes only, {passed_after} with bounds tightened; tightened: {}, of these in the median {} iterations more, {:.2} of the cold time, cost {:+.2} %",
         more_iterations.len(),
         median(&mut more_iterations),
         median(&mut shares),

@@ -1,9 +1,9 @@
 //! The certificate of a gait: what the gait problem promised, checked without its code.
 //!
-//! From the gait as it is handed out (Bezier coefficients, phase limits, hip velocities, mesh points) and the physics of
+//! From the gait as it is handed out (Bezier coefficients, phase limits, hip velocities, nodes) and the physics of
 //! [`crate::body`], [`crate::muscle`] and [`crate::walking`] alone:
 //!
-//! 1. the residuals of C1-C12 at the mesh points and on a grid ten times finer (`residuals`);
+//! 1. the residuals of C1-C12 at the nodes and on a grid ten times finer (`residuals`);
 //! 2. the closed loop of the full hybrid system under feedback linearisation with the gait's own virtual constraints:
 //!    [`STRIDES`] strides, and contacts, friction and torques over a periodic stride (`closed_loop`);
 //! 3. the multipliers of the stride-to-stride map, by variational equations and by differences ([`ReturnMap`]), with the

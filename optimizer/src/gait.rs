@@ -82,7 +82,7 @@ pub enum Axis {
     Z,
 }
 
-/// The trajectory within one domain at its equidistant mesh points.
+/// The trajectory within one domain at its equidistant nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DomainTrajectory {
     /// `DS2_R`, `DS3_R`, `SS2_R`, `SS1_R`, `DS2_L`, ... (R: stance on the prosthesis).
@@ -129,17 +129,17 @@ pub struct MuscleTrajectory {
 }
 
 impl Gait {
-    /// Coordinates at a time of the stride, s, linear between mesh points; clamped to the stride.
+    /// Coordinates at a time of the stride, s, linear between nodes; clamped to the stride.
     pub fn coordinates_at(&self, time_s: f64) -> [f64; 9] {
         self.between(time_s, |domain| Some(&domain.q)).unwrap_or([0.0; 9])
     }
 
-    /// Activations of the ten muscles at a time of the stride, s, linear between mesh points; none without muscles.
+    /// Activations of the ten muscles at a time of the stride, s, linear between nodes; none without muscles.
     pub fn activations_at(&self, time_s: f64) -> Option<[f64; 10]> {
         self.between(time_s, |domain| domain.muscles.as_ref().map(|muscles| &muscles.activation))
     }
 
-    /// What the mesh points have at a time of the stride.
+    /// What the nodes have at a time of the stride.
     fn between<const N: usize>(
         &self,
         time_s: f64,

@@ -43,7 +43,7 @@ pub fn alternations(curve: &[f64]) -> usize {
     steps.windows(3).filter(alternate).count()
 }
 
-/// How often the muscles' activations alternate from mesh point to mesh point within the domains.
+/// How often the muscles' activations alternate from node to node within the domains.
 pub fn activation_alternations(gait: &Gait) -> usize {
     let muscles = gait.domains.iter().filter_map(|domain| domain.muscles.as_ref());
     muscles

@@ -48,7 +48,7 @@ pub enum SolveError {
 /// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]; when none
 /// converges, it tries the others of the catalogue until one does ([`SolveOptions::retry`]). A warm start that does not
 /// converge falls back to a cold start; when that does not converge either, the outcome is where the violation is
-/// smallest. A gait that exceeds its bounds between its mesh points is solved on with tightened bounds
+/// smallest. A gait that exceeds its bounds between its nodes is solved on with tightened bounds
 /// ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on the calling thread.
 /// A solve that ends without a gait is an `Ok` outcome with another status than `Converged`.
 ///
@@ -83,7 +83,7 @@ pub fn solve(
     finish(&context, tried, chosen, started_from)
 }
 
-/// Solves one gait problem from an earlier solve only, as it is at its mesh points.
+/// Solves one gait problem from an earlier solve only, as it is at its nodes.
 ///
 /// # Errors
 /// [`SolveError`] when the input is invalid or the warm start is of another problem.
@@ -101,7 +101,7 @@ pub(crate) fn solve_from_warm_start(
     finish(&context, vec![tried], 0, StartedFrom::Warm)
 }
 
-/// Solves one gait problem cold from the given guesses only, as it is at its mesh points: for studies of basins and of
+/// Solves one gait problem cold from the given guesses only, as it is at its nodes: for studies of basins and of
 /// the solver.
 ///
 /// # Errors

@@ -51,11 +51,11 @@ fn a_certificate_is_deterministic_and_survives_json() {
 }
 
 #[test]
-fn a_changed_torque_is_found_at_its_mesh_point() {
+fn a_changed_torque_is_found_at_its_node() {
     let (_, mut gait) = golden_gait(1, false);
     gait.domains[3].u[4][1] += 1.0;
     let certificate = certificate(&gait);
-    assert!(objects_to(&certificate, "C1 equations of motion, moments, at mesh points"));
+    assert!(objects_to(&certificate, "C1 equations of motion, moments, at nodes"));
     let check = certificate.checks.iter().find(|c| c.name.starts_with("C1 equations of motion, moments, at")).unwrap();
     assert!((check.value.unwrap() - 1.0).abs() < 1e-6 && check.place.starts_with("SS1_R"), "{check:?}");
 }

@@ -115,7 +115,7 @@ fn phase_and_hip_velocity_of_the_golden_gaits() {
     }
 }
 
-/// The programme of the golden gaits lets activations alternate from mesh point to mesh point; the default one does not.
+/// The programme of the golden gaits lets activations alternate from node to node; the default one does not.
 #[test]
 fn activations_do_not_alternate_with_the_default_weights() {
     for subject in [1, 2] {

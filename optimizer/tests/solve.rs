@@ -51,14 +51,14 @@ fn cold_then_warm() {
     assert!(attempts.iter().rev().map(|a| a.chosen).eq((0..attempts.len()).map(|i| i == 0)));
 }
 
-/// Whatever the certificate finds between the mesh points.
+/// Whatever the certificate finds between the nodes.
 fn objections_between_points(outcome: &SolveOutcome) -> Vec<String> {
     let certificate = certify(&outcome.gait).unwrap();
-    certificate.objections.into_iter().filter(|words| words.contains("between mesh points")).collect()
+    certificate.objections.into_iter().filter(|words| words.contains("between nodes")).collect()
 }
 
 #[test]
-fn bounds_hold_between_the_mesh_points() {
+fn bounds_hold_between_the_nodes() {
     // On the default mesh: a coarser one leaves contacts a millimetre away between its points.
     let bounds = "a1=20,a2=90,a3=0.5,a4=1.3,a5=0.039,a6=0.5,a7=50,a8=30";
     let problem = GaitProblem { settings: GaitSettings::default(), ..problem(bounds) };

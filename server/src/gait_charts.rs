@@ -53,7 +53,7 @@ impl Group {
 /// So many points are drawn for each of a gait's own.
 const DRAWN_PARTS: usize = 6;
 
-/// A gait as it is drawn: smooth between its mesh points.
+/// A gait as it is drawn: smooth between its nodes.
 fn drawn(gait: &Gait) -> Gait {
     gait.refined(DRAWN_PARTS)
 }
@@ -298,7 +298,7 @@ fn phase_in_words(phase: Phase) -> &'static str {
         Phase::MuscleTracking => "tracking with muscles",
         Phase::PlainCost => "cost without muscles",
         Phase::Cost => "cost",
-        Phase::BetweenPoints => "bounds tightened between mesh points",
+        Phase::BetweenPoints => "bounds tightened between nodes",
     }
 }
 

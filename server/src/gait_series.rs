@@ -19,7 +19,7 @@ pub(crate) const FORCE_NAMES: [&str; 8] = [
 pub(crate) const MUSCLES: [&str; 10] =
     ["HAM_L", "GLU_L", "HFL_L", "GAS_L", "VAS_L", "SOL_L", "TA_L", "HAM_R", "GLU_R", "HFL_R"];
 
-/// One mesh point.
+/// One node.
 #[derive(Debug)]
 pub(crate) struct Point<'a> {
     /// Time since right heel strike, s.
@@ -40,7 +40,7 @@ pub(crate) struct Point<'a> {
     pub(crate) fibre_length: Option<&'a [f64; 10]>,
 }
 
-/// The mesh points of all domains, in time. A domain's last point and the next one's first have the same time:
+/// The nodes of all domains, in time. A domain's last point and the next one's first have the same time:
 /// between them velocities and forces may jump.
 pub(crate) fn points(gait: &Gait) -> Vec<Point<'_>> {
     let mut points = Vec::new();

@@ -1,4 +1,4 @@
-//! A gait as a table: one row per mesh point.
+//! A gait as a table: one row per node.
 
 use crate::csv_table::{Cell, CsvTable, cells};
 use crate::gait_series::{FORCE_NAMES, MUSCLES, points};

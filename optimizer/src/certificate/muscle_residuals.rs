@@ -47,7 +47,7 @@ pub(super) fn note(
     worst.note(point, &RANGE, excess);
 }
 
-/// How far the fibre lengths that are written at a mesh point are from those of the cubic through the interval's ends.
+/// How far the fibre lengths that are written at a node are from those of the cubic through the interval's ends.
 pub(super) fn note_written(
     point: &GridPoint<'_>,
     written: &[f64; MUSCLE_COUNT],

@@ -1,4 +1,4 @@
-//! C1-C4 of the gait as it stands, at its mesh points and on a grid ten times finer.
+//! C1-C4 of the gait as it stands, at its nodes and on a grid ten times finer.
 
 use super::check::{Check, Place, Quantity, Worst};
 use super::contact::Contact;
@@ -10,10 +10,10 @@ use crate::gait::motion::{Instant, instant};
 use crate::gait::{Axis, FootPoint, Gait, Side};
 use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
-/// Grid points per gap between mesh points.
+/// Grid points per gap between nodes.
 pub(super) const REFINEMENT: usize = 10;
 
-/// A quantity with what is allowed at the mesh points, where the gait problem imposed it, and between them, where it
+/// A quantity with what is allowed at the nodes, where the gait problem imposed it, and between them, where it
 /// follows from them as far as the mesh is fine enough. `None`: reported only. Those are the quantities in which the
 /// torques and muscle states between the points occur, a parabola that nobody executes: what a controller applies
 /// there, the closed loop says.
@@ -65,7 +65,7 @@ pub(super) struct GridPoint<'a> {
     on_mesh: bool,
 }
 
-/// The worst values at the mesh points, between them, and of everything else.
+/// The worst values at the nodes, between them, and of everything else.
 #[derive(Default)]
 pub(super) struct Findings {
     at_points: Worst,
@@ -84,8 +84,8 @@ impl Findings {
     }
 
     fn into_checks(self) -> Vec<Check> {
-        let mut checks = self.at_points.into_checks(", at mesh points");
-        checks.extend(self.between.into_checks(", between mesh points"));
+        let mut checks = self.at_points.into_checks(", at nodes");
+        checks.extend(self.between.into_checks(", between nodes"));
         checks.extend(self.other.into_checks(""));
         checks
     }

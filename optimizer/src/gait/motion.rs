@@ -1,4 +1,4 @@
-//! The gait between its mesh points: the continuous motion that its numbers stand for.
+//! The gait between its nodes: the continuous motion that its numbers stand for.
 //!
 //! Coordinates: the quintic through position, velocity and acceleration of neighbouring points. Torques and forces: the
 //! parabola through the three points of a mesh interval. Fibre lengths: the cubic of Hermite-Simpson collocation, whose
@@ -64,7 +64,7 @@ pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> Instant {
 
 impl Gait {
     /// The same gait with `parts` points for each of its own, for drawing: coordinates with velocities and accelerations,
-    /// and fibre lengths, as they are between the mesh points; what has no derivatives there, linear. What is not a
+    /// and fibre lengths, as they are between the nodes; what has no derivatives there, linear. What is not a
     /// well-formed gait stays as it is.
     #[must_use]
     pub fn refined(&self, parts: usize) -> Self {

@@ -58,7 +58,7 @@ fn swing_share(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> Sw
     SwingShare { w, gradient, hessian, durations }
 }
 
-/// A height row at a relative time of domain `d`, on a mesh point or not: the height, less the swing clearance where it
+/// A height row at a relative time of domain `d`, on a node or not: the height, less the swing clearance where it
 /// applies.
 pub(super) fn height_row(
     programme: &GaitProgramme,

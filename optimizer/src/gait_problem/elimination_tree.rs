@@ -2,9 +2,9 @@
 //!
 //! From the leaves to the root:
 //!
-//! * each muscle at each mesh point (states and force row; its activation higher, with the interval, where the objective
+//! * each muscle at each node (states and force row; its activation higher, with the interval, where the objective
 //!   couples the activations of neighbouring points);
-//! * each mesh point;
+//! * each node;
 //! * the integration rows of each mesh interval, by bisection of the domain, so that an interval meets few others;
 //! * each domain (Bezier coefficients, phase limits);
 //! * each transition between domains (resets, impulse, and the velocities before an impact with the rows that determine

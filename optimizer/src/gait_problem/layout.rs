@@ -133,7 +133,7 @@ pub struct Layout {
     pub scale: Vec<f64>,
 }
 
-/// The variables of one mesh point in physical units.
+/// The variables of one node in physical units.
 #[derive(Debug, Clone, Copy)]
 pub struct PointVariables {
     /// Coordinates.

@@ -1,6 +1,6 @@
-//! By how much bounds at mesh points are tightened, so that the gait keeps them between the points too.
+//! By how much bounds at nodes are tightened, so that the gait keeps them between the points too.
 //!
-//! A gait satisfies its constraints at the mesh points; between two points that lie at a bound it may exceed it. What it
+//! A gait satisfies its constraints at the nodes; between two points that lie at a bound it may exceed it. What it
 //! exceeds there is taken from the bound at both, and the programme is solved on (an exchange method of semi-infinite
 //! programming, Hettich and Kortanek 1993, section 7).
 
@@ -61,7 +61,7 @@ impl From<MarginLists> for Margins {
     }
 }
 
-/// What a gait exceeds between its mesh points.
+/// What a gait exceeds between its nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excess {
     /// By how much, at the points beside.
@@ -164,7 +164,7 @@ impl Excess {
     }
 }
 
-/// What `gait`, the gait of the point `x` of `programme`, exceeds between its mesh points: bounds of coordinates,
+/// What `gait`, the gait of the point `x` of `programme`, exceeds between its nodes: bounds of coordinates,
 /// torques, activations and fibre velocities, the heights of the feet, normal forces and friction.
 pub fn excess_between_points(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> Excess {
     let mut values = vec![0.0; programme.rows.names.len()];

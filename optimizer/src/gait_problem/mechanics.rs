@@ -1,4 +1,4 @@
-//! C1 at one mesh point: equations of motion and the kinematics of the contact points.
+//! C1 at one node: equations of motion and the kinematics of the contact points.
 //!
 //! `M qdd + h = B u + J^T lambda` (divided by 100), `J qdd + Jdot qd = 0` (divided by 10), contact positions and
 //! velocities. All terms live in link space, so the Hessian of every row of a point is accumulated there once,

@@ -35,7 +35,7 @@ fn transfer_variables(from: &GaitProgramme, to: &GaitProgramme, values: &[f64], 
             }
         }
     }
-    // What does not belong to a mesh point comes last, in the same order.
+    // What does not belong to a node comes last, in the same order.
     let (start_old, start) = (from.layout.hip_velocities, to.layout.hip_velocities);
     result[start..].copy_from_slice(&values[start_old..]);
     result

@@ -328,7 +328,7 @@ impl GaitProgramme {
         self.phase_of_stance(self.layout.domains[d].domain.stance).along(q)
     }
 
-    /// A variable vector with everything that is not at a mesh point taken from another programme of the same mesh
+    /// A variable vector with everything that is not at a node taken from another programme of the same mesh
     /// (its point blocks are zero).
     pub fn adopt_globals(&self, other: &Self, x_other: &[f64]) -> Vec<f64> {
         let mut x = vec![0.0; self.layout.variables];

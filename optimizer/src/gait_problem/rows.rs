@@ -215,7 +215,7 @@ impl RowName {
     }
 }
 
-/// First row of each group at one mesh point. Groups that a point lacks are `None` or empty.
+/// First row of each group at one node. Groups that a point lacks are `None` or empty.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointRows {
     /// 9 rows.

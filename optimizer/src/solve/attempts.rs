@@ -1,5 +1,5 @@
 //! What a solve tries: a warm start, then cold guesses side by side; which attempt is the answer; and what becomes of it
-//! between its mesh points.
+//! between its nodes.
 
 use super::cold_guesses::ColdGuess;
 use super::run::{Context, Run};
@@ -133,7 +133,7 @@ pub(super) fn number_basins(tried: &mut [Tried]) {
     }
 }
 
-/// Solves on from the chosen gait with bounds tightened where it exceeds them between its mesh points, until it does not
+/// Solves on from the chosen gait with bounds tightened where it exceeds them between its nodes, until it does not
 /// or the rounds are over. Index of the answer: the last gait that converged, or what was cancelled.
 pub(super) fn keep_between_points(
     context: &Context<'_>,
@@ -156,7 +156,7 @@ pub(super) fn keep_between_points(
         let mut run = Run::new(context, context.options.threads, observer);
         run.guess = tried.len();
         let result = run.warm(Phase::BetweenPoints, &context.programme.tightened(&margins), point)?;
-        let mut next = Tried::new(context, result, "bounds tightened between mesh points", margins, &run);
+        let mut next = Tried::new(context, result, "bounds tightened between nodes", margins, &run);
         next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.choice.status == SolveStatus::Converged);
         let status = next.choice.status;
         tried.push(next);

@@ -25,7 +25,7 @@ pub struct SolveOptions {
     pub retry: bool,
     /// Which of the converged guesses is the answer.
     pub basin_choice: BasinChoice,
-    /// How often bounds are tightened where the gait exceeds them between its mesh points by more than half of what its
+    /// How often bounds are tightened where the gait exceeds them between its nodes by more than half of what its
     /// certificate allows there, each time solving on from where it was; 0: never.
     pub tightening_rounds: usize,
     /// Settings of the interior point, but for those that the phases of a solve decide. In JSON only

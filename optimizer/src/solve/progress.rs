@@ -38,7 +38,7 @@ pub enum Phase {
     PlainCost,
     /// Minimising the cost of transport.
     Cost,
-    /// The same with bounds tightened where the gait exceeded them between its mesh points.
+    /// The same with bounds tightened where the gait exceeded them between its nodes.
     BetweenPoints,
 }
 

@@ -160,7 +160,7 @@ pub struct SolveReport {
     /// versions that did not say.
     #[serde(default)]
     pub optimality: Option<Optimality>,
-    /// How many bounds at mesh points are tightened so that the gait keeps them between the points too.
+    /// How many bounds at nodes are tightened so that the gait keeps them between the points too.
     #[serde(default)]
     pub tightened_bounds: usize,
     /// Wall time, s.
@@ -213,7 +213,7 @@ pub struct OtherBasin {
     pub objective: f64,
     /// Gait RMSE there, rad.
     pub gait_rmse_rad: f64,
-    /// The gait, which keeps its bounds at its mesh points; a solve from `warm_start` sees to it between them too.
+    /// The gait, which keeps its bounds at its nodes; a solve from `warm_start` sees to it between them too.
     pub gait: Gait,
     /// For solving on in this basin.
     pub warm_start: WarmStart,

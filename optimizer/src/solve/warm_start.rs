@@ -17,7 +17,7 @@ pub struct WarmStart {
     pub mesh: Mesh,
     /// Scaled primal variables and all multipliers.
     pub point: WarmPoint,
-    /// Bounds that were tightened for the sake of the gait between its mesh points.
+    /// Bounds that were tightened for the sake of the gait between its nodes.
     #[serde(default, skip_serializing_if = "Margins::is_empty")]
     pub margins: Margins,
 }

@@ -13,7 +13,7 @@ pub(crate) fn clearance_profile(w: f64) -> [f64; 3] {
     [bump * bump, 2.0 * bump * slope, 2.0 * slope * slope - 16.0 * bump]
 }
 
-/// The largest clearance `c` that a gait keeps at every mesh point of both swings, m; none of a gait without a swing.
+/// The largest clearance `c` that a gait keeps at every node of both swings, m; none of a gait without a swing.
 ///
 /// # Errors
 /// [`ModelError`] when the gait's subject or device is invalid.

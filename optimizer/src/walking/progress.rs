@@ -5,7 +5,7 @@ use crate::body::WalkerModel;
 use crate::gait::Gait;
 use crate::subject::ModelError;
 
-/// Progress at a mesh point.
+/// Progress at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Phase of the domain: 0 at its planned start, 1 at its planned end.
@@ -14,7 +14,7 @@ pub struct Progress {
     pub hip_velocity_m_s: f64,
 }
 
-/// Progress at the mesh points of all domains, in time.
+/// Progress at the nodes of all domains, in time.
 ///
 /// # Errors
 /// [`ModelError`] when the gait's subject or device is invalid.

@@ -33,7 +33,7 @@ pub struct LegPoints {
     pub toe: [f64; 2],
 }
 
-/// Stick figures of a gait at its mesh points, in time order.
+/// Stick figures of a gait at its nodes, in time order.
 ///
 /// # Errors
 /// [`ModelError`] when the gait's subject or device is invalid.

@@ -135,7 +135,7 @@ impl Pair {
     }
 }
 
-/// Reference angles at the mesh points: domain boundaries at 0, 7, 12, 33, 50 % of each step's half stride.
+/// Reference angles at the nodes: domain boundaries at 0, 7, 12, 33, 50 % of each step's half stride.
 fn tracked_angles(table: &[[f64; 5]], intervals: [usize; 4]) -> Vec<Vec<[f64; 7]>> {
     let boundaries = [0.0, 0.07, 0.12, 0.33, 0.50];
     let at = |fraction: f64, column: usize| {

@@ -251,7 +251,7 @@ pub fn dissect(points: usize, leaf: usize) -> (Vec<Option<usize>>, Vec<usize>) {
     (parent, of.into_iter().map(|b| count - 1 - b).collect())
 }
 
-/// A synthetic problem of the size and structure of a gait optimisation: `domains` x `points` mesh points with 18 state
+/// A synthetic problem of the size and structure of a gait optimisation: `domains` x `points` nodes with 18 state
 /// and 42 algebraic variables, 42 algebraic rows and 18 defect rows each, 3 inequality rows, 30 parameters per domain,
 /// 4 globals, periodic end. Blocks: the algebraic part of each point, then its states, by nested dissection of the
 /// points inside a domain, domain parameters, and globals.

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// What a gait is converted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// Table of the mesh points (CSV): angles, velocities, torques, forces, activations in SI units.
+    /// Table of the nodes (CSV): angles, velocities, torques, forces, activations in SI units.
     Csv,
     /// OpenSim motion file (.mot), degrees, OpenSim's signs.
     Mot,

@@ -53,7 +53,7 @@ pub struct Dimension {
 /// A row of the gait problem that was not met.
 #[derive(Debug, ToSchema)]
 pub struct Violation {
-    /// The row in words: domain, mesh point, constraint, component.
+    /// The row in words: domain, node, constraint, component.
     pub row: String,
     /// By how much.
     pub amount: f64,

@@ -88,13 +88,13 @@ impl Schedule {
         let mut last: Vec<(usize, usize)> = single.iter().map(|&f| (f, f)).collect();
         last.extend(subtrees.iter().map(|&f| (f, start[f])));
         last.sort_unstable();
-        let piece_of = |f: usize| last.binary_search_by_key(&f, |(end, _)| *end).ok();
+        let task_of = |f: usize| last.binary_search_by_key(&f, |(end, _)| *end).ok();
         let mut tasks: Vec<SubtreeTask> = last
             .iter()
             .map(|&(f, start)| SubtreeTask {
                 start,
                 end: f + 1,
-                parent: parent[f].and_then(piece_of),
+                parent: parent[f].and_then(task_of),
                 children: Vec::new(),
             })
             .collect();

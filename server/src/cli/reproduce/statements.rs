@@ -61,7 +61,7 @@ fn stable(outcomes: &[Outcome]) -> Statement {
         paper: "Both gaits walk in stable limit cycles (figure 5)".to_owned(),
         here: format!(
             "{passed} of {with_gait} best gaits pass their certificate (20 strides of the simulated closed loop, multipliers, \
-             constraints between mesh points){others}"
+             constraints between nodes){others}"
         ),
         agrees: match passed {
             0 => "no",

@@ -43,7 +43,7 @@ pub(super) async fn get(
     operation_id = "get_gait_csv",
     tag = "trials",
     params(("id" = TrialId, Path, description = "The trial")),
-    responses((status = 200, description = "One row per mesh point", body = String, content_type = "text/csv")),
+    responses((status = 200, description = "One row per node", body = String, content_type = "text/csv")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get_csv(
