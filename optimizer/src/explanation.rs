@@ -323,7 +323,7 @@ fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
 /// Explains a solve that did not converge: finds the smallest conflict among its tuned bounds, then which of them has to give
 /// way and how far, by solving with other bounds.
 ///
-/// Takes some dozens of solves. `progress` is told what is being found out. `None`: cancelled, or the solve converged or was
+/// Takes some dozens of solves. `progress` hears of each step. `None`: cancelled, or the solve converged or was
 /// cancelled itself.
 ///
 /// # Errors

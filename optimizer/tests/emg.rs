@@ -105,7 +105,7 @@ fn rectified_signals_and_envelopes_are_refused_and_raw_ones_are_not() {
             "{reason}"
         );
     }
-    // Too short to be filtered: that is told where it is.
+    // Too short to be filtered: the error names the place.
     assert_eq!(checked(bursts()[..25].to_vec()), Ok(()));
 }
 

@@ -158,7 +158,7 @@ type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
 const FORGERIES: [Forgery; 56] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "not those of its report"),
-    ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its Gait RMSE is told as 0.01 rad"),
+    ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its Gait RMSE is stated as 0.01 rad"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
     ("a better cost", |r| r.first("trials")["cost_of_transport"] = 0.01.into(), "not those of its report"),
     ("a violation that converges", |r| everywhere(r, "max_violation", 0.5), "converged with a violation of 0.5"),
@@ -171,7 +171,7 @@ const FORGERIES: [Forgery; 56] = [
             let result = r.table("results").into_iter().find(|row| row["trial_id"] == id).unwrap();
             within(result, "report", |report| report["gait_rmse_parts_rad"] = parts.clone());
         },
-        "its Gait RMSE is told as",
+        "its Gait RMSE is stated as",
     ),
     ("a gait that is not its hash", |r| r.first("gaits")["gait_sha256"] = "0".repeat(64).into(), "has changed"),
     (
@@ -195,7 +195,7 @@ const FORGERIES: [Forgery; 56] = [
     (
         "a changed angle",
         |r| gait(r.first("gaits"), |g| g["domains"][0]["q"][1][5] = 1.0.into()),
-        "its Gait RMSE is told as",
+        "its Gait RMSE is stated as",
     ),
     ("a gait without domains", |r| gait(r.first("gaits"), |g| g["domains"] = json!([])), "number of domains"),
     ("a gait of missing points", |r| gait(r.first("gaits"), |g| g["domains"][0]["qd"] = json!([])), "has 0 entries"),

@@ -50,7 +50,7 @@ async fn errors_in_the_browser_are_pages_and_problem_documents_for_programs() {
         (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
         ("/nothing".to_owned(), StatusCode::NOT_FOUND),
     ] {
-        is_page(&service.fetch(&path).await, status, "Back to the first page");
+        is_page(&service.fetch(&path).await, status, "Back to the home page");
     }
     let wrong_method = service.post("/api/v1/health", &json!({})).await;
     assert_eq!(wrong_method.status, StatusCode::METHOD_NOT_ALLOWED);

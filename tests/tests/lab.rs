@@ -235,7 +235,7 @@ async fn what_the_person_who_walked_says_is_heard_when_the_order_is_told() {
     let said = json!({"number": 2, "answer": "second", "note": "softer"});
     let seen = service.post(&answers, &said).await.json();
     assert_eq!((&seen["answer"]["answer"], &seen["can_be_taken_back"]), (&json!("second"), &json!(true)));
-    assert!(heard(&service, study).await.is_empty(), "before the order is told");
+    assert!(heard(&service, study).await.is_empty(), "before unblinding");
 
     service.post(&format!("{session}/unblind"), &json!({"reason": "all were walked"})).await;
     let rows = heard(&service, study).await;

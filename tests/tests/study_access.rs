@@ -94,7 +94,7 @@ impl Closed {
     }
 }
 
-/// What the whole service shares: no study is told by it.
+/// What the whole service shares: it reveals no study.
 const SHARED: [&str; 6] = ["subjects", "devices", "reference-gaits", "users", "tokens", "sessions"];
 /// The same of pages.
 const SHARED_PAGES: [&str; 3] = ["subjects", "devices", "references"];

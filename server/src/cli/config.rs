@@ -33,7 +33,7 @@ const KNOWN: &[(&str, &str, &str)] = &[
     ),
     ("workers", "cores", "how many solves at the same time; with nats, over all its workers together"),
     ("nats", "", "NATS broker whose workers solve, nats://HOST:PORT; empty: this process solves itself"),
-    ("nats_queue", "gaitwright", "name of this service on the broker; its workers are told the same"),
+    ("nats_queue", "gaitwright", "name of this service on the broker; its workers need the same name"),
     ("sign_in", "true", "whether people and programs say who they are; false on this machine only"),
     ("idle_minutes", "60", "a session without a sign of life for so long ends"),
     ("session_hours", "12", "a session ends so long after signing in, used or not"),

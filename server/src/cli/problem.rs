@@ -178,7 +178,7 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// A file, read and checked; what is wrong is told with its name.
+/// Reads and checks a file; errors name it.
 pub(super) fn read_document<T: DeserializeOwned>(
     path: &Path,
     what: &str,

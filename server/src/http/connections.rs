@@ -135,7 +135,7 @@ struct Table {
     next: u64,
     by_number: HashMap<u64, Arc<Connection>>,
     by_network: HashMap<String, usize>,
-    /// What the log was not told yet: connections closed, connections refused.
+    /// Not logged yet: connections closed, connections refused.
     untold: (u64, u64),
     told_at: Option<Instant>,
 }

@@ -104,7 +104,7 @@ pub(super) async fn in_path<T: Located, P: Permission>(
     parts: &mut Parts,
     app: &AppState,
 ) -> Result<(T, Option<StudyId>), Error> {
-    // The right comes first: who lacks it is told that, whether the thing exists or not.
+    // The right comes first: the refusal is the same whether the thing exists or not.
     let reach = permitted::<P>(&parts.extensions)?.reach();
     let named = RawPathParams::from_request_parts(parts, app).await.map_err(|e| Error::Malformed(e.body_text()))?;
     let text = named.iter().find(|(name, _)| *name == "id").map_or("", |(_, text)| text);

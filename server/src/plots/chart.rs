@@ -299,7 +299,7 @@ fn numbers(places: &[f64]) -> Vec<(f64, String)> {
 }
 
 impl Stroke {
-    /// Lines of one chart that are told apart without their colours; after five they begin anew.
+    /// Dash patterns, so that the lines of a chart differ without colours; after five they repeat.
     pub const APART: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
 
     fn class(self) -> &'static str {

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 pub enum Act {
     /// A walk was recorded: 1, 2, 3.
     Walk(u8),
-    /// Somebody was told which walk was with which gait.
+    /// Unblinded: somebody knows which walk was with which gait.
     Unblinded,
     /// Nothing is recorded any more.
     Closed,

@@ -203,7 +203,7 @@ impl Shared {
         // The commit makes a log that was cut as long as before, with a hole in it: its length tells nothing afterwards.
         self.outside.check()?;
         run(connection, "commit").await?;
-        // Nobody is told that a change is durable which went into a file that nobody will find again.
+        // A change that went into a deleted file must not be acknowledged.
         self.outside.check()?;
         if let Some((anchors, ends)) = anchored {
             anchors.write(&ends);

@@ -97,7 +97,7 @@ pub fn attribution<'a>(
     Ok(Attribution { source, author, note })
 }
 
-/// So many answers of others are told.
+/// A comparison lists so many answers of others.
 const BESIDE: u32 = 20;
 
 /// The newest answers of others to the same comparison, which stand beside an answer: all of them count.

@@ -128,7 +128,7 @@ pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) 
     new.feedback_mode = fork.feedback_mode.unwrap_or(new.feedback_mode);
     new.start = fork.start;
     let made = plan::create_from(writer, actor, new, Some(id)).await?;
-    // What a restricted study is made of is told to its members alone, in a copy, too.
+    // Only members see what a restricted study is made of, in a copy too.
     members::inherit(writer, id, made.id, actor.as_str()).await?;
     Ok(made)
 }

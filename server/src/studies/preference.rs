@@ -106,7 +106,7 @@ pub enum StandingAnswer {
     Note(crate::store::RemarkId),
 }
 
-/// The newest answer of a person to a comparison that was not retracted; answers that were given blindly are not told.
+/// The newest answer of a person to a comparison that was not retracted; blind answers are not shown.
 ///
 /// # Errors
 /// What the database reports.

@@ -33,7 +33,7 @@ pub enum SafetyReportSource {
     Rater(PresentationId),
     /// In a remark.
     Staff(RemarkId),
-    /// The person who walked, in a lab session whose order was not told.
+    /// The subject, in a lab session that is not unblinded.
     Subject,
 }
 
@@ -90,11 +90,11 @@ impl SafetyReports {
         }
         for session in lab_sessions::of_study(db, study).await? {
             if session.done(lab_sessions::Act::Unblinded).is_some() {
-                // What was said there was told with the order: it is a remark, or a preference.
+                // After unblinding its answers are remarks or preferences.
                 continue;
             }
             if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
-                // Which of the two it is would tell the order: both are closed until that is told.
+                // Naming one of the two would reveal the order: both are closed until unblinding.
                 let by = format!("the subject in lab session {}, of one of its two gaits or both", session.number);
                 let (at, said) = (answer.at, SafetyReportSource::Subject);
                 let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };

@@ -92,7 +92,7 @@ async fn heard_of(db: &mut Connection, said: SafetyReportSource) -> StoreResult<
     match said {
         SafetyReportSource::Rater(id) => presentations::heard_of(db, id).await,
         SafetyReportSource::Staff(id) => Ok(remarks::get(db, id).await?.feedback_id),
-        // The learner hears it when the order is told.
+        // It reaches the learner at unblinding.
         SafetyReportSource::Subject => Ok(None),
     }
 }

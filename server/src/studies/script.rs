@@ -158,7 +158,7 @@ pub struct Heard {
     answers: Vec<FeedbackContent>,
 }
 
-/// Checks what was told and what follows from it: no transaction is open yet.
+/// Checks the outcome that a script tells, and what follows from it: no transaction is open yet.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the trial is not open to be told.
@@ -222,7 +222,7 @@ fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
     })
 }
 
-/// Writes what was told. `None`: the study heard something else meanwhile; look again.
+/// Writes the outcome. `None`: the study has changed meanwhile; look again.
 ///
 /// # Errors
 /// What the database reports.

@@ -18,7 +18,7 @@ use thiserror::Error as ThisError;
 pub enum Certified {
     /// It passed.
     Passed,
-    /// It failed: whoever gets the gait is told.
+    /// It failed, and the controller file says so.
     Failed,
     /// The lab evaluated the trial itself; the record has no gait to certify.
     ByLab,

@@ -22,7 +22,7 @@ pub(crate) fn stand_back(niceness: i32) {
     let _ = niceness;
 }
 
-/// Does some work on a thread of its own that gives way to every solve. Nothing is told when it panics; nobody waits for the
+/// Does some work on a thread of its own that gives way to every solve. A panic is not reported; nobody waits for the
 /// thread when the receiver is dropped.
 ///
 /// # Errors

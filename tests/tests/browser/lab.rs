@@ -125,7 +125,7 @@ async fn browser_in_the_lab_answers_without_scripts_and_in_two_tabs() {
     plain.click_plainly("main form button").await;
     plain.wait_for(".notice.good").await;
     assert!(plain.text(".notice.good").await.contains("walk 2 was unsafe"));
-    // The other tab is told that its answer was not taken, and shows the one that was.
+    // The other tab says that its answer was not recorded, and shows the recorded one.
     other.click("input[value=second]").await;
     other.click("main form button").await;
     other.wait_for("[role=alert]").await;
@@ -191,7 +191,7 @@ async fn browser_staff_look_at_what_was_called_unsafe_and_decide() {
     site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;
     watched.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;
 
-    // From the first page to the decision.
+    // From the home page to the decision.
     let page = browser.open(&site.at("/")).await;
     assert!(page.text("main").await.contains("a gait was called unsafe: review it"));
     page.click("#waits ~ ul a").await;

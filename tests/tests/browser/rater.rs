@@ -251,7 +251,7 @@ async fn browser_rater_takes_the_newest_answer_back_also_later() {
     page.click("input[value=second]").await;
     page.click("[data-answer] [type=submit]").await;
     page.wait_for(".notice.good").await;
-    // The page of the pair offers it, and so does the first page without a word in its address.
+    // The page of the pair offers it, and so does the home page without a word in its address.
     page.goto(&pair).await;
     assert!(page.text(".notice").await.contains("This pair was answered: second"));
     assert_eq!(page.count("form[action$='/take-back']").await, 1);

@@ -192,7 +192,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
 
-    // What waits is on the first page.
+    // The home page has the queue.
     let page = browser.open(&site.origin).await;
     page.click("[aria-labelledby=waits] a").await;
     // Both gaits walk, on one clock.

@@ -159,8 +159,8 @@ pub(super) async fn process(
     once.finish(&app, writer, StatusCode::CREATED, None, &view).await
 }
 
-/// `GET /lab-sessions/{id}/emg-results`: what was made of the electromyograms last, and the model's muscles beside it where
-/// the order was told.
+/// `GET /lab-sessions/{id}/emg-results`: the newest result of the electromyograms, and after unblinding the muscles of the
+/// model for comparison.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/emg-results",

@@ -244,8 +244,8 @@ pub(super) async fn walk(
     once.finish(&app, writer, StatusCode::CREATED, None, &next).await
 }
 
-/// `POST /lab/{id}/answers`: which walk the person who walked found better. It is kept in terms of walks; the learner
-/// hears it when the order is told.
+/// `POST /lab/{id}/answers`: which walk the subject found better. The record keeps the number of the walk; the answer
+/// reaches the learner at unblinding.
 #[utoipa::path(
     post,
     path = "/lab/{id}/answers",

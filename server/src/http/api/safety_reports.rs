@@ -43,8 +43,8 @@ impl From<Closed> for SafetyReport {
 
 /// `GET /studies/{id}/safety-reports`: every time that a gait was called unsafe, also what was lifted since.
 ///
-/// By raters, in remarks and in lab sessions; what its author took back is left out. Of a lab session whose order was not told
-/// both gaits are named.
+/// By raters, in remarks and in lab sessions; what its author took back is left out. Before a lab session is unblinded,
+/// both of its gaits are named.
 #[utoipa::path(
     get,
     path = "/studies/{id}/safety-reports",
@@ -70,8 +70,8 @@ pub(super) async fn of_study(
 /// `POST /trials/{id}/safety-reviews`: staff looked at a gait that was called unsafe, and decide.
 ///
 /// Where it may be walked with again it can be recommended, asked about and planned; what was said stays in the record, and what
-/// the learner heard of it is taken back. When the order of a lab session is told later, what was said there closes the gait
-/// again that it was said of.
+/// the learner heard of it is taken back. When a lab session is unblinded later, a safety report of that session closes its
+/// gait again.
 #[utoipa::path(
     post,
     path = "/trials/{id}/safety-reviews",

@@ -131,7 +131,7 @@ pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: Choice) -> 
     app.compute(draw).await?
 }
 
-/// What the learner believes of a study, or why it is not told.
+/// What the learner believes of a study, or why the page does not show it.
 enum Believed {
     Absent(String),
     There(Box<StudySnapshot>, Arc<Belief>),

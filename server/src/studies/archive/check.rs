@@ -236,7 +236,7 @@ fn same_rmse(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<()
     if agree(report.gait_rmse_rad, anew.total) && parts {
         return Ok(());
     }
-    Err(format!("its Gait RMSE is told as {} rad, and is {} rad of its gait", report.gait_rmse_rad, anew.total))
+    Err(format!("its Gait RMSE is stated as {} rad, but its gait has {} rad", report.gait_rmse_rad, anew.total))
 }
 
 /// Checks what workers brought for a trial.

@@ -1,6 +1,6 @@
 //! Which walk the person who walked found better, in terms of walks.
 //!
-//! It becomes a preference, or a remark, when the order is told: what the learner hears is shown to everybody who may
+//! It becomes a preference, or a remark, at unblinding: what the learner hears is shown to everybody who may
 //! read, and whoever was in the lab would know the order from it.
 
 use super::session::{InTheLab, has_file, in_the_lab, next_walk, still_open};

@@ -195,7 +195,7 @@ pub enum GaitOfWalk {
     Two,
 }
 
-/// Gives out the controller file of a walk: tells which gait it is with, and records who was told. Only the device's own
+/// Gives out the controller file of a walk: the file reveals the gait, so the record names whoever took it. Only the device's own
 /// token leaves the session blind to its caller.
 ///
 /// # Errors

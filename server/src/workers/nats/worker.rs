@@ -44,7 +44,7 @@ pub struct Worker {
 struct Held {
     number: u32,
     acker: Acker,
-    /// Iterations that nobody was told of yet.
+    /// Iterations that were not sent yet.
     untold: Vec<IterationRecord>,
     /// When the solve last came further.
     lived: Instant,
@@ -280,6 +280,6 @@ async fn publish(link: &Link, attempt: Attempt, bytes: &[u8]) -> Result<(), Disp
 
 async fn answer(acker: &Acker, kind: AckKind) {
     if let Err(error) = acker.ack_with(kind).await {
-        tracing::warn!(%error, "the broker was not told about a job; it gives it to others");
+        tracing::warn!(%error, "a job could not be acknowledged; the broker gives it to another worker");
     }
 }
