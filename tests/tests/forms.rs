@@ -258,10 +258,10 @@ async fn who_answers_what_another_has_answered_is_told_so() {
     let give = format!("/api/v1/studies/{study}/preferences");
     let said = |author: &str, answer: &str| json!({"trial_a": a, "trial_b": b, "answer": answer, "author": author});
     let first = service.post(&give, &said("S01", "a")).await.json();
-    assert_eq!(first["beside"], json!([]));
+    assert_eq!(first["other_answers"], json!([]));
     assert_eq!(service.post(&give, &said("S01", "a")).await.status, StatusCode::CONFLICT, "the same person again");
     let other = json!({"trial_a": b, "trial_b": a, "answer": "a", "author": "K"});
-    assert_eq!(service.post(&give, &other).await.json()["beside"].as_array().unwrap().len(), 1);
+    assert_eq!(service.post(&give, &other).await.json()["other_answers"].as_array().unwrap().len(), 1);
 
     let body = format!("a={a}&b={b}&answer=no_difference&source=clinician&author=L&note=&key={UNKNOWN}");
     let sent = service.post_text(&format!("/studies/{study}/compare"), FORM, &body).await;

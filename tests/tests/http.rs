@@ -207,7 +207,7 @@ async fn preferences_are_given_read_back_and_taken_back() {
     let given = service.post(&path, &body).await;
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
     let mut row = given.json();
-    assert_eq!(row.as_object_mut().unwrap().remove("beside"), Some(json!([])), "nobody else answered this");
+    assert_eq!(row.as_object_mut().unwrap().remove("other_answers"), Some(json!([])), "nobody else answered this");
     assert_eq!((&row["kind"], &row["winner"]), (&json!("preference"), &json!(converged[1])));
     assert_eq!(service.fetch(given.headers["location"].to_str().unwrap()).await.json(), row);
 

@@ -100,11 +100,11 @@ pub fn attribution<'a>(
 /// A comparison lists so many answers of others.
 const BESIDE: u32 = 20;
 
-/// The newest answers of others to the same comparison, which stand beside an answer: all of them count.
+/// The newest answers of other people to the same comparison. All of them count.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn beside(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
+pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
     let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.said else {
         return Ok(Vec::new());
     };

@@ -111,7 +111,7 @@ pub(super) struct Recorded {
     #[serde(flatten)]
     row: FeedbackRow,
     /// Answers of others to the same comparison, the newest twenty at most: all of them count.
-    beside: Vec<FeedbackId>,
+    other_answers: Vec<FeedbackId>,
 }
 
 /// `POST /studies/{id}/preferences`.
@@ -136,9 +136,9 @@ pub(super) async fn create(
     };
     let given = answer::give(&mut writer, &once.caller, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
-    let beside = answer::beside(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
+    let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    once.finish(&app, writer, StatusCode::CREATED, Some(location), &Recorded { row, beside }).await
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &Recorded { row, other_answers }).await
 }
 
 /// Why an answer or a remark is taken back.

@@ -126,7 +126,7 @@ struct Saved {
     at: String,
     retracted: bool,
     /// What others answered to the same comparison: who, and what.
-    beside: Vec<(String, String)>,
+    other_answers: Vec<(String, String)>,
 }
 
 /// So many trials of a large study are offered.
@@ -254,13 +254,13 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
             }
             let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
-            let beside = answer::beside(db, &row).await?.into_iter().filter_map(said).collect();
+            let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(said).collect();
             answer_in_words(&row, snapshot).map(|text| Saved {
                 id: saved,
                 text,
                 at: row.created_at.minute(),
                 retracted: row.retraction.is_some(),
-                beside,
+                other_answers,
             })
         }
         Recorded::Remark(id) => {
@@ -273,7 +273,7 @@ async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorde
                 text,
                 at: remark.created_at.minute(),
                 retracted: remark.retraction.is_some(),
-                beside: Vec::new(),
+                other_answers: Vec::new(),
             })
         }
     })
