@@ -68,9 +68,7 @@ async fn writes_are_refused_when_the_log_or_the_file_was_cut() {
         assert_eq!(add_subjects(&service, "before", 5).await, (5, 0));
         // In the middle of a change, whose commit makes the log longer than it was.
         let mut writer = service.store.write().await.unwrap();
-        let sql =
-            "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values ('S', 'S', 1.8, 70, '')";
-        sqlx::query(sql).execute(&mut **writer).await.unwrap();
+        sqlx::query(SUBJECT).execute(&mut **writer).await.unwrap();
         let file = std::fs::OpenOptions::new().write(true).open(beside(&database, ending)).unwrap();
         file.set_len(100).unwrap();
         let refused = gaitwright::store::commit(writer).await;
@@ -78,6 +76,47 @@ async fn writes_are_refused_when_the_log_or_the_file_was_cut() {
         assert_eq!(add_subjects(&service, "after", 20).await, (0, 20), "{ending}");
         service.abandon().await;
     }
+}
+
+const SUBJECT: &str =
+    "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values ('S', 'S', 1.8, 70, '')";
+
+#[tokio::test]
+async fn log_that_is_cut_within_a_commit_is_noticed_and_never_reaches_the_file() {
+    // Bytes that the log loses; 9999 stands for all but the first 100.
+    for lost in [1, 4000, 4121, 20_000, 9999] {
+        let (_folder, database, service) = service().await;
+        assert_eq!(add_subjects(&service, "before", 40).await, (40, 0));
+        let kept = std::fs::read(&database).unwrap();
+        let mut writer = service.store.write().await.unwrap();
+        sqlx::query(SUBJECT).execute(&mut **writer).await.unwrap();
+        let log = std::fs::OpenOptions::new().write(true).open(beside(&database, "-wal")).unwrap();
+        let length = log.metadata().unwrap().len();
+        // SQLite calls this when it was told to commit, before it writes.
+        writer.lock_handle().await.unwrap().set_commit_hook(move || {
+            log.set_len(if lost == 9999 { 100 } else { length - lost }).unwrap();
+            true
+        });
+        let refused = gaitwright::store::commit(writer).await;
+        assert!(matches!(refused, Err(StoreError::RecordVanished { .. })), "{lost}: {refused:?}");
+        assert_eq!(add_subjects(&service, "after", 5).await, (0, 5), "{lost}");
+        service.abandon().await;
+        assert!(std::fs::read(&database).unwrap() == kept, "{lost}: the file holds what was in the cut log");
+    }
+}
+
+#[tokio::test]
+async fn long_logs_go_into_the_file_and_are_written_from_their_beginning_again() {
+    let (_folder, database, service) = service().await;
+    let mut longest = 0;
+    for number in 0..12 {
+        assert_eq!(add_subjects(&service, &format!("{number}-"), 40).await, (40, 0));
+        longest = longest.max(std::fs::metadata(beside(&database, "-wal")).unwrap().len());
+    }
+    assert!(longest < 12 << 20, "{longest} bytes");
+    assert!(std::fs::metadata(&database).unwrap().len() > 1 << 19);
+    service.stop().await;
+    verify::file(&database, &[]).await.unwrap();
 }
 
 #[tokio::test]

@@ -1,10 +1,11 @@
 //! Whether the files of the record are still the ones that were opened. SQLite goes on writing into a file that was deleted
 //! or replaced: every change is acknowledged, and all of them are gone with the process.
 
+use super::log::Log;
 use super::{StoreError, StoreResult, beside};
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Which file a name stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +40,7 @@ struct Seen {
 pub(super) struct Files {
     path: PathBuf,
     seen: Mutex<Vec<Seen>>,
+    log: Mutex<Log>,
     /// What was found once stays found: whatever lies there later is not what was written to.
     gone: OnceLock<String>,
     /// Saving what is only in the log was tried.
@@ -57,7 +59,15 @@ impl Files {
             let bytes = (ending != "-shm").then_some(file.len());
             seen.push(Seen { what, path, id: FileId::of(&file), bytes });
         }
-        Ok(Self { path: path.to_owned(), seen: Mutex::new(seen), gone: OnceLock::new(), saved: OnceLock::new() })
+        let name = beside(path, "-wal");
+        let log = Log::open(&name).map_err(|source| StoreError::Open { path: name, source })?;
+        Ok(Self {
+            path: path.to_owned(),
+            seen: Mutex::new(seen),
+            log: Mutex::new(log),
+            gone: OnceLock::new(),
+            saved: OnceLock::new(),
+        })
     }
 
     /// Refuses when one of them is not the file that was opened, now or at any time before.
@@ -66,16 +76,33 @@ impl Files {
             return Err(self.vanished(what));
         }
         let found = self.seen.lock().unwrap_or_else(PoisonError::into_inner).iter_mut().find_map(Seen::look);
-        let Some(found) = found else { return Ok(()) };
-        let what = self.gone.get_or_init(|| found);
-        let refusal = self.vanished(what);
-        tracing::error!("{refusal}");
-        Err(refusal)
+        found.map_or(Ok(()), |found| Err(self.refuse(found)))
     }
 
-    /// Whether the database file itself is there, so that what is only in a log without a name can be saved: once.
-    pub(super) fn log_is_to_be_saved(&self) -> bool {
-        if self.saved.set(()).is_err() {
+    /// [`Self::check`], and refuses a log of so many frames that is not as it was written.
+    pub(super) fn check_log(&self, frames: u32) -> StoreResult<()> {
+        self.check()?;
+        match self.log().is_whole(frames) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.refuse("its write-ahead log (-wal) was cut during a change".to_owned())),
+            Err(error) => Err(self.refuse(format!("its write-ahead log (-wal) cannot be read back ({error})"))),
+        }
+    }
+
+    fn log(&self) -> MutexGuard<'_, Log> {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn refuse(&self, found: String) -> StoreError {
+        let refusal = self.vanished(self.gone.get_or_init(|| found));
+        tracing::error!("{refusal}");
+        refusal
+    }
+
+    /// Whether the database file itself is there, so that what is only in a log without a name can be saved: once. The log
+    /// has so many frames.
+    pub(super) fn log_is_to_be_saved(&self, frames: u32) -> bool {
+        if self.saved.set(()).is_err() || !self.log().is_whole(frames).is_ok_and(|whole| whole) {
             return false;
         }
         let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);

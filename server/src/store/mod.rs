@@ -33,6 +33,7 @@ pub mod lab_recordings;
 pub mod lab_sessions;
 mod lent;
 pub mod listing;
+mod log;
 mod many_rows;
 pub mod members;
 mod migrations;
@@ -194,6 +195,8 @@ impl Store {
         migrations::apply(&only, path).await?;
         let mut connection = only.acquire().await?.detach();
         seals::watch(&mut connection).await?;
+        // The log goes into the file when it was read back, and not in the middle of a commit.
+        sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
         let files = Arc::new(Files::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
         let writing = Arc::new(Writing::new(connection, space::Space::of(path), outside));

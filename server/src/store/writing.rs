@@ -8,7 +8,7 @@ use super::anchor::{self, Anchors};
 use super::files::Files;
 use super::space::Space;
 use super::{StoreError, StoreResult};
-use sqlx::{Connection as _, SqliteConnection};
+use sqlx::{Connection as _, Row as _, SqliteConnection};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -18,6 +18,9 @@ use tokio_util::task::AbortOnDropHandle;
 
 /// The connection; `None`: closed. Whoever waits for it gets it in the order of asking.
 type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
+
+/// A log with so many frames goes into the database file.
+const LONGEST_LOG: u32 = 1000;
 
 /// Pause before the making durable is begun again.
 const PAUSE: Duration = Duration::from_millis(100);
@@ -63,6 +66,13 @@ impl Outside {
     fn check(&self) -> StoreResult<()> {
         self.files.as_ref().map_or(Ok(()), |files| files.check())
     }
+
+    /// [`Self::check`], and reads back what the commit wrote: how many frames the log has.
+    async fn check_log(&self, connection: &mut SqliteConnection) -> StoreResult<u32> {
+        let frames = log_frames(connection).await?;
+        self.files.as_ref().map_or(Ok(()), |files| files.check_log(frames))?;
+        Ok(frames)
+    }
 }
 
 /// Changes only while the connection is held.
@@ -102,6 +112,11 @@ impl Writing {
             self.shared.flush(&mut connection).await;
             if let Some(anchors) = &self.shared.outside.anchors {
                 anchors.sync();
+            }
+            if self.shared.outside.check_log(&mut connection).await.is_err() {
+                // Closing would write a log with a hole in it into the database file.
+                std::mem::forget(connection);
+                return;
             }
             if let Err(error) = connection.close().await {
                 tracing::warn!(%error, "closing the database");
@@ -190,12 +205,18 @@ impl Shared {
             return;
         }
         match self.make_durable(connection).await {
-            Ok(()) => self.tell(Ok(())),
+            Ok(frames) => {
+                self.tell(Ok(()));
+                if frames >= LONGEST_LOG {
+                    fold(connection).await;
+                }
+            }
             Err(error) => self.give_up(connection, &error).await,
         }
     }
 
-    async fn make_durable(&self, connection: &mut SqliteConnection) -> StoreResult<()> {
+    /// How many frames the log has afterwards.
+    async fn make_durable(&self, connection: &mut SqliteConnection) -> StoreResult<u32> {
         let anchored = match &self.outside.anchors {
             Some(anchors) => Some((anchors, anchor::ends(connection).await?)),
             None => None,
@@ -203,12 +224,12 @@ impl Shared {
         // The commit makes a log that was cut as long as before, with a hole in it: its length tells nothing afterwards.
         self.outside.check()?;
         run(connection, "commit").await?;
-        // A change that went into a deleted file must not be acknowledged.
-        self.outside.check()?;
+        // A change that went into a deleted file, or into a log that was cut meanwhile, must not be acknowledged.
+        let frames = self.outside.check_log(connection).await?;
         if let Some((anchors, ends)) = anchored {
             anchors.write(&ends);
         }
-        Ok(())
+        Ok(frames)
     }
 
     async fn give_up(&self, connection: &mut SqliteConnection, error: &StoreError) {
@@ -222,11 +243,10 @@ impl Shared {
     /// can go where it belongs.
     async fn save(&self, connection: &mut SqliteConnection, error: &StoreError) {
         let vanished = matches!(error, StoreError::RecordVanished { .. });
-        if vanished && self.outside.files.as_ref().is_some_and(|files| files.log_is_to_be_saved()) {
-            match run(connection, "pragma wal_checkpoint(passive)").await {
-                Ok(()) => tracing::warn!("what was in the write-ahead log was written into the database file"),
-                Err(error) => tracing::error!(%error, "the write-ahead log cannot be written into the database file"),
-            }
+        let Ok(frames) = log_frames(connection).await else { return };
+        if vanished && self.outside.files.as_ref().is_some_and(|files| files.log_is_to_be_saved(frames)) {
+            fold(connection).await;
+            tracing::warn!("what was in the write-ahead log was written into the database file");
         }
     }
 
@@ -283,6 +303,19 @@ async fn keep_flushing(line: Line, shared: Arc<Shared>) {
     }
 }
 
+/// Frames in the write-ahead log.
+async fn log_frames(connection: &mut SqliteConnection) -> StoreResult<u32> {
+    let row = sqlx::query("pragma wal_checkpoint(noop)").fetch_one(connection).await?;
+    Ok(row.try_get("log")?)
+}
+
+/// Writes the log into the database file.
+async fn fold(connection: &mut SqliteConnection) {
+    if let Err(error) = run(connection, "pragma wal_checkpoint(passive)").await {
+        tracing::error!(%error, "the write-ahead log cannot be written into the database file");
+    }
+}
+
 async fn run(connection: &mut SqliteConnection, statement: &'static str) -> StoreResult<()> {
     sqlx::query(statement).execute(connection).await?;
     Ok(())
@@ -291,7 +324,6 @@ async fn run(connection: &mut SqliteConnection, statement: &'static str) -> Stor
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sqlx::Row;
     use sqlx::sqlite::SqliteConnectOptions;
 
     async fn open(file: &std::path::Path) -> SqliteConnection {
