@@ -19,6 +19,9 @@ use tokio_util::sync::{CancellationToken, DropGuard};
 /// News that wait for the service; more wait in the broker.
 const WAITING: usize = 256;
 
+/// A result that could not be recorded so often, a lease after the other, is left out: its job was run again long ago.
+const MOST_DELIVERIES: i64 = 10;
+
 /// Jobs are run by whoever asks a NATS broker for them.
 pub struct JetStream {
     link: Link,
@@ -187,7 +190,12 @@ async fn results(
 }
 
 async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) -> Result<(), DispatchError> {
+    let delivered = message.info().map_or(1, |info| info.delivered);
     let (message, acker) = message.split();
+    if delivered > MOST_DELIVERIES {
+        tracing::error!(subject = %message.subject, "a result could not be recorded {MOST_DELIVERIES} times; it is left out");
+        return acker.ack_with(AckKind::Term).await.map_err(unreachable);
+    }
     let read = pool.run(move |_| unpack::<Brought>(&message.payload)).await.map_err(unreachable)?;
     let brought = match read {
         Ok(brought) => brought,

@@ -244,7 +244,8 @@ async fn bring(link: Link, pool: Pool, worker: String, attempt: Attempt, finding
         Ok(bytes) => {
             if let Err(error) = publish_within(&link, attempt, &bytes, link.lease * GIVE_UP_AFTER_LEASES).await {
                 tracing::error!(trial = %attempt.trial, %error, "a result is given up; its job is left to others");
-                return answer(&acker, AckKind::Nak(None)).await;
+                // After a pause: a job that is given anew comes before all that wait.
+                return answer(&acker, AckKind::Nak(Some(link.lease))).await;
             }
             if let Err(error) = acker.double_ack().await {
                 tracing::warn!(%error, "the broker does not know that a job is done; it will be run again in vain");
