@@ -1,10 +1,12 @@
 //! Gaits: the trajectory of a finished solve, kept as the optimiser wrote it.
 
-use super::{Connection, StoreError, StoreResult, TrialId, json, now};
+use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json, now};
+use crate::compute::OnPool;
 use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
+use serde::de::DeserializeOwned;
 use sqlx::Row;
 
-/// A gait made ready to be written: compressing takes CPU time and happens outside any transaction.
+/// A gait made ready to be written.
 #[derive(Debug)]
 pub struct PackedGait {
     format_version: u32,
@@ -23,7 +25,7 @@ impl PackedGait {
     ///
     /// # Errors
     /// When serialising fails.
-    pub fn new(outcome: &SolveOutcome, iterations: &[IterationRecord]) -> StoreResult<Option<Self>> {
+    pub fn new(pool: &OnPool, outcome: &SolveOutcome, iterations: &[IterationRecord]) -> StoreResult<Option<Self>> {
         let gait = json::to_text("gait", &outcome.gait)?;
         let warm_start = json::to_text("warm start", &outcome.warm_start)?;
         // JSON has no word for such numbers: they are written as null and cannot be read back.
@@ -37,9 +39,9 @@ impl PackedGait {
             stride_length_m: Some(outcome.gait.stride_length_m),
             stride_time_s: Some(outcome.gait.stride_time_s),
             sha256: json::sha256(gait.as_bytes()),
-            gait: json::compress("gait", gait.as_bytes())?,
-            warm_start: json::compress("warm start", warm_start.as_bytes())?,
-            iterations: json::compress("iterations", json::to_text("iterations", &finite)?.as_bytes())?,
+            gait: json::compress(pool, "gait", gait.as_bytes())?,
+            warm_start: json::compress(pool, "warm start", warm_start.as_bytes())?,
+            iterations: json::compress(pool, "iterations", json::to_text("iterations", &finite)?.as_bytes())?,
         }))
     }
 }
@@ -74,23 +76,6 @@ pub async fn insert(db: &mut Connection, trial: TrialId, packed: &PackedGait) ->
     Ok(())
 }
 
-/// The gait of a trial, as JSON text.
-///
-/// # Errors
-/// [`StoreError::Missing`] when the trial has none, [`StoreError::Damaged`] when its hash is wrong.
-pub async fn json_of(db: &mut Connection, trial: TrialId) -> StoreResult<String> {
-    let row = sqlx::query("select gait, gait_sha256 from gaits where trial_id = ?")
-        .bind(trial)
-        .fetch_optional(db)
-        .await?
-        .ok_or_else(|| missing(trial))?;
-    let bytes = json::decompress("gait", row.try_get("gait")?)?;
-    if json::sha256(&bytes) != row.try_get::<&str, _>("gait_sha256")? {
-        return Err(StoreError::Damaged { what: "gait", reason: format!("the gait of trial {trial} has changed") });
-    }
-    String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
-}
-
 /// Whether the columns beside a gait say what is in it.
 ///
 /// # Errors
@@ -122,25 +107,39 @@ pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
 /// The gait of a trial.
 ///
 /// # Errors
-/// As [`json_of`].
-pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Gait> {
-    json::from_text("gait", &json_of(db, trial).await?)
+/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Gait>> {
+    let sql = "select gait, gait_sha256 from gaits where trial_id = ?";
+    let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?.ok_or_else(|| missing(trial))?;
+    Ok(Packed::new(PackedText::new("gait", row.try_get("gait")?, Some(row.try_get("gait_sha256")?))))
+}
+
+/// [`get`]; `None` when the trial has none.
+///
+/// # Errors
+/// What the database reports.
+pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Packed<Gait>>> {
+    match get(db, trial).await {
+        Ok(gait) => Ok(Some(gait)),
+        Err(StoreError::Missing { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
 }
 
 /// What another solve can start from.
 ///
 /// # Errors
 /// [`StoreError::Missing`] when the trial has none, or what the database reports.
-pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<WarmStart> {
-    parse_column(db, trial, "select warm_start from gaits where trial_id = ?").await
+pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<WarmStart>> {
+    column(db, trial, "warm start", "select warm_start from gaits where trial_id = ?").await
 }
 
 /// The iterations of the solve.
 ///
 /// # Errors
 /// [`StoreError::Missing`] when the trial has none, or what the database reports.
-pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<IterationRecord>> {
-    parse_column(db, trial, "select iterations from gaits where trial_id = ?").await
+pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Vec<IterationRecord>>> {
+    column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await
 }
 
 /// Drops the gaits of a study but those of these trials, those that they started from, and those that people walk with in
@@ -163,14 +162,14 @@ pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[T
     Ok(done.rows_affected())
 }
 
-async fn parse_column<T: serde::de::DeserializeOwned>(
+async fn column<T: DeserializeOwned>(
     db: &mut Connection,
     trial: TrialId,
+    what: &'static str,
     sql: &'static str,
-) -> StoreResult<T> {
+) -> StoreResult<Packed<T>> {
     let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?.ok_or_else(|| missing(trial))?;
-    let bytes = json::decompress("gait", row.try_get(0)?)?;
-    serde_json::from_slice(&bytes).map_err(|e| StoreError::Damaged { what: "gait", reason: e.to_string() })
+    Ok(Packed::new(PackedText::new(what, row.try_get(0)?, None)))
 }
 
 fn missing(trial: TrialId) -> StoreError {

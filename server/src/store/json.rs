@@ -1,6 +1,7 @@
 //! JSON and compressed JSON columns.
 
 use super::{StoreError, StoreResult};
+use crate::compute::OnPool;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
@@ -39,7 +40,7 @@ pub(super) fn optional_column<T: DeserializeOwned>(row: &SqliteRow, name: &'stat
     row.try_get::<Option<&str>, _>(name)?.map(|text| from_text(name, text)).transpose()
 }
 
-pub(super) fn compress(what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
+pub(super) fn compress(_: &OnPool, what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
     if bytes.len() as u64 > LARGEST_BYTES {
         let reason = format!("{} bytes; at most {LARGEST_BYTES} are kept", bytes.len());
         return Err(StoreError::Damaged { what, reason });
@@ -48,7 +49,7 @@ pub(super) fn compress(what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>>
 }
 
 /// What a compressed value holds, of which there is never more than [`LARGEST_BYTES`], however little it takes compressed.
-pub(super) fn decompress(what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
+pub(super) fn decompress(_: &OnPool, what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
     let damaged = |reason: String| StoreError::Damaged { what, reason };
     let read = || {
         let mut decoder = zstd::Decoder::with_buffer(bytes)?;

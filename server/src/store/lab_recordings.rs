@@ -1,7 +1,10 @@
 //! What was measured in the walks of a lab session, and what was made of it.
 
 use super::audit::Actor;
-use super::{Connection, EmgResultId, Instant, LabRecordingId, LabSessionId, StoreError, StoreResult, json, now};
+use super::{
+    Connection, EmgResultId, Instant, LabRecordingId, LabSessionId, PackedText, StoreError, StoreResult, json, now,
+};
+use crate::compute::OnPool;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sqlx::sqlite::SqliteRow;
@@ -58,7 +61,7 @@ pub struct LabRecording {
     pub created_at: Instant,
 }
 
-/// A file made ready to be written: compressing takes CPU time and happens outside any transaction.
+/// A file made ready to be written.
 #[derive(Debug)]
 pub struct PackedRecording {
     kind: RecordingKind,
@@ -72,11 +75,11 @@ impl PackedRecording {
     ///
     /// # Errors
     /// When serialising fails.
-    pub fn new<T: Serialize>(kind: RecordingKind, reading: &T, file: &str) -> StoreResult<Self> {
+    pub fn new<T: Serialize>(pool: &OnPool, kind: RecordingKind, reading: &T, file: &str) -> StoreResult<Self> {
         Ok(Self {
             kind,
             reading: json::to_text("reading of a recording", reading)?,
-            raw: json::compress("recording", file.as_bytes())?,
+            raw: json::compress(pool, "recording", file.as_bytes())?,
             raw_sha256: json::sha256(file.as_bytes()),
         })
     }
@@ -154,23 +157,15 @@ fn missing(id: LabRecordingId) -> StoreError {
 /// The file of a recording, and how it is to be read.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or [`StoreError::Damaged`] when its hash is wrong.
-pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) -> StoreResult<(T, String)> {
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) -> StoreResult<(T, PackedText)> {
     let row = sqlx::query("select reading, raw, raw_sha256 from lab_recordings where id = ?")
         .bind(id)
         .fetch_optional(db)
         .await?
         .ok_or_else(|| missing(id))?;
-    let bytes = json::decompress("recording", row.try_get("raw")?)?;
-    if json::sha256(&bytes) != row.try_get::<&str, _>("raw_sha256")? {
-        return Err(StoreError::Damaged {
-            what: "recording",
-            reason: format!("the file of recording {id} has changed"),
-        });
-    }
-    let text =
-        String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what: "recording", reason: e.to_string() })?;
-    Ok((json::column(&row, "reading")?, text))
+    let file = PackedText::new("recording", row.try_get("raw")?, Some(row.try_get("raw_sha256")?));
+    Ok((json::column(&row, "reading")?, file))
 }
 
 /// Adds what was made of a session's electromyograms.

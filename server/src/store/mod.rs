@@ -38,6 +38,7 @@ mod many_rows;
 pub mod members;
 mod migrations;
 mod ownership;
+mod packed;
 pub mod presentations;
 pub mod quarantine;
 pub mod reference_gaits;
@@ -69,6 +70,7 @@ pub use id::{
 };
 pub use lent::{Lent, LentWriter, Reader};
 pub use migrations::FORM;
+pub use packed::{Packed, PackedText};
 pub use space::DEFAULT_RESERVE_BYTES;
 pub use time::{Instant, now};
 pub use writing::Writer;

@@ -1,9 +1,10 @@
 //! The certificate of a trial's gait: made when somebody asks for it or the study has ended, then kept.
 
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::trials::TrialState;
-use crate::store::{Connection, Store, TrialId, Writer, certificates, commit, consents, events, gaits, trials};
+use crate::store::{Connection, Packed, Store, TrialId, Writer, certificates, commit, consents, events, gaits, trials};
 use crate::workers::Certify;
 use crate::workers::stand_back::behind_solves;
 use gait_optimizer::Gait;
@@ -17,7 +18,7 @@ pub enum Certification {
     /// It was made before.
     Made(Box<Certificate>),
     /// The gait to certify.
-    Ahead(Box<Gait>),
+    Ahead(Packed<Gait>),
 }
 
 /// Looks for the certificate of a trial's gait.
@@ -34,7 +35,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
         let state = found.state.as_str();
         return Err(Error::conflict(format!("trial {} is {state}: only a converged gait is certified", found.number)));
     }
-    Ok(Certification::Ahead(Box::new(gaits::get(reader, trial).await?)))
+    Ok(Certification::Ahead(gaits::get(reader, trial).await?))
 }
 
 /// The certificate; a new one takes some seconds of processor time, outside any transaction.
@@ -44,7 +45,10 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
 pub async fn certificate(store: &mut Store, certification: Certification) -> Result<Certificate, Error> {
     match certification {
         Certification::Made(certificate) => Ok(*certificate),
-        Certification::Ahead(gait) => Ok(store.compute(move |_| certify(&gait)).await??),
+        Certification::Ahead(gait) => {
+            let certified = move |pool: &OnPool| Ok(certify(&gait.unpack(pool)?)?);
+            store.compute(certified).await?
+        }
     }
 }
 
@@ -53,8 +57,14 @@ pub async fn certificate(store: &mut Store, certification: Certification) -> Res
 ///
 /// # Errors
 /// As [`begin`] and [`certificate`].
-pub async fn aside(store: &Store, actor: &Actor, trial: TrialId, certifier: &Arc<dyn Certify>) -> Result<(), Error> {
+pub async fn aside(
+    store: &mut Store,
+    actor: &Actor,
+    trial: TrialId,
+    certifier: &Arc<dyn Certify>,
+) -> Result<(), Error> {
     let Certification::Ahead(gait) = begin(&mut *store.read().await?, trial).await? else { return Ok(()) };
+    let gait = store.compute(move |pool| gait.unpack(pool)).await??;
     let certifier = Arc::clone(certifier);
     let told = behind_solves("certifier", move || certifier.certify(&gait))
         .map_err(|e| Error::Internal(format!("no thread for a certification: {e}")))?;

@@ -140,7 +140,7 @@ impl Certifier {
 
     /// Certifies the gait of a trial. What cannot be certified has failed, and its certificate says why.
     async fn certify(&self, trial: TrialId) -> Result<(), Error> {
-        match certification::aside(&self.store, &Actor::program(), trial, &self.certify).await {
+        match certification::aside(&mut self.store.clone(), &Actor::program(), trial, &self.certify).await {
             // There is nothing to certify, or the subject withdrew meanwhile.
             Err(Error::Conflict(_) | Error::NotFound { .. }) => Ok(()),
             other => other,

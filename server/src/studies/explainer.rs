@@ -117,10 +117,12 @@ impl Explainer {
     /// Explains a trial and keeps the explanation, unless its subject withdraws meanwhile. The solves stop when this is
     /// dropped.
     async fn explain(&self, trial: TrialId, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
-        let mut reader = self.store.read().await?;
+        let mut store = self.store.clone();
+        let mut reader = store.read().await?;
         let study = trials::get(&mut reader, trial).await?.study_id;
-        let (solve, problem) = explanation::unexplained(&mut reader, trial).await?;
+        let packed = explanation::unexplained(&mut reader, trial).await?;
         drop(reader);
+        let (solve, problem) = store.compute(move |pool| packed.unpack(pool)).await??;
         let (explain, cancel) = (Arc::clone(&self.explain), CancelToken::new());
         let _cancels = CancelOnDrop(cancel.clone());
         let mut told = behind_solves("explainer", move || explain.explain(&solve, &cancel))

@@ -1,14 +1,15 @@
 //! Why a trial has no gait: found out when somebody asks or its study has ended, then kept.
 
-use super::solve_input::SolveInput;
+use super::solve_input::{PackedInput, SolveInput};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::explanations::{self, Explained};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, Store, TrialId, Writer, commit, consents, events, gaits, studies, trials};
+use crate::store::{Connection, Packed, Store, TrialId, Writer, commit, consents, events, gaits, studies, trials};
 use crate::workers::Unexplained;
-use gait_optimizer::SolveStatus;
 use gait_optimizer::explanation::Explanation;
+use gait_optimizer::{SolveStatus, Violation, WarmStart};
 use serde_json::json;
 
 /// Where the explanation of a trial stands.
@@ -91,19 +92,39 @@ pub fn refusal(trial: &Trial, reason: &str) -> Error {
     Error::conflict(format!("trial {} cannot be explained: {reason}", trial.number))
 }
 
-/// What the solve of a trial without a gait left, and its problem as a file.
+/// What the solve of a trial without a gait left, as it was read.
+pub(super) struct PackedSolve {
+    status: SolveStatus,
+    violations: Vec<Violation>,
+    last: Packed<WarmStart>,
+    input: PackedInput,
+}
+
+impl PackedSolve {
+    /// What there is to explain, and the problem as a file.
+    ///
+    /// # Errors
+    /// What the record reports of damage.
+    pub(super) fn unpack(self, pool: &OnPool) -> Result<(Unexplained, String), Error> {
+        let Self { status, violations, last, input } = self;
+        let input = input.unpack(pool)?;
+        let file = input.to_json()?;
+        let SolveInput { problem, options, .. } = input;
+        Ok((Unexplained { problem, options, status, violations, last: last.unpack(pool)? }, file))
+    }
+}
+
+/// What the solve of a trial without a gait left.
 ///
 /// # Errors
 /// [`Error::Conflict`] when there is nothing to explain, [`Error::NotFound`] for what was dropped, or what the database
 /// reports.
-pub(super) async fn unexplained(db: &mut Connection, id: TrialId) -> Result<(Unexplained, String), Error> {
+pub(super) async fn unexplained(db: &mut Connection, id: TrialId) -> Result<PackedSolve, Error> {
     let trial = trials::get(db, id).await?;
     let status = explainable(db, &trial).await?;
     let last = gaits::warm_start(db, id).await?;
-    let input = SolveInput::of_trial(db, id).await?;
-    let file = input.to_json()?;
-    let SolveInput { problem, options, .. } = input;
-    Ok((Unexplained { problem, options, status, violations: trial.violations, last }, file))
+    let input = PackedInput::of_trial(db, id).await?;
+    Ok(PackedSolve { status, violations: trial.violations, last, input })
 }
 
 /// Keeps what was found out about a problem.

@@ -13,7 +13,7 @@ use super::plans_under_way::Plans;
 use super::prefetch::{LikelyNext, PREPARED, Prefetches, Prepared};
 use super::record;
 use super::snapshot::StudySnapshot;
-use super::solve_input::SolveInput;
+use super::solve_input::{PackedInput, SolveInput};
 use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::jobs::Lease;
@@ -46,6 +46,8 @@ pub struct Scheduler(Arc<Inner>);
 
 struct Inner {
     store: Store,
+    /// The record with a pool of its own: a job does not wait for the posterior of another study.
+    unpacking: Store,
     engine: Arc<dyn Dispatch>,
     /// How far the running solves are.
     board: Arc<Board>,
@@ -98,6 +100,7 @@ impl Scheduler {
         };
         Self(Arc::new(Inner {
             after_solves: after_solves.map(over_record),
+            unpacking: store.with_own_pool(),
             store,
             beliefs,
             engine,
@@ -453,7 +456,7 @@ impl Scheduler {
     }
 
     async fn submit(&self, lease: &Lease) -> Result<(), Error> {
-        let assignment = match assignment(&self.0.store, lease).await {
+        let assignment = match assignment(&mut self.0.unpacking.clone(), lease).await {
             Ok(assignment) => assignment,
             Err(error) => {
                 record::broke(&self.0.store, lease, &error.to_string()).await?;
@@ -513,15 +516,17 @@ impl Scheduler {
             self.withdraw(self.0.prefetches.forget(|other| other != study.id)).await;
         }
         let mut store = self.0.store.clone();
+        let mut unpacking = self.0.unpacking.clone();
         for new in likely.of(&mut store, snapshot).await? {
             if self.busy().await? >= self.0.engine.size() {
                 return Ok(());
             }
             // No trial has this name: what comes of it is kept here until one asks.
             let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
-            let mut reader = self.0.store.read().await?;
-            let input = SolveInput::of(&mut reader, &study.plan, new.action, new.warm_started_from).await?;
+            let mut reader = unpacking.read().await?;
+            let input = PackedInput::of(&mut reader, &study.plan, new.action, new.warm_started_from).await?;
             drop(reader);
+            let input = unpacking.compute(move |pool| input.unpack(pool)).await??;
             let assignment = assigned(attempt, new.number, input);
             let _hand_over = self.0.hand_over.lock().await;
             if self.busy().await? < self.0.engine.size()
@@ -641,8 +646,8 @@ impl Scheduler {
             Finding::Ended { outcome, iterations } => (outcome, iterations),
             Finding::Broke(reason) => return record::broke(&store, &lease, &reason).await.map(drop),
         };
-        let pack = move |_: &OnPool| {
-            let packed = gaits::PackedGait::new(&outcome, &iterations);
+        let pack = move |pool: &OnPool| {
+            let packed = gaits::PackedGait::new(pool, &outcome, &iterations);
             (outcome, packed)
         };
         let (outcome, packed) = store.compute(pack).await?;
@@ -656,10 +661,12 @@ impl Scheduler {
 }
 
 /// The solve of a leased job.
-async fn assignment(store: &Store, lease: &Lease) -> Result<Assignment, Error> {
+async fn assignment(store: &mut Store, lease: &Lease) -> Result<Assignment, Error> {
     let mut reader = store.read().await?;
     let number = trials::get(&mut reader, lease.trial).await?.number;
-    let input = SolveInput::of_trial(&mut reader, lease.trial).await?;
+    let input = PackedInput::of_trial(&mut reader, lease.trial).await?;
+    drop(reader);
+    let input = store.compute(move |pool| input.unpack(pool)).await??;
     Ok(assigned(Attempt { trial: lease.trial, number: lease.attempt }, number, input))
 }
 

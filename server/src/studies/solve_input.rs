@@ -1,9 +1,10 @@
 //! What a solve begins with: for the worker that runs it, and as a file with which it is done again elsewhere.
 
 use super::device;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::store::studies::StudyPlan;
-use crate::store::{Connection, TrialId, devices, gaits, reference_gaits, studies, subjects, trials};
+use crate::store::{Connection, Packed, TrialId, devices, gaits, reference_gaits, studies, subjects, trials};
 use gait_optimizer::{GaitProblem, SolveOptions, TunedBounds, WarmStart};
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +44,17 @@ impl SolveInput {
     pub fn to_json(&self) -> Result<String, Error> {
         serde_json::to_string(self).map_err(|e| Error::Internal(e.to_string()))
     }
+}
 
+/// A solve input as it was read: its start is not unpacked yet.
+#[derive(Debug)]
+pub struct PackedInput {
+    problem: GaitProblem,
+    options: SolveOptions,
+    warm_start: Option<Packed<WarmStart>>,
+}
+
+impl PackedInput {
     /// That of a trial, as its solve has it or had it.
     ///
     /// # Errors
@@ -77,5 +88,15 @@ impl SolveInput {
         let (muscles, settings) = (plan.muscles, *plan.gait_settings);
         let problem = GaitProblem { subject, device, bounds, muscles, settings, reference };
         Ok(Self { problem, options: plan.solve_options, warm_start })
+    }
+
+    /// The input.
+    ///
+    /// # Errors
+    /// [`crate::store::StoreError::Damaged`] for a start that cannot be unpacked.
+    pub fn unpack(self, pool: &OnPool) -> Result<SolveInput, Error> {
+        let Self { problem, options, warm_start } = self;
+        let warm_start = warm_start.map(|start| start.unpack(pool)).transpose()?;
+        Ok(SolveInput { problem, options, warm_start })
     }
 }

@@ -7,7 +7,7 @@ use super::safety_reports::SafetyReports;
 use crate::error::Error;
 use crate::store::certificates::{self, CertificateOnRecord};
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Connection, StoreError, StoreResult, StudyId, TrialId, consents, gaits, trials};
+use crate::store::{Connection, Packed, StoreError, StoreResult, StudyId, TrialId, consents, gaits, trials};
 use gait_optimizer::export::ControllerFile;
 use gait_optimizer::{Gait, SolveReport};
 use std::collections::HashMap;
@@ -53,7 +53,7 @@ impl WalkableGait {
     ///
     /// # Errors
     /// [`crate::store::StoreError::Missing`] when it was pruned or the lab evaluated the trial.
-    pub async fn trajectory(&self, db: &mut Connection) -> StoreResult<Gait> {
+    pub async fn trajectory(&self, db: &mut Connection) -> StoreResult<Packed<Gait>> {
         gaits::get(db, self.trial).await
     }
 

@@ -204,7 +204,10 @@ async fn outcome(
     let milestones = history::of(snapshot, best);
     let best = best.and_then(|id| snapshot.trial(id));
     let gait = match best {
-        Some(trial) => Some(gaits::get(&mut *store.read().await?, trial.id).await?),
+        Some(trial) => {
+            let gait = gaits::get(&mut *store.read().await?, trial.id).await?;
+            Some(store.compute(move |pool| gait.unpack(pool)).await??)
+        }
         None => None,
     };
     Ok(Outcome {

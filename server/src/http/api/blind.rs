@@ -81,10 +81,10 @@ pub(super) async fn next(
 )]
 pub(super) async fn first(
     may: May<Rate>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Json<Vec<Figure>>, Error> {
-    motion(&app, &may, &token, |(first, _)| first).await
+    motion(&mut app, &may, &token, |(first, _)| first).await
 }
 
 /// `GET /blind/{token}/second`: as the first one.
@@ -99,14 +99,14 @@ pub(super) async fn first(
 )]
 pub(super) async fn second(
     may: May<Rate>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Path(token): Path<String>,
 ) -> Result<Json<Vec<Figure>>, Error> {
-    motion(&app, &may, &token, |(_, second)| second).await
+    motion(&mut app, &may, &token, |(_, second)| second).await
 }
 
 async fn motion(
-    app: &AppState,
+    app: &mut AppState,
     may: &May<Rate>,
     token: &str,
     side: impl Fn((TrialId, TrialId)) -> TrialId,
@@ -115,7 +115,12 @@ async fn motion(
     let shown = blind::own(&mut reader, &may.caller, token).await?;
     let gait = gaits::get(&mut reader, side(shown.shown())).await;
     drop(reader);
-    let motion = gait.map_err(Error::from).and_then(|gait| blind_motion(&gait, phase(token)));
+    let phase = phase(token);
+    let motion = match gait {
+        Ok(gait) => app.compute(move |pool| blind_motion(&gait.unpack(pool)?, phase)).await.map_err(Error::from),
+        Err(error) => Err(error.into()),
+    };
+    let motion = motion.flatten();
     // An error here must not say which trial it was, nor of which person or device.
     motion.map(Json).map_err(|error| {
         tracing::error!(%error, "a gait cannot be shown to a rater");

@@ -1,20 +1,19 @@
 //! A trial's gait for other programs.
 
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
 use crate::http::may::May;
 use crate::http::reached::Id;
 use crate::http::shown::Shown;
-use crate::store::trials::Trial;
 use crate::store::{TrialId, consents, gaits, trials};
-use crate::studies::solve_input::SolveInput;
+use crate::studies::solve_input::PackedInput;
 use crate::studies::walkable::{self, NotWalkable};
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use gait_optimizer::Gait;
 use gait_optimizer::export;
 use serde::Deserialize;
 
@@ -43,14 +42,15 @@ pub(super) fn two_hundred() -> f64 {
 )]
 pub(super) async fn problem(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let number = trials::get(&mut reader, id).await?.number;
-    let input = SolveInput::of_trial(&mut reader, id).await?;
+    let input = PackedInput::of_trial(&mut reader, id).await?;
     drop(reader);
-    Ok(file("application/json", &format!("problem-trial-{number}.json"), input.to_json()?))
+    let text = app.compute(move |pool| input.unpack(pool)?.to_json()).await??;
+    Ok(file("application/json", &format!("problem-trial-{number}.json"), text))
 }
 
 /// `GET /trials/{id}/gait.mot`: OpenSim motion file.
@@ -65,12 +65,17 @@ pub(super) async fn problem(
 )]
 pub(super) async fn motion_file(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Read>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
-    let (trial, gait) = leaving(&app, id).await?;
-    let text = export::motion_file(&gait, sampling.rate_hz)?;
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, id).await?;
+    consents::may_be_shown(&mut reader, trial.study_id).await?;
+    let gait = gaits::get(&mut reader, id).await?;
+    drop(reader);
+    let write = move |pool: &OnPool| Ok::<_, Error>(export::motion_file(&gait.unpack(pool)?, sampling.rate_hz)?);
+    let text = app.compute(write).await??;
     Ok(file("text/plain; charset=utf-8", &format!("gait-trial-{}.mot", trial.number), text))
 }
 
@@ -86,7 +91,7 @@ pub(super) async fn motion_file(
 )]
 pub(super) async fn controller(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Read>,
     Params(sampling): Params<Sampling>,
 ) -> Result<Response, Error> {
@@ -98,17 +103,10 @@ pub(super) async fn controller(
     let gait = found?;
     let trajectory = gait.trajectory(&mut reader).await?;
     drop(reader);
-    let text = gait.controller_file(&trajectory, sampling.rate_hz)?;
-    Ok(file("application/json", &format!("device-trial-{}.json", gait.number()), text))
-}
-
-/// A trial and its gait, where its subject lets it be given out.
-async fn leaving(app: &AppState, id: TrialId) -> Result<(Trial, Gait), Error> {
-    let mut reader = app.read().await?;
-    let trial = trials::get(&mut reader, id).await?;
-    consents::may_be_shown(&mut reader, trial.study_id).await?;
-    let gait = gaits::get(&mut reader, id).await?;
-    Ok((trial, gait))
+    let number = gait.number();
+    let write = move |pool: &OnPool| gait.controller_file(&trajectory.unpack(pool)?, sampling.rate_hz);
+    let text = app.compute(write).await??;
+    Ok(file("application/json", &format!("device-trial-{number}.json"), text))
 }
 
 /// An answer that a browser saves under `name`.

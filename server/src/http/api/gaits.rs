@@ -1,13 +1,14 @@
 //! Gaits: the trajectory of a trial.
 
 use crate::access::Read;
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::gait_table::gait_csv;
 use crate::http::AppState;
 use crate::http::may::May;
 use crate::http::negotiate::{csv_file, wants_csv};
 use crate::http::shown::Shown;
-use crate::store::{TrialId, gaits, trials};
+use crate::store::{StoreError, TrialId, gaits, trials};
 use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
@@ -24,14 +25,15 @@ use axum::response::{IntoResponse, Response};
 )]
 pub(super) async fn get(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
     headers: HeaderMap,
 ) -> Result<Response, Error> {
     if wants_csv(&headers) {
-        return table(&app, id).await;
+        return table(&mut app, id).await;
     }
-    let text = gaits::json_of(&mut *app.read().await?, id).await?;
+    let gait = gaits::get(&mut *app.read().await?, id).await?;
+    let text = app.compute(move |pool| gait.text(pool)).await??;
     let headers = [(header::CONTENT_TYPE, "application/json"), (header::VARY, "Accept")];
     Ok((headers, text).into_response())
 }
@@ -48,16 +50,18 @@ pub(super) async fn get(
 )]
 pub(super) async fn get_csv(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Response, Error> {
-    table(&app, id).await
+    table(&mut app, id).await
 }
 
-async fn table(app: &AppState, id: TrialId) -> Result<Response, Error> {
+async fn table(app: &mut AppState, id: TrialId) -> Result<Response, Error> {
     let mut reader = app.read().await?;
     let number = trials::get(&mut reader, id).await?.number;
     let gait = gaits::get(&mut reader, id).await?;
     drop(reader);
-    Ok(csv_file(&format!("gait-trial-{number}.csv"), gait_csv(&gait)))
+    let table = move |pool: &OnPool| Ok::<_, StoreError>(gait_csv(&gait.unpack(pool)?));
+    let table = app.compute(table).await??;
+    Ok(csv_file(&format!("gait-trial-{number}.csv"), table))
 }

@@ -49,10 +49,11 @@ pub(super) async fn list(
 )]
 pub(super) async fn file(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<LabRecordingId, Read>,
 ) -> Result<Response, Error> {
-    let Brought { recording, form, text } = lab::brought(&mut *app.read().await?, id).await?;
+    let Brought { recording, form, file } = lab::brought(&mut *app.read().await?, id).await?;
+    let text = app.compute(move |pool| file.text(pool)).await??;
     let (kind, ending) = match form {
         FileForm::Csv => ("text/csv; charset=utf-8", "csv"),
         FileForm::Opensim => ("text/plain; charset=utf-8", "sto"),

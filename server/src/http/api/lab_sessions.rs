@@ -2,6 +2,7 @@
 
 use super::exports;
 use crate::access::{Administer, Device, Rate, Read, Run};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::http::AppState;
 use crate::http::extract::Params;
@@ -110,7 +111,7 @@ pub(super) struct OfWalk {
 )]
 pub(super) async fn controller(
     may: May<Device>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<LabSessionId, Device>,
     Params(of): Params<OfWalk>,
 ) -> Result<Response, Error> {
@@ -121,8 +122,12 @@ pub(super) async fn controller(
     let of_one = one.trajectory(&mut reader).await?;
     let of_two = two.trajectory(&mut reader).await?;
     drop(reader);
-    let one = one.blinded_controller_file(&of_one, of.rate_hz)?;
-    let two = two.blinded_controller_file(&of_two, of.rate_hz)?;
+    let write = move |pool: &OnPool| {
+        let one = one.blinded_controller_file(&of_one.unpack(pool)?, of.rate_hz)?;
+        let two = two.blinded_controller_file(&of_two.unpack(pool)?, of.rate_hz)?;
+        Ok::<_, Error>((one, two))
+    };
+    let (one, two) = app.compute(write).await??;
     let mut writer = app.write().await?;
     let gait = lab::for_device(&mut writer, &may.caller, id, of.walk).await?;
     commit(writer).await?;

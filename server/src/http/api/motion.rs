@@ -50,11 +50,11 @@ struct Frame {
 )]
 pub(super) async fn get(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Motion>, Error> {
     let gait = gaits::get(&mut *app.read().await?, id).await?;
-    Ok(Json(motion(&gait)?))
+    Ok(Json(app.compute(move |pool| motion(&gait.unpack(pool)?)).await??))
 }
 
 pub(in crate::http) fn motion(gait: &Gait) -> Result<Motion, Error> {

@@ -161,13 +161,14 @@ pub(super) async fn retry(
 )]
 pub(super) async fn iterations(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<TrialId, Read>,
 ) -> Result<Json<Vec<IterationRecord>>, Error> {
     if let Some(track) = app.scheduler.board().track(id) {
         return Ok(Json(track.records));
     }
-    Ok(Json(gaits::iterations(&mut *app.read().await?, id).await?))
+    let iterations = gaits::iterations(&mut *app.read().await?, id).await?;
+    Ok(Json(app.compute(move |pool| iterations.unpack(pool)).await??))
 }
 
 /// `GET /trials/{id}/attempts`: what workers brought, also what came too late to count.

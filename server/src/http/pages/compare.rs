@@ -19,7 +19,7 @@ use crate::store::feedback::{FeedbackRow, Source};
 use crate::store::idempotency::{self, Kept, fingerprint};
 use crate::store::studies::{Study, StudyState};
 use crate::store::{
-    Connection, FeedbackId, RemarkId, StoreError, StudyId, TrialId, commit, events, feedback, gaits, presentations,
+    Connection, FeedbackId, RemarkId, StudyId, TrialId, commit, events, feedback, gaits, presentations,
     reference_gaits, remarks, studies, trials,
 };
 use crate::studies::answer::{self, Answer, PairAnswer};
@@ -209,24 +209,22 @@ async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted,
     let b = trials.iter().find(|trial| trial.as_b).map(|trial| (trial.id, trial.number));
     let pair = match (a, b) {
         (Some((a, of_a)), Some((b, of_b))) if a != b => {
-            match (gaits::get(&mut reader, a).await, gaits::get(&mut reader, b).await) {
-                (Ok(gait_a), Ok(gait_b)) => Some(((a, of_a, gait_a), (b, of_b, gait_b))),
-                (Err(StoreError::Missing { .. }), _) | (_, Err(StoreError::Missing { .. })) => None,
-                (Err(error), _) | (_, Err(error)) => return Err(error.into()),
-            }
+            let gaits = gaits::find(&mut reader, a).await?.zip(gaits::find(&mut reader, b).await?);
+            gaits.map(|(gait_a, gait_b)| ((a, of_a, gait_a), (b, of_b, gait_b)))
         }
         _ => None,
     };
     drop(reader);
-    let draw = move |_: &OnPool| {
-        let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return (Vec::new(), Vec::new()) };
+    let draw = move |pool: &OnPool| {
+        let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return Ok((Vec::new(), Vec::new())) };
+        let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
         let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
         let charts = figures::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
         let stride = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
-        (charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect())
+        Ok::<_, Error>((charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect()))
     };
-    let (charts, strides) = app.compute(draw).await.map_err(Error::from)?;
+    let (charts, strides) = app.compute(draw).await.map_err(Error::from)??;
     page(&ComparePage {
         study: snapshot.study,
         trials,

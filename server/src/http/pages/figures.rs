@@ -15,10 +15,7 @@ use crate::http::reached::{Named, reached};
 use crate::http::shown::Shown;
 use crate::plots::{Chart, Figure, band_in_words};
 use crate::store::studies::Study;
-use crate::store::{
-    Connection, LabSessionId, Store, StoreError, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies,
-    trials,
-};
+use crate::store::{LabSessionId, Store, StudyId, TrialId, gaits, lab_sessions, reference_gaits, studies, trials};
 use crate::studies::answer;
 use crate::studies::lab::{self, LimitCycles, SessionView};
 use askama::Template;
@@ -84,23 +81,16 @@ impl Best {
             None => None,
         };
         let gait = match trial {
-            Some((id, _)) => gait_of(&mut reader, id).await?,
+            Some((id, _)) => gaits::find(&mut reader, id).await?,
             None => None,
         };
+        drop(reader);
+        let gait = app.compute(move |pool| gait.map(|gait| gait.unpack(pool)).transpose()).await??;
         Ok(Self { side, figures, trial, gait })
     }
 
     fn name(&self) -> &str {
         &self.side.snapshot.study.plan.name
-    }
-}
-
-/// The gait of a trial; none: there is none, or its trajectory was dropped.
-async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Option<Gait>, Error> {
-    match gaits::get(db, id).await {
-        Ok(gait) => Ok(Some(gait)),
-        Err(StoreError::Missing { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
     }
 }
 
@@ -177,10 +167,11 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
     let study = trials::get(&mut reader, id).await?.study_id;
     let reference = studies::get(&mut reader, study).await?.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
-    let Some(gait) = gait_of(&mut reader, id).await? else { return Ok(Vec::new()) };
+    let Some(gait) = gaits::find(&mut reader, id).await? else { return Ok(Vec::new()) };
     let iterations = gaits::iterations(&mut reader, id).await?;
     drop(reader);
-    let draw = move |_: &OnPool| {
+    let draw = move |pool: &OnPool| {
+        let (gait, iterations) = (gait.unpack(pool)?, iterations.unpack(pool)?);
         let mut figures = vec![gait_charts::tiles(stick_figures(&gait)?)];
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
@@ -201,12 +192,15 @@ pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Resul
     let other = answer::comparable(&mut reader, trial.study_id, "other", b).await?;
     let reference = studies::get(&mut reader, trial.study_id).await?.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
-    let (Some(gait_a), Some(gait_b)) = (gait_of(&mut reader, a).await?, gait_of(&mut reader, b).await?) else {
+    let (Some(gait_a), Some(gait_b)) = (gaits::find(&mut reader, a).await?, gaits::find(&mut reader, b).await?) else {
         return Ok(Vec::new());
     };
     drop(reader);
-    let draw = move |_: &OnPool| pair((trial.number, &gait_a), (other.number, &gait_b), &reference);
-    Ok(app.compute(draw).await?)
+    let draw = move |pool: &OnPool| {
+        let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
+        Ok(pair((trial.number, &gait_a), (other.number, &gait_b), &reference))
+    };
+    app.compute(draw).await?
 }
 
 /// Two gaits, each with the number of its trial, over the reference gait.
@@ -247,6 +241,7 @@ pub(super) async fn measured_cycles(
     let mut found = Vec::new();
     for cycles in lab::limit_cycles(store, id).await? {
         let gait = lab::known_gait(&mut *store.read().await?, id, cycles.walk).await?;
+        let gait = store.compute(move |pool| gait.map(|gait| gait.unpack(pool)).transpose()).await??;
         found.push((cycles, gait));
     }
     Ok(found)

@@ -7,6 +7,7 @@ use super::error::{Page, page};
 use super::explanation::NoGait;
 use super::format::{self, words};
 use crate::access::{Answer, Permission, Read, Run};
+use crate::compute::OnPool;
 use crate::error::Error;
 use crate::gait_charts;
 use crate::http::AppState;
@@ -15,7 +16,7 @@ use crate::http::shown::Shown;
 use crate::plots::Figure;
 use crate::store::studies::Study;
 use crate::store::trials::{Trial, TrialState};
-use crate::store::{Instant, StoreError, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+use crate::store::{Instant, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 use crate::studies::explanation::{self, ExplanationState};
 use crate::studies::safety_reports::{Closed, SafetyReports};
 use askama::Template;
@@ -74,12 +75,10 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
         Some(from) => Some((from, trials::get(&mut reader, from).await?.number)),
         None => None,
     };
-    let gait = match gaits::get(&mut reader, id).await {
-        Ok(gait) => Some(gait),
-        Err(StoreError::Missing { .. }) => None,
-        Err(error) => return Err(error.into()),
+    let gait = match gaits::find(&mut reader, id).await? {
+        Some(gait) => Some((gait, gaits::iterations(&mut reader, id).await?)),
+        None => None,
     };
-    let iterations = if gait.is_some() { gaits::iterations(&mut reader, id).await? } else { Vec::new() };
     let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = SafetyReports::read(&mut reader, study.id).await?;
     for said in [&mut unsafe_by, &mut lifted] {
         said.retain(|closed| closed.trial == id);
@@ -95,8 +94,12 @@ pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(i
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
     let action = trial.action;
-    let drawn = app.compute(move |_| draw(id, gait.as_ref(), &reference, &iterations, &action));
-    let drawn = drawn.await.map_err(Error::from)??;
+    let drawn = move |pool: &OnPool| {
+        let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
+        let (gait, iterations) = gait.transpose()?.unzip();
+        draw(id, gait.as_ref(), &reference, &iterations.unwrap_or_default(), &action)
+    };
+    let drawn = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
         state: words(trial.state.as_str()),
         rmse: format::figure(trial.gait_rmse_rad),

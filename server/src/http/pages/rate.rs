@@ -14,7 +14,7 @@ use crate::plots::gait_tiles;
 use crate::store::allocations::Sided;
 use crate::store::presentations::{self, Judgement, Presentation};
 use crate::store::studies::FeedbackMode;
-use crate::store::{Connection, StudyId, commit, consents, gaits, members, studies};
+use crate::store::{Connection, Packed, StudyId, commit, consents, gaits, members, studies};
 use crate::studies::blind::{self, RaterAnswer};
 use askama::Template;
 use axum::extract::{Path, State};
@@ -193,8 +193,11 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
     }
     drop(reader);
     let phase = phase(&token);
-    let strides = app.compute(move |_| {
-        let stride = |gait: &Gait| blind_stride(gait, phase).ok().and_then(|figures| Stride::of(&figures));
+    let strides = app.compute(move |pool| {
+        let stride = |gait: &Packed<Gait>| {
+            let figures = blind_stride(&gait.unpack(pool).ok()?, phase).ok()?;
+            Stride::of(&figures)
+        };
         match &pair[..] {
             [first, second] => stride(first).zip(stride(second)).map(|(first, second)| [first, second]),
             _ => None,

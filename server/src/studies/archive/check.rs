@@ -3,6 +3,7 @@
 
 use super::file::refuse;
 use crate::access::Reach;
+use crate::compute::{OnPool, Pool};
 use crate::error::Error;
 use crate::printable;
 use crate::store::archive::Definition;
@@ -20,8 +21,9 @@ use crate::studies::lab::EmgResult;
 use crate::studies::{device, lab, person, plan, recording, search, trial_state};
 use gait_optimizer::metrics::gait_rmse;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
-use gait_optimizer::{Gait, ReferenceGait};
+use gait_optimizer::{Gait, ReferenceGait, WarmStart};
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 use uuid::Uuid;
 
 /// Texts that a noun reads by itself: their characters are its business.
@@ -92,7 +94,7 @@ fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E
 }
 
 /// Checks everything in quarantine.
-pub(super) async fn study(quarantine: &mut Quarantine) -> Result<Checked, Error> {
+pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Checked, Error> {
     if let Some(parent) = quarantine.forked_from() {
         at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is no identifier")))?;
     }
@@ -119,7 +121,7 @@ pub(super) async fn study(quarantine: &mut Quarantine) -> Result<Checked, Error>
     of_definition("reference_gaits", &reference.name, &written)?;
 
     let id = study.id;
-    let context = Context { study, device, reference };
+    let context = Arc::new(Context { study, device, reference });
     let trials = at("trials", trials::of_study(db, id).await)?;
     let mut unchecked_rmse = 0;
     let mut earlier = HashSet::new();
@@ -135,7 +137,7 @@ pub(super) async fn study(quarantine: &mut Quarantine) -> Result<Checked, Error>
         }
         earlier.insert(trial.id);
         at(&what, figures(trial, &context.study.plan))?;
-        let has_gait = at(&what, gait(db, trial, &context).await)?;
+        let has_gait = at(&what, gait(db, pool, trial, &context).await)?;
         unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
         at(&what, brought(db, trial).await)?;
     }
@@ -143,7 +145,7 @@ pub(super) async fn study(quarantine: &mut Quarantine) -> Result<Checked, Error>
         return Err(refuse(format!("trial {number}: its job says otherwise than its state")));
     }
     answers(db, &context.study, &trials).await?;
-    lab(db, id).await?;
+    lab(db, pool, id).await?;
     Ok(Checked { study: id, unchecked_rmse })
 }
 
@@ -198,7 +200,7 @@ fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
 }
 
 /// Checks the gait of a trial and computes its Gait RMSE anew. Whether it has one.
-async fn gait(db: &mut Connection, trial: &Trial, context: &Context) -> Result<bool, String> {
+async fn gait(db: &mut Connection, pool: &Pool, trial: &Trial, context: &Arc<Context>) -> Result<bool, String> {
     let text = |error: StoreError| error.to_string();
     if !gaits::is_here(db, trial.id).await.map_err(text)? {
         return Ok(false);
@@ -207,6 +209,26 @@ async fn gait(db: &mut Connection, trial: &Trial, context: &Context) -> Result<b
         return Err("it has a gait without a solve".to_owned());
     }
     let gait = gaits::get(db, trial.id).await.map_err(text)?;
+    let warm_start = gaits::warm_start(db, trial.id).await.map_err(text)?;
+    let iterations = gaits::iterations(db, trial.id).await.map_err(text)?;
+    let (trial, context) = (trial.clone(), Arc::clone(context));
+    let id = trial.id;
+    let checked = move |pool: &OnPool| {
+        let gait = gait.unpack(pool).map_err(text)?;
+        let warm_start = warm_start.unpack(pool).map_err(text)?;
+        iterations.unpack(pool).map_err(text)?;
+        solved(&trial, &context, &gait, &warm_start)?;
+        Ok::<_, String>(gait)
+    };
+    let gait = pool.run(checked).await.map_err(|e| e.to_string())??;
+    if !gaits::is_described(db, id, &gait).await.map_err(text)? {
+        return Err("its gait is not as its row describes it".to_owned());
+    }
+    Ok(true)
+}
+
+/// Checks what a solve left against its trial.
+fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart) -> Result<(), String> {
     gait.validate().map_err(|e| e.to_string())?;
     let plan = &context.study.plan;
     if gait.device != context.device
@@ -216,16 +238,10 @@ async fn gait(db: &mut Connection, trial: &Trial, context: &Context) -> Result<b
     {
         return Err("its gait is of another device, problem or action".to_owned());
     }
-    if !gaits::is_described(db, trial.id, &gait).await.map_err(text)? {
-        return Err("its gait is not as its row describes it".to_owned());
-    }
-    let warm_start = gaits::warm_start(db, trial.id).await.map_err(text)?;
     if warm_start.muscles != plan.muscles || warm_start.mesh != plan.gait_settings.mesh {
         return Err("its warm start is of another problem".to_owned());
     }
-    gaits::iterations(db, trial.id).await.map_err(text)?;
-    same_rmse(trial, &gait, &context.reference)?;
-    Ok(true)
+    same_rmse(trial, gait, &context.reference)
 }
 
 fn same_rmse(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
@@ -341,10 +357,10 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
 }
 
 /// Checks what was measured in the lab.
-async fn lab(db: &mut Connection, study: StudyId) -> Result<(), Error> {
+async fn lab(db: &mut Connection, pool: &Pool, study: StudyId) -> Result<(), Error> {
     for session in at("lab_sessions", lab_sessions::of_study(db, study).await)? {
         for found in at("lab_recordings", lab_recordings::of_session(db, session.id).await)? {
-            at(format!("recording {}", found.id), lab::check_kept(db, &found).await)?;
+            at(format!("recording {}", found.id), lab::check_kept(db, pool, &found).await)?;
         }
         let results = lab_recordings::results::<EmgResult>(db, session.id).await;
         at(format!("EMG results of lab session {}", session.id), results)?;

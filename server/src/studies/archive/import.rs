@@ -3,6 +3,7 @@
 use super::check;
 use super::file::{Next, Unpacker, Whole, refuse};
 use super::signature::PublicKey;
+use crate::compute::Pool;
 use crate::error::Error;
 use crate::store::archive::{self, Known, Unpacking};
 use crate::store::audit::{self, Actor};
@@ -70,7 +71,7 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
         return Err(refuse(format!("it is signed by {by}, which is none of the keys to trust")));
     }
     quarantine.settle().await.map_err(refuse)?;
-    let checked = check::study(&mut quarantine).await?;
+    let checked = check::study(&mut quarantine, &Pool::default()).await?;
     let origin = NewImport {
         file_sha256: whole.file_sha256,
         signed_by: whole.signed_by.map(|key| key.to_string()),

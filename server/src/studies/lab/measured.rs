@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, RecordingKind};
 use crate::store::lab_sessions;
-use crate::store::{Connection, LabRecordingId, LabSessionId, Store, StoreError, Writer, gaits};
+use crate::store::{Connection, LabRecordingId, LabSessionId, Packed, PackedText, Store, Writer, gaits};
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
 use gait_optimizer::phase_portrait::PhasePortrait;
@@ -58,20 +58,20 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     let mut db = store.read().await?;
     still_shown(&mut db, id).await?;
     let recordings = lab_recordings::of_session(&mut db, id).await?;
-    let mut files: Vec<(u8, LabRecordingId, EmgReading, String)> = Vec::new();
+    let mut files: Vec<(u8, LabRecordingId, EmgReading, PackedText)> = Vec::new();
     for recording in newest(&recordings, RecordingKind::Electromyogram) {
-        let (reading, text) = lab_recordings::file(&mut db, recording.id).await?;
-        files.push((recording.walk, recording.id, reading, text));
+        let (reading, file) = lab_recordings::file(&mut db, recording.id).await?;
+        files.push((recording.walk, recording.id, reading, file));
     }
     drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
         return Err(Error::conflict("there is no electromyogram of walk 1, which the others are measured by"));
     }
-    let process = move |_: &OnPool| {
+    let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();
         let mut normal: Vec<CycleActivity> = Vec::new();
-        for (walk, recording_id, reading, text) in &files {
-            let (recording, strikes) = reading.read(WHAT, text)?;
+        for (walk, recording_id, reading, file) in &files {
+            let (recording, strikes) = reading.read(WHAT, &file.text(pool)?)?;
             let measured = recording.cycles(&strikes, &settings)?;
             let activity = if walks.is_empty() {
                 normal = measured;
@@ -146,34 +146,31 @@ pub async fn beside_model(store: &mut Store, id: LabSessionId, result: EmgResult
         gaits.extend(known_gait(&mut db, id, walk.walk).await?.map(|gait| (walk.walk, gait)));
     }
     drop(db);
-    Ok(store.compute(move |_| view(result, &gaits)).await?)
+    store.compute(move |pool| view(pool, result, &gaits)).await?
 }
 
 /// A result with the model's muscles beside it.
-fn view(result: EmgResult, gaits: &[(u8, Gait)]) -> EmgView {
+fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Result<EmgView, Error> {
     let mut model = Vec::new();
     for (number, gait) in gaits {
+        let gait = gait.unpack(pool)?;
         let channels = result.walks.iter().filter(|walk| walk.walk == *number).flat_map(|walk| &walk.channels);
-        let muscles: Vec<ModelActivity> = channels.filter_map(|channel| model_activity(gait, channel)).collect();
+        let muscles: Vec<ModelActivity> = channels.filter_map(|channel| model_activity(&gait, channel)).collect();
         if !muscles.is_empty() {
             model.push(WalkModel { walk: *number, muscles });
         }
     }
-    EmgView { result, model }
+    Ok(EmgView { result, model })
 }
 
 /// The gait of a walk; none without the device, as long as the order is blinded, and where its trajectory was dropped.
 ///
 /// # Errors
 /// What the database reports.
-pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Result<Option<Gait>, Error> {
+pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Result<Option<Packed<Gait>>, Error> {
     let session = lab_sessions::get(db, id).await?;
     let Some(gait) = gait_of(&session, walk) else { return Ok(None) };
-    match gaits::get(db, gait).await {
-        Ok(gait) => Ok(Some(gait)),
-        Err(StoreError::Missing { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
+    Ok(gaits::find(db, gait).await?)
 }
 
 /// The limit cycles of a walk.
@@ -197,15 +194,15 @@ pub struct LimitCycles {
 pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
     let mut db = store.read().await?;
     let recordings = lab_recordings::of_session(&mut db, id).await?;
-    let mut files: Vec<(u8, LabRecordingId, MotionReading, String)> = Vec::new();
+    let mut files: Vec<(u8, LabRecordingId, MotionReading, PackedText)> = Vec::new();
     for recording in newest(&recordings, RecordingKind::Motion) {
-        let (reading, text) = lab_recordings::file(&mut db, recording.id).await?;
-        files.push((recording.walk, recording.id, reading, text));
+        let (reading, file) = lab_recordings::file(&mut db, recording.id).await?;
+        files.push((recording.walk, recording.id, reading, file));
     }
     drop(db);
-    let process = move |_: &OnPool| {
-        let cycles = |(walk, recording_id, reading, text): (u8, LabRecordingId, MotionReading, String)| {
-            let joints = reading.portraits(&text)?;
+    let process = move |pool: &OnPool| {
+        let cycles = |(walk, recording_id, reading, file): (u8, LabRecordingId, MotionReading, PackedText)| {
+            let joints = reading.portraits(&file.text(pool)?)?;
             Ok(LimitCycles { walk, recording_id, cutoff_hz: reading.cutoff_hz, joints })
         };
         files.into_iter().map(cycles).collect()

@@ -1,12 +1,12 @@
 //! What is measured in a walk: brought as a file, read whole or refused with line, column and reason, kept as it was.
 
 use super::session::{checked_walk, still_open};
-use crate::compute::OnPool;
+use crate::compute::{OnPool, Pool};
 use crate::error::Error;
 use crate::store::audit::{self, Actor};
 use crate::store::lab_recordings::{self, LabRecording, PackedRecording, RecordingKind};
 use crate::store::lab_sessions::Act;
-use crate::store::{Connection, LabRecordingId, LabSessionId, Store, Writer};
+use crate::store::{Connection, LabRecordingId, LabSessionId, PackedText, Store, Writer};
 use crate::studies::recording::Unit;
 use clap::ValueEnum;
 use gait_optimizer::ModelError;
@@ -196,10 +196,10 @@ impl NewEmg {
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
     pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
-        let check = move |_: &OnPool| {
+        let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
-            let packed = PackedRecording::new(RecordingKind::Electromyogram, &self.reading, &self.recording)?;
+            let packed = PackedRecording::new(pool, RecordingKind::Electromyogram, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
         };
         store.compute(check).await?
@@ -212,10 +212,10 @@ impl NewMotion {
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
     pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
-        let check = move |_: &OnPool| {
+        let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
-            let packed = PackedRecording::new(RecordingKind::Motion, &self.reading, &self.recording)?;
+            let packed = PackedRecording::new(pool, RecordingKind::Motion, &self.reading, &self.recording)?;
             Ok(Checked { walk, packed })
         };
         store.compute(check).await?
@@ -226,21 +226,21 @@ impl NewMotion {
 ///
 /// # Errors
 /// [`Error::Invalid`] with line and column, or the field.
-pub async fn check_kept(db: &mut Connection, kept: &LabRecording) -> Result<(), Error> {
+pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &LabRecording) -> Result<(), Error> {
     let id = kept.id;
     match kept.kind {
         RecordingKind::Electromyogram => {
-            let (reading, text) = lab_recordings::file::<EmgReading>(db, id).await?;
-            reading.check(&text)
+            let (reading, file) = lab_recordings::file::<EmgReading>(db, id).await?;
+            pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }
         RecordingKind::Motion => {
-            let (reading, text) = lab_recordings::file::<MotionReading>(db, id).await?;
-            reading.check(&text)
+            let (reading, file) = lab_recordings::file::<MotionReading>(db, id).await?;
+            pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }
     }
 }
 
-/// A file as it was brought, byte for byte.
+/// A file as it was brought.
 #[derive(Debug)]
 pub struct Brought {
     /// What is known of it.
@@ -248,7 +248,7 @@ pub struct Brought {
     /// Its form.
     pub form: FileForm,
     /// The file.
-    pub text: String,
+    pub file: PackedText,
 }
 
 /// A recording as it was brought.
@@ -262,8 +262,8 @@ pub async fn brought(db: &mut Connection, id: LabRecordingId) -> Result<Brought,
         form: FileForm,
     }
     let recording = lab_recordings::get(db, id).await?;
-    let (Reading { form }, text) = lab_recordings::file(db, id).await?;
-    Ok(Brought { recording, form, text })
+    let (Reading { form }, file) = lab_recordings::file(db, id).await?;
+    Ok(Brought { recording, form, file })
 }
 
 /// Keeps a file with the walk that it is of.
