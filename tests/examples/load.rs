@@ -7,8 +7,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::workers::{Assignment, Evaluate, GaitSolver};
+use gaitwright_service::workers::{Assignment, Evaluate, GaitSolver};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
 use gaitwright_tests::service::Service;

@@ -9,8 +9,8 @@ use gait_optimizer::{
     CancelToken, DomainTrajectory, Gait, IterationRecord, LinearAlgebra, Margins, SolveOutcome, SolveReport,
     SolveStatus, Violation, WarmStart,
 };
-use gaitwright::store::TrialId;
-use gaitwright::workers::{Assignment, Evaluate};
+use gaitwright_service::workers::{Assignment, Evaluate};
+use gaitwright_store::TrialId;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

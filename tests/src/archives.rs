@@ -1,9 +1,9 @@
 //! Archives of studies, for tests that take one elsewhere.
 
-use gaitwright::error::Error;
-use gaitwright::store::audit::Actor;
-use gaitwright::store::{Store, StudyId};
-use gaitwright::studies::archive::{self, PublicKey};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::archive::{self, PublicKey};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{Store, StudyId};
 use std::io::Cursor;
 
 /// The archive of a study, not signed.

@@ -1,8 +1,8 @@
 //! An engine whose workers are all away: it takes jobs and begins none.
 
 use futures_util::future::BoxFuture;
-use gaitwright::store::TrialId;
-use gaitwright::workers::{Assignment, Attempt, Dispatch, DispatchError, News};
+use gaitwright_service::workers::{Assignment, Attempt, Dispatch, DispatchError, News};
+use gaitwright_store::TrialId;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 

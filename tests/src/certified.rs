@@ -2,7 +2,7 @@
 
 use gait_optimizer::certificate::{Certificate, FORMAT_VERSION};
 use gait_optimizer::{Gait, ModelError};
-use gaitwright::workers::Certify;
+use gaitwright_service::workers::Certify;
 use std::time::Duration;
 
 /// A certificate that passed, or one of a walker that falls.

@@ -5,7 +5,7 @@ use gait_optimizer::gait::ContactRowName;
 use gait_optimizer::metrics::gait_rmse;
 use gait_optimizer::walking::{BEZIER_COEFFICIENTS, CYCLE};
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
-use gaitwright::workers::{Assignment, Evaluate};
+use gaitwright_service::workers::{Assignment, Evaluate};
 
 /// The analytic solver; its gaits are whole, and its Gait RMSE is that of the gait.
 #[derive(Debug, Default)]

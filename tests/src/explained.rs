@@ -3,7 +3,7 @@
 use gait_learner::SearchSpace;
 use gait_optimizer::explanation::{BoundAtLimit, Conflict, Explanation, GivenBound, Relaxation};
 use gait_optimizer::{CancelToken, SolveError, SolveStatus, TunedBounds, Violation};
-use gaitwright::workers::{Explain, Unexplained};
+use gaitwright_service::workers::{Explain, Unexplained};
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -3,8 +3,8 @@
 use crate::analytic::Analytic;
 use crate::service::Service;
 use axum::http::StatusCode;
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::{Store, StudyId, TrialId, commit};
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::{Store, StudyId, TrialId, commit};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

@@ -19,4 +19,5 @@ pub mod measured;
 pub mod orders;
 pub mod service;
 pub mod skipped;
+pub mod sources;
 pub mod well_formed;

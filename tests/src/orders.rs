@@ -1,6 +1,6 @@
 //! Orders as they were drawn, read past the program: for tests that hold what is served against them.
 
-use gaitwright::store::{LabSessionId, Store, StudyId, TrialId};
+use gaitwright_store::{LabSessionId, Store, StudyId, TrialId};
 use sqlx::Row;
 
 /// Whether walk 2 of a session is with gait one.

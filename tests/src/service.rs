@@ -7,20 +7,20 @@ use axum::body::Body;
 use axum::http::{HeaderMap, HeaderValue, Method, Request, Response, StatusCode, header};
 use axum::middleware::map_request;
 use gait_optimizer::Gait;
-use gaitwright::access::Reach;
-use gaitwright::http::{Access, AppState, Hosts, router};
-use gaitwright::store::audit::Actor;
-use gaitwright::store::certificates::{self, CertificateOnRecord};
-use gaitwright::store::feedback::FeedbackRow;
-use gaitwright::store::studies::{Study, StudyState};
-use gaitwright::store::trials::Trial;
-use gaitwright::store::{
+use gaitwright_http::{Access, AppState, Hosts, router};
+use gaitwright_service::access::Reach;
+use gaitwright_service::studies::catalogue;
+use gaitwright_service::studies::plan::{self, NewStudy};
+use gaitwright_service::studies::scheduler::Scheduler;
+use gaitwright_service::workers::{AfterSolves, Certify, Dispatch, Evaluate, Explain, InProcess};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::certificates::{self, CertificateOnRecord};
+use gaitwright_store::feedback::FeedbackRow;
+use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{
     ReferenceGaitId, Store, StudyId, SubjectId, commit, feedback, reference_gaits, studies, subjects, trials,
 };
-use gaitwright::studies::catalogue;
-use gaitwright::studies::plan::{self, NewStudy};
-use gaitwright::studies::scheduler::Scheduler;
-use gaitwright::workers::{AfterSolves, Certify, Dispatch, Evaluate, Explain, InProcess};
 use http_body_util::BodyExt;
 use serde_json::Value;
 use std::path::Path;

@@ -4,7 +4,7 @@ use crate::analytic::Analytic;
 use gait_optimizer::gait::ContactRowName;
 use gait_optimizer::walking::{BEZIER_COEFFICIENTS, CYCLE};
 use gait_optimizer::{CancelToken, Gait, IterationRecord, SolveOutcome};
-use gaitwright::workers::{Assignment, Evaluate};
+use gaitwright_service::workers::{Assignment, Evaluate};
 
 /// The analytic solver with well-formed gaits, each with curves of its own.
 #[derive(Debug, Default)]

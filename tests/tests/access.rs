@@ -5,12 +5,12 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use futures_util::future::join_all;
-use gaitwright::access::{Right, Role, people, secret};
-use gaitwright::http::{Access, openapi};
-use gaitwright::store::audit::{self, Actor};
-use gaitwright::store::commit;
-use gaitwright::store::members::MemberKind;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright_http::{Access, openapi};
+use gaitwright_service::access::{Right, Role, people, secret};
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::commit;
+use gaitwright_store::members::MemberKind;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::callers::{As, FORM, member, send, service, session_of, signed_in, token, user};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
@@ -144,7 +144,7 @@ const PAGES: [(&str, Option<Right>); 71] = [
 
 #[tokio::test]
 async fn every_page_is_shown_to_those_who_may_see_it() {
-    let listed = include_str!("../../server/src/http/pages/mod.rs");
+    let listed = include_str!("../../server/http/src/pages/mod.rs");
     let (_folder, service) = service().await;
     let callers = everybody(&service).await;
     let mut seen = BTreeSet::new();

@@ -7,14 +7,14 @@ use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use axum::middleware::map_request;
 use axum::routing::get;
-use gaitwright::access::{Right, Role};
-use gaitwright::http::access_log::NO_SUBJECT_DATA;
-use gaitwright::http::{openapi, with_layers};
-use gaitwright::store::access_log::{self, Access, AccessRow, Kind, Tally};
-use gaitwright::store::audit::Actor;
-use gaitwright::store::seals::{self, SealCheck};
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::{StudyId, commit, now};
+use gaitwright_http::access_log::NO_SUBJECT_DATA;
+use gaitwright_http::{openapi, with_layers};
+use gaitwright_service::access::{Right, Role};
+use gaitwright_store::access_log::{self, Access, AccessRow, Kind, Tally};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::seals::{self, SealCheck};
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::{StudyId, commit, now};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, FORM, send, signed_in, token};
 use gaitwright_tests::cli;
@@ -28,7 +28,7 @@ const ANY_ID: &str = "01890000-0000-7000-8000-000000000000";
 
 /// Every route that is read: pages as the router lists them, operations as the description does.
 fn read_routes() -> BTreeSet<String> {
-    let pages = include_str!("../../server/src/http/pages/mod.rs");
+    let pages = include_str!("../../server/http/src/pages/mod.rs");
     let pages = pages.lines().filter(|line| line.contains(".route(\"") && line.contains("get("));
     let mut routes: BTreeSet<String> = pages.map(|line| line.split('"').nth(1).unwrap().to_owned()).collect();
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();

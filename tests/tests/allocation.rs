@@ -3,20 +3,21 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::{Method, StatusCode};
-use gaitwright::access::{Right, Role};
-use gaitwright::store::allocations::{self, Lot};
-use gaitwright::store::audit::Actor;
-use gaitwright::store::presentations::{self, Kind, NewPresentation};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::{Trial, TrialState};
-use gaitwright::store::{Connection, LabSessionId, Store, StudyId, TokenId, TrialId, commit, lab_sessions};
-use gaitwright::studies::lab::{self, NewSession};
+use gaitwright_service::access::{Right, Role};
+use gaitwright_service::studies::lab::{self, NewSession};
+use gaitwright_store::allocations::{self, Lot};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::presentations::{self, Kind, NewPresentation};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{Connection, LabSessionId, Store, StudyId, TokenId, TrialId, commit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
 use gaitwright_tests::consistent::Consistent;
 use gaitwright_tests::orders::{gait_one_first, sides};
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
@@ -391,7 +392,7 @@ async fn exchange_orders(database: &Path) {
 
 /// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a side.
 async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str) -> Vec<(String, String)> {
-    let document: Value = serde_json::from_str(&gaitwright::http::openapi::text().unwrap()).unwrap();
+    let document: Value = serde_json::from_str(&gaitwright_http::openapi::text().unwrap()).unwrap();
     // Each address, in every form that it can be asked for.
     let mut paths: Vec<(String, Option<String>)> = vec![("/health".to_owned(), None), ("/ready".to_owned(), None)];
     for (path, item) in document["paths"].as_object().unwrap() {
@@ -404,7 +405,7 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
     }
     let forms: Vec<&str> = paths.iter().filter_map(|(_, form)| form.as_deref()).collect();
     assert!(forms.contains(&"text/csv"), "{forms:?}");
-    for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains("get(")) {
+    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains("get(")) {
         paths.extend(line.split('"').nth(1).map(|path| (path.to_owned(), None)));
     }
     // These differ from one call to the next, or are the sides as the rater sees them.
@@ -573,7 +574,7 @@ async fn an_archive_leaves_out_orders_that_are_blind_and_a_session_without_one_c
     let blind = of(&mut reader, ids[1]).await;
     assert_eq!((blind.included, blind.gait_one_first), (false, None));
     drop(reader);
-    let device = gaitwright::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
+    let device = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     let mut writer = store.write().await.unwrap();
     let refused = lab::for_device(&mut writer, &device, ids[1], 2).await.unwrap_err();
     assert!(refused.to_string().contains("left its order out"), "{refused}");
@@ -605,8 +606,9 @@ async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_dev
     let mut writer = service.store.write().await.unwrap();
     let row: LabSessionId = id.parse().unwrap();
     // An analytic gait has no controller file: what is recorded of one is what counts here.
-    let device_caller = gaitwright::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
-    let reading_caller = gaitwright::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Rate]);
+    let device_caller = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
+    let reading_caller =
+        gaitwright_service::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Rate]);
     let gait = lab::for_device(&mut writer, &device_caller, row, 2).await.unwrap();
     let other = lab::for_device(&mut writer, &reading_caller, row, 3).await.unwrap();
     commit(writer).await.unwrap();
@@ -655,7 +657,8 @@ async fn whoever_took_a_controller_file_of_a_study_rates_it_no_longer_blindly() 
     let plan = NewSession { gait_one: drawn[0].0, gait_two: drawn[0].1, notes: String::new() };
     let mut writer = service.store.write().await.unwrap();
     let session = lab::plan(&mut writer, &Actor::program(), study, &plan).await.unwrap();
-    let caller = gaitwright::access::Caller::token(TokenId::fresh(), "[Rate, Device]", &[Right::Rate, Right::Device]);
+    let caller =
+        gaitwright_service::access::Caller::token(TokenId::fresh(), "[Rate, Device]", &[Right::Rate, Right::Device]);
     lab::for_device(&mut writer, &caller, session.id, 2).await.unwrap();
     commit(writer).await.unwrap();
     let path = format!("/rate/pair/{}", pair["token"].as_str().unwrap());
@@ -744,25 +747,16 @@ async fn nobody_who_is_not_signed_in_learns_what_is_solved() {
 
 #[test]
 fn only_the_modules_of_allocations_name_their_tables() {
-    let allowed = ["store/allocations/mod.rs", "store/archived_allocations.rs", "store/archive.rs", "store/seals.rs"];
-    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/src")];
+    let allowed = ["allocations/mod.rs", "archived_allocations.rs", "archive.rs", "seals.rs"];
+    let allowed = allowed.map(|file| format!("store/src/{file}"));
     let mut read = 0;
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-                continue;
-            }
-            let name = path.to_string_lossy().replace('\\', "/");
-            if allowed.iter().any(|end| name.ends_with(end)) {
-                continue;
-            }
-            let text = std::fs::read_to_string(&path).unwrap();
-            read += 1;
-            for table in ["lab_allocations", "presentation_allocations"] {
-                assert!(!text.contains(table), "{name} names {table}");
-            }
+    for (name, text) in sources::of_server() {
+        if allowed.contains(&name) {
+            continue;
+        }
+        read += 1;
+        for table in ["lab_allocations", "presentation_allocations"] {
+            assert!(!text.contains(table), "{name} names {table}");
         }
     }
     assert!(read > 150, "{read}");

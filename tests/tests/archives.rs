@@ -5,10 +5,10 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::Mesh;
-use gaitwright::store::row::Row;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, StudyId};
-use gaitwright::studies::archive::{self, SigningKey};
+use gaitwright_service::studies::archive::{self, SigningKey};
+use gaitwright_store::row::Row;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::{Store, StudyId};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::cli;
 use gaitwright_tests::consistent::Consistent;

@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::{Method, StatusCode};
-use gaitwright::access::{Right, Role};
-use gaitwright::store::members::MemberKind;
-use gaitwright::store::presentations::{self, Kind, Presentation};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{StudyId, audit};
+use gaitwright_service::access::{Right, Role};
+use gaitwright_store::members::MemberKind;
+use gaitwright_store::presentations::{self, Kind, Presentation};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, member, rater_of, send, signed_in};
 use gaitwright_tests::orders::sides;
@@ -172,7 +172,7 @@ async fn an_answer_is_heard_of_the_gait_that_was_shown_on_that_side() {
         let heard = feedback.iter().filter(|row| row.by_rater).map(|row| row.said);
         for (said, (first, second)) in heard.zip(sides(&service.store, study).await) {
             let (winner, loser) = if answer == "first" { (first, second) } else { (second, first) };
-            assert_eq!(said, gaitwright::store::feedback::FeedbackContent::Preference { winner, loser });
+            assert_eq!(said, gaitwright_store::feedback::FeedbackContent::Preference { winner, loser });
             swapped.insert(winner > loser);
         }
     }
@@ -313,7 +313,7 @@ async fn the_last_answer_can_be_taken_back_once_and_counts_no_more() {
     let pair = next(&service, study).await;
     let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
     assert_eq!(say(&service, &pair, "first").await, StatusCode::CREATED);
-    let heard = |rows: &[gaitwright::store::feedback::FeedbackRow]| {
+    let heard = |rows: &[gaitwright_store::feedback::FeedbackRow]| {
         rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
     };
     assert_eq!(heard(&service.feedback(study).await), 1);

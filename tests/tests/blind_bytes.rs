@@ -4,13 +4,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::{HeaderMap, Method, StatusCode};
-use gaitwright::access::{Right, Role};
-use gaitwright::http::openapi;
-use gaitwright::store::members::MemberKind;
-use gaitwright::store::presentations::{self, Kind, Presentation};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, studies};
+use gaitwright_http::openapi;
+use gaitwright_service::access::{Right, Role};
+use gaitwright_store::members::MemberKind;
+use gaitwright_store::presentations::{self, Kind, Presentation};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, studies};
 use gaitwright_tests::callers::{As, FORM, member, rater_of, send, service, signed_in, token};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -82,7 +82,7 @@ fn addresses() -> Vec<(Method, String)> {
     for (path, item) in document["paths"].as_object().unwrap() {
         all.extend(item.as_object().unwrap().keys().map(|m| (m.to_uppercase().parse().unwrap(), path.clone())));
     }
-    for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
+    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
         let path = line.split('"').nth(1).unwrap().to_owned();
         for (method, called) in [(Method::GET, "get("), (Method::POST, "post(")] {
             if line.contains(called) && path != "/sign-out" {

@@ -4,7 +4,7 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::Device;
-use gaitwright::store::studies::StudyState;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;

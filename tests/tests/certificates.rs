@@ -6,8 +6,8 @@
 use axum::http::StatusCode;
 use gait_optimizer::Mesh;
 use gait_optimizer::export::ControllerFile;
-use gaitwright::store::studies::StudyState;
-use gaitwright::workers::GaitSolver;
+use gaitwright_service::workers::GaitSolver;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};

@@ -6,14 +6,14 @@
 
 use axum::body::Body;
 use axum::http::{Request, header};
-use gaitwright::access::Role;
-use gaitwright::http::openapi;
-use gaitwright::store::audit::{self, ChainCheck};
-use gaitwright::store::feedback::FeedbackRow;
-use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
-use gaitwright::store::trials::Trial;
-use gaitwright::store::{StudyId, feedback};
-use gaitwright::studies::search;
+use gaitwright_http::openapi;
+use gaitwright_service::access::Role;
+use gaitwright_service::studies::search;
+use gaitwright_store::audit::{self, ChainCheck};
+use gaitwright_store::feedback::FeedbackRow;
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{StudyId, feedback};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::signed_in;
 use gaitwright_tests::explained::without_gaits;

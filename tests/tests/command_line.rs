@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::Store;
+use gaitwright_store::Store;
 use gaitwright_tests::cli;
 use std::path::Path;
 use std::process::{Output, Stdio};

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::http::openapi;
-use gaitwright::store::audit;
-use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_http::openapi;
+use gaitwright_store::audit;
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
@@ -76,7 +76,7 @@ async fn after_withdrawal_nothing_new_is_written_and_nothing_is_given_out() {
     let other =
         if service.get(finished).await.plan.search_space.values(trials[0].action_index)[5] == 0.3 { 0.2 } else { 0.3 };
     let suggestion = json!({"over": trials[0].id, "bounds": {"a6": other}});
-    let ended = |trial: &gaitwright::store::trials::Trial| trial.state.as_str() == "cancelled";
+    let ended = |trial: &gaitwright_store::trials::Trial| trial.state.as_str() == "cancelled";
     let cancelled = service.trials(running).await.into_iter().find(ended).unwrap().id;
     for (path, body) in [
         ("/api/v1/studies".to_owned(), json!({"subject_id": person})),
@@ -242,7 +242,7 @@ async fn studies_of_who_withdrew_neither_leave_nor_enter_a_record_as_archives() 
     assert!(!folder.path().join("study.gait").exists());
 
     // Elsewhere, where the subject withdraws after a first study came in.
-    let other = gaitwright::store::Store::open(&folder.path().join("b.db")).await.unwrap();
+    let other = gaitwright_store::Store::open(&folder.path().join("b.db")).await.unwrap();
     import(&other, &archives[0]).await.unwrap();
     other.close().await;
     drop(other);

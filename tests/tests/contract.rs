@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::studies::StudyState;
-use gaitwright::studies::belief::Beliefs;
-use gaitwright::studies::choice::ranking_to_show;
-use gaitwright::studies::recommended::Judged;
-use gaitwright::studies::snapshot::StudySnapshot;
-use gaitwright::studies::summary;
+use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::choice::ranking_to_show;
+use gaitwright_service::studies::recommended::Judged;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::summary;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::{Map, Value};

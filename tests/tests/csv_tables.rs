@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -66,7 +66,7 @@ async fn no_csv_endpoint_gives_a_formula() {
         .execute(&mut **writer)
         .await
         .unwrap();
-    gaitwright::store::commit(writer).await.unwrap();
+    gaitwright_store::commit(writer).await.unwrap();
 
     let description = service.fetch("/api/openapi.json").await.json();
     let mut asked = BTreeSet::new();

@@ -4,12 +4,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use futures_util::future::BoxFuture;
-use gaitwright::store::feedback::FeedbackContent;
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, TrialId, results};
-use gaitwright::workers::nats::JetStream;
-use gaitwright::workers::{Assignment, Dispatch, DispatchError, InProcess, News, Receipt};
+use gaitwright_service::workers::nats::JetStream;
+use gaitwright_service::workers::{Assignment, Dispatch, DispatchError, InProcess, News, Receipt};
+use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, TrialId, results};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::service::Service;
@@ -123,7 +123,7 @@ async fn wait_for_a_solve(service: &Service, study: StudyId) {
 /// What must not depend on what happened on the way.
 async fn essence(service: &Service, study: StudyId) -> Vec<String> {
     let trials = service.trials(study).await;
-    let line = |t: &gaitwright::store::trials::Trial| {
+    let line = |t: &gaitwright_store::trials::Trial| {
         format!("{} {} {:?} {:?}", t.number, t.action_index, t.state, t.gait_rmse_rad.map(f64::to_bits))
     };
     trials.iter().map(line).collect()

@@ -5,11 +5,11 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::{Mesh, TunedBounds};
-use gaitwright::store::audit::{self, Actor};
-use gaitwright::store::studies::{Evaluation, StudyState};
-use gaitwright::store::trials::{Trial, TrialState};
-use gaitwright::store::{StudyId, TrialId, events, explanations};
-use gaitwright::workers::GaitSolver;
+use gaitwright_service::workers::GaitSolver;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::studies::{Evaluation, StudyState};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{StudyId, TrialId, events, explanations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::explained::{Clearance, with_few_gaits, without_gaits};
@@ -249,7 +249,8 @@ async fn the_real_explanation_is_that_of_the_command_line() {
     }
     let folder = tempfile::tempdir().unwrap();
     let service =
-        Service::start_explaining(&folder.path().join("a.db"), GaitSolver, gaitwright::workers::GaitExplainer).await;
+        Service::start_explaining(&folder.path().join("a.db"), GaitSolver, gaitwright_service::workers::GaitExplainer)
+            .await;
     let study = service
         .study(|new| {
             (new.muscles, new.trial_budget) = (false, 1);

@@ -4,8 +4,8 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::trials::TrialState;
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::measured::{electromyogram, four_strides, motion};
 use gaitwright_tests::service::Service;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::{Store, StoreError};
+use gaitwright_store::{Store, StoreError};
 use gaitwright_tests::cli;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use std::path::Path;

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, TrialId};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, TrialId};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::json;
@@ -353,7 +353,7 @@ async fn the_best_line_starts_at_the_first_gait_also_when_trials_run_side_by_sid
             .await
             .iter()
             .filter_map(|row| match row.said {
-                gaitwright::store::feedback::FeedbackContent::Label { trial, .. } => Some(trial),
+                gaitwright_store::feedback::FeedbackContent::Label { trial, .. } => Some(trial),
                 _ => None,
             })
             .collect();

@@ -4,9 +4,9 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, events};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, events};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use http_body_util::BodyExt;

@@ -4,12 +4,12 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::emg::EmgSettings;
-use gaitwright::store::feedback::{FeedbackContent, FeedbackRow, Source};
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::trials::{Trial, TrialState};
-use gaitwright::store::{LabSessionId, Store, StudyId, audit, lab_sessions};
-use gaitwright::studies::lab;
-use gaitwright::workers::Evaluate;
+use gaitwright_service::studies::lab;
+use gaitwright_service::workers::Evaluate;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{LabSessionId, Store, StudyId, audit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::consistent::Consistent;

@@ -6,12 +6,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::http::openapi;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, TrialId, lab_sessions};
+use gaitwright_http::openapi;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, TrialId, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
+use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use tempfile::TempDir;
@@ -135,7 +136,7 @@ fn operations() -> Vec<String> {
     for (path, item) in document["paths"].as_object().unwrap() {
         all.extend(item.as_object().unwrap().keys().map(|method| format!("{method} {path}")));
     }
-    for line in include_str!("../../server/src/http/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
+    for line in include_str!("../../server/http/src/pages/mod.rs").lines().filter(|line| line.contains(".route(\"")) {
         let path = line.split('"').nth(1).unwrap();
         for method in ["get", "post"] {
             if line.contains(&format!("{method}(")) {
@@ -181,7 +182,7 @@ impl Scene {
     async fn by_hand(&self, sql: &str) {
         let mut writer = self.service.store.write().await.unwrap();
         sqlx::query(sqlx::AssertSqlSafe(sql.to_owned())).execute(&mut **writer).await.unwrap();
-        gaitwright::store::commit(writer).await.unwrap();
+        gaitwright_store::commit(writer).await.unwrap();
     }
 
     /// How many rows each table has that a door may write.
@@ -457,7 +458,7 @@ impl Rated {
                 }
                 sqlx::query("delete from certificates").execute(&mut **writer).await.unwrap();
                 sqlx::query("delete from gaits").execute(&mut **writer).await.unwrap();
-                gaitwright::store::commit(writer).await.unwrap();
+                gaitwright_store::commit(writer).await.unwrap();
             }
             Rule::Withdrawal => {
                 let subject = self.service.subject().await;
@@ -511,38 +512,29 @@ async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certi
 fn every_writer_of_the_learners_log_is_the_one_door() {
     let mut writers = Vec::new();
     let mut appenders = Vec::new();
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/src");
-    let mut folders = vec![root.clone()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "rs") {
-                let text = std::fs::read_to_string(&path).unwrap();
-                let name = path.strip_prefix(&root).unwrap().to_string_lossy().into_owned();
-                let flat = text.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
-                if flat.contains("into feedback ") || flat.contains("into feedback(") {
-                    writers.push(name.clone());
-                }
-                if text.contains("feedback::append(") || text.contains("feedback::{append") {
-                    appenders.push(name);
-                }
-            }
+    for (name, text) in sources::of_server() {
+        let flat = text.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+        if flat.contains("into feedback ") || flat.contains("into feedback(") {
+            writers.push(name.clone());
+        }
+        if text.contains("feedback::append(") || text.contains("feedback::{append") {
+            appenders.push(name);
         }
     }
-    assert_eq!(writers, ["store/feedback.rs"], "SQL that writes the table");
-    assert_eq!(appenders, ["studies/preference.rs"], "callers of the function that writes it");
+    assert_eq!(writers, ["store/src/feedback.rs"], "SQL that writes the table");
+    assert_eq!(appenders, ["service/src/studies/preference.rs"], "callers of the function that writes it");
 }
 
 #[tokio::test]
 async fn a_plan_made_before_a_safety_report_is_not_written() {
     let scene = Rated::new().await;
     let study = scene.service.get(scene.study).await;
-    let snapshot =
-        gaitwright::studies::snapshot::StudySnapshot::read(&mut scene.service.store.read().await.unwrap(), study)
-            .await
-            .unwrap();
+    let snapshot = gaitwright_service::studies::snapshot::StudySnapshot::read(
+        &mut scene.service.store.read().await.unwrap(),
+        study,
+    )
+    .await
+    .unwrap();
     let current = async || {
         let mut writer = scene.service.store.write().await.unwrap();
         snapshot.is_current(&mut writer).await.unwrap()

@@ -7,8 +7,8 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::Violation;
-use gaitwright::http::openapi;
-use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_http::openapi;
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};

@@ -6,11 +6,11 @@ use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::SolveStatus;
 use gaitwright::cli::study::prune;
-use gaitwright::store::audit::Actor;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{Store, backup, certificates, commit, explanations, gaits, members, studies};
-use gaitwright::studies::archive::file::read_through;
-use gaitwright::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::archive::file::read_through;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::{Store, backup, certificates, commit, explanations, gaits, members, studies};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::certified::certificate;
@@ -24,13 +24,13 @@ use std::path::Path;
 use std::process::Command;
 use tower::ServiceExt;
 
-async fn posterior(service: &Service, study: gaitwright::store::StudyId) -> Vec<(u64, u64)> {
+async fn posterior(service: &Service, study: gaitwright_store::StudyId) -> Vec<(u64, u64)> {
     let mut reader = service.store.read().await.unwrap();
     let study = studies::get(&mut reader, study).await.unwrap();
     let snapshot = StudySnapshot::read(&mut reader, study).await.unwrap();
     let plan = &snapshot.study.plan;
     let belief = gait_learner::posterior(&plan.search_space, &snapshot.log(), &plan.learner).unwrap();
-    let mean = |trial: &gaitwright::store::trials::Trial| belief.mean(trial.action_index).unwrap().to_bits();
+    let mean = |trial: &gaitwright_store::trials::Trial| belief.mean(trial.action_index).unwrap().to_bits();
     snapshot.trials.iter().map(|trial| (trial.action_index.0, mean(trial))).collect()
 }
 

@@ -5,9 +5,9 @@
 
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Request, StatusCode};
-use gaitwright::http::{Access, openapi};
-use gaitwright::store::studies::StudyState;
-use gaitwright::studies::archive::file::read_through;
+use gaitwright_http::{Access, openapi};
+use gaitwright_service::studies::archive::file::read_through;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::exported;
 use gaitwright_tests::service::Service;

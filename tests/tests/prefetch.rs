@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::results;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::studies::comparison::open_question;
-use gaitwright::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::results;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::http::openapi;
+use gaitwright_http::openapi;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::skipped::skipped;

@@ -6,14 +6,14 @@
 use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, ReferenceGait, SolveOptions, Subject, TunedBounds,
 };
-use gaitwright::access::Reach;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
-use gaitwright::studies::catalogue;
-use gaitwright::studies::plan::{self, NewStudy};
-use gaitwright::workers::nats::{Brought, Order, pack};
-use gaitwright::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
+use gaitwright_service::access::Reach;
+use gaitwright_service::studies::catalogue;
+use gaitwright_service::studies::plan::{self, NewStudy};
+use gaitwright_service::workers::nats::{Brought, Order, pack};
+use gaitwright_service::workers::{Assignment, Attempt, Evaluate, Finding, GaitSolver};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
@@ -275,7 +275,7 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
     let subject = subjects::by_pseudonym(&mut writer, "paper-1").await.unwrap().unwrap();
     let mut new = NewStudy { muscles: false, trial_budget: 2, ..NewStudy::of(subject.id) };
     change(&mut new);
-    let study = plan::create(&mut writer, &gaitwright::store::audit::Actor::program(), new).await.unwrap();
+    let study = plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), new).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     study.id
@@ -298,7 +298,7 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
     let child =
         cli::command(BINARY, folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let of_others = [of_people, coarser, shorter, tighter, bolder];
-    let pool = gaitwright::store::backup::open_read_only(&database).await.unwrap();
+    let pool = gaitwright_store::backup::open_read_only(&database).await.unwrap();
     let mut ours = None;
     until("a study of its own", async || {
         let mut reader = pool.acquire().await.unwrap();

@@ -4,9 +4,9 @@
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gaitwright::store::audit::{self, ChainCheck};
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::{Store, StoreError, backup};
+use gaitwright_store::audit::{self, ChainCheck};
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::{Store, StoreError, backup};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -205,7 +205,7 @@ async fn a_copy_made_while_the_service_runs_is_whole_and_goes_on() {
     let again = Service::start(&copy, Analytic::default(), 1).await;
     again.wait_for(study, &[StudyState::Finished]).await;
     let trials = again.trials(study).await;
-    let actions = |trials: &[gaitwright::store::trials::Trial]| -> Vec<_> {
+    let actions = |trials: &[gaitwright_store::trials::Trial]| -> Vec<_> {
         trials.iter().map(|t| (t.action_index, t.gait_rmse_rad.map(f64::to_bits))).collect()
     };
     assert_eq!(actions(&trials), actions(&whole), "the copy goes on to the same trials");

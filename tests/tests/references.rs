@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::studies::StudyState;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::measured::four_strides;
 use gaitwright_tests::service::Service;
@@ -44,7 +44,7 @@ async fn a_recording_becomes_the_reference_of_a_study() {
     assert_eq!(names[..2], ["near", "far"]);
     assert!(matches[0]["distance"].as_f64().unwrap() < 0.2 && matches[2]["distance"].is_null(), "{matches}");
 
-    let id: gaitwright::store::ReferenceGaitId = near["id"].as_str().unwrap().parse().unwrap();
+    let id: gaitwright_store::ReferenceGaitId = near["id"].as_str().unwrap().parse().unwrap();
     let study = service.study(|new| (new.reference_gait_id, new.trial_budget) = (Some(id), 1)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0).id;

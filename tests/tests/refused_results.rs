@@ -4,9 +4,9 @@
 
 use async_nats::jetstream::stream::{Config, RetentionPolicy};
 use gait_optimizer::{GaitProblem, SolveOptions, Subject};
-use gaitwright::store::TrialId;
-use gaitwright::workers::nats::{Brought, JetStream, Worker, pack};
-use gaitwright::workers::{Assignment, Attempt, Dispatch, Evaluate, Finding, News};
+use gaitwright_service::workers::nats::{Brought, JetStream, Worker, pack};
+use gaitwright_service::workers::{Assignment, Attempt, Dispatch, Evaluate, Finding, News};
+use gaitwright_store::TrialId;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
 use std::sync::Arc;
@@ -71,7 +71,7 @@ async fn worker_whose_results_are_refused_gives_up_and_takes_the_next_job() {
     let stop = CancellationToken::new();
     let running = tokio::spawn({
         let stop = stop.clone();
-        async move { worker.run(stop).await }
+        async move { Box::pin(worker.run(stop)).await }
     });
     let jobs = [job(1), job(2)];
     for job in &jobs {

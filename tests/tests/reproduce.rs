@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gait_optimizer::ReferenceGait;
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::{commit, reference_gaits};
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::{commit, reference_gaits};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;

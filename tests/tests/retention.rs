@@ -4,10 +4,10 @@
 
 use axum::body::Body;
 use axum::http::{Request, header};
-use gaitwright::store::audit;
-use gaitwright::store::seals::{self, SealCheck};
-use gaitwright::store::studies::StudyState;
-use gaitwright::studies::retention::{Dropped, drop_expired};
+use gaitwright_service::studies::retention::{Dropped, drop_expired};
+use gaitwright_store::audit;
+use gaitwright_store::seals::{self, SealCheck};
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 
@@ -70,7 +70,7 @@ async fn expired_keys_sessions_and_links_are_dropped_and_nothing_else() {
         .await
         .unwrap();
     }
-    gaitwright::store::commit(writer).await.unwrap();
+    gaitwright_store::commit(writer).await.unwrap();
 
     let before = counts(&service).await;
     let dropped = drop_expired(&service.store).await.unwrap();

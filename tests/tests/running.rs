@@ -4,9 +4,9 @@
 
 use axum::http::StatusCode;
 use futures_util::future::BoxFuture;
-use gaitwright::store::TrialId;
-use gaitwright::store::studies::StudyState;
-use gaitwright::workers::{Assignment, Dispatch, DispatchError, InProcess, News};
+use gaitwright_service::workers::{Assignment, Dispatch, DispatchError, InProcess, News};
+use gaitwright_store::TrialId;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::client;
 use gaitwright_tests::large;
@@ -168,7 +168,7 @@ async fn disk_that_is_really_full_loses_nothing_acknowledged_and_says_so() {
     }
     let database = service.store.path().to_owned();
     service.stop().await;
-    gaitwright::store::verify::file(&database, &[]).await.unwrap();
+    gaitwright_store::verify::file(&database, &[]).await.unwrap();
     println!("{} acknowledged before the disk was full, all there", acknowledged.len());
 }
 

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::presentations::{self, Judgement};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, TrialId, audit, lab_sessions};
+use gaitwright_store::presentations::{self, Judgement};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, TrialId, audit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::FORM;
 use gaitwright_tests::service::{Answer, Service};

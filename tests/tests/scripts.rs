@@ -5,9 +5,9 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use gait_learner::Partner;
-use gaitwright::store::StudyId;
-use gaitwright::store::feedback::FeedbackContent;
-use gaitwright::store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::StudyId;
+use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};

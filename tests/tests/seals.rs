@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::seals::{self, SealCheck};
-use gaitwright::store::{Store, StoreError, audit, backup, verify as store_verify};
+use gaitwright_store::seals::{self, SealCheck};
+use gaitwright_store::{Store, StoreError, audit, backup, verify as store_verify};
 use gaitwright_tests::every_table::filled;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection, Row};

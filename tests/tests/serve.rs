@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::access::Role;
-use gaitwright::access::people::{self, NewUser};
-use gaitwright::store::audit::Actor;
-use gaitwright::store::{Store, commit};
+use gaitwright_service::access::Role;
+use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{Store, commit};
 use gaitwright_tests::cli::run;
 use gaitwright_tests::client::{get, send};
 use gaitwright_tests::skipped::skipped;

@@ -5,19 +5,20 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use futures_util::StreamExt;
-use gaitwright::access::back_off::{self, Origin};
-use gaitwright::access::people::{self, NewUser};
-use gaitwright::access::sign_in::Limits;
-use gaitwright::access::tokens::{self as making, NewToken};
-use gaitwright::access::{Caller, Clock, Right, Role};
-use gaitwright::http::Access;
-use gaitwright::store::audit::{self, Actor, AuditRow};
-use gaitwright::store::{Instant, SessionId, Store, UserId, commit, now, seals, sign_in_failures};
+use gaitwright_http::Access;
+use gaitwright_service::access::back_off::{self, Origin};
+use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_service::access::sign_in::Limits;
+use gaitwright_service::access::tokens::{self as making, NewToken};
+use gaitwright_service::access::{Caller, Clock, Right, Role};
+use gaitwright_store::audit::{self, Actor, AuditRow};
+use gaitwright_store::{Instant, SessionId, Store, UserId, commit, now, seals, sign_in_failures};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{
     As, FORM, cookie_of, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
 };
 use gaitwright_tests::service::Service;
+use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
@@ -493,24 +494,13 @@ async fn event_streams_end_with_what_allowed_them() {
 
 #[test]
 fn event_streams_are_made_in_one_place_that_asks_who_listens() {
-    fn sources(folder: &Path, found: &mut Vec<(String, String)>) {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                sources(&path, found);
-            } else {
-                found.push((path.display().to_string(), std::fs::read_to_string(&path).unwrap()));
-            }
-        }
-    }
-    let mut found = Vec::new();
-    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/src"), &mut found);
+    let found = sources::of_server();
     let makes = |text: &str| ["Sse::new", "Body::from_stream", "StreamBody"].iter().any(|way| text.contains(way));
     let makers: Vec<&str> = found.iter().filter(|(_, text)| makes(text)).map(|(path, _)| path.as_str()).collect();
     // An archive is a file that ends.
-    let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| path.ends_with("http/api/archive.rs"));
+    let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| **path == "http/src/api/archive.rs");
     assert_eq!(files.len(), 1);
-    assert!(found.len() > 100 && makers.len() == 1 && makers[0].ends_with("http/event_stream.rs"), "{makers:?}");
+    assert!(found.len() > 100 && makers.len() == 1 && makers[0] == "http/src/event_stream.rs", "{makers:?}");
 }
 
 #[tokio::test]
@@ -549,7 +539,7 @@ async fn upgrade_from_the_baseline_keeps_sessions_and_seals() {
         id.unwrap().parse::<SessionId>().expect("every session has an identifier now");
     }
     drop(reader);
-    let tokens = gaitwright::store::tokens::all(&mut store.read().await.unwrap()).await.unwrap();
+    let tokens = gaitwright_store::tokens::all(&mut store.read().await.unwrap()).await.unwrap();
     assert!(!tokens.is_empty());
     let found = seals::verify(&mut store.read().await.unwrap()).await.unwrap();
     assert!(matches!(found, seals::SealCheck::Whole { .. }), "{found:?}");

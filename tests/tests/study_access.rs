@@ -4,12 +4,12 @@
 
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
-use gaitwright::access::{Right, Role};
-use gaitwright::http::openapi;
-use gaitwright::store::members::MemberKind;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::TrialState;
-use gaitwright::store::{StudyId, audit};
+use gaitwright_http::openapi;
+use gaitwright_service::access::{Right, Role};
+use gaitwright_store::members::MemberKind;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::callers::{As, FORM, member, send, service, signed_in, token};
 use gaitwright_tests::measured::motion;
 use gaitwright_tests::service::{Answer, Service};
@@ -43,7 +43,7 @@ impl Closed {
     async fn new() -> Self {
         let (folder, service) = service().await;
         let admin = signed_in(&service, Role::Admin).await;
-        let set_up = |new: &mut gaitwright::studies::plan::NewStudy| {
+        let set_up = |new: &mut gaitwright_service::studies::plan::NewStudy| {
             (new.name, new.feedback_mode, new.trial_budget) = (Some(NAME.to_owned()), FeedbackMode::Mixed, 30);
         };
         let study = service.study(set_up).await;
@@ -113,7 +113,7 @@ fn doors() -> Vec<(Method, String, String)> {
             all.push((method.to_uppercase().parse().unwrap(), path.clone(), start.to_owned()));
         }
     }
-    let pages = include_str!("../../server/src/http/pages/mod.rs");
+    let pages = include_str!("../../server/http/src/pages/mod.rs");
     for line in pages.lines().filter(|line| line.contains(".route(\"")) {
         let path = line.split('"').nth(1).unwrap();
         let start = path.split('/').nth(1).unwrap();
@@ -429,7 +429,7 @@ async fn study_that_is_made_restricted_is_never_open() {
 
 /// A finished study in which people may answer, and its first three gaits.
 async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
-    let mixed = |new: &mut gaitwright::studies::plan::NewStudy| {
+    let mixed = |new: &mut gaitwright_service::studies::plan::NewStudy| {
         (new.feedback_mode, new.trial_budget) = (FeedbackMode::Mixed, 30);
     };
     let study = service.study(mixed).await;

@@ -4,9 +4,9 @@
 
 use axum::http::StatusCode;
 use gait_learner::{ActionIndex, Feedback};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::{StudyId, backup, studies};
-use gaitwright::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::{StudyId, backup, studies};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;

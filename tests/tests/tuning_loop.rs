@@ -4,14 +4,14 @@
 
 use axum::http::StatusCode;
 use gait_learner::{Dimension, LearnerSettings, Partner, SearchSpace};
-use gaitwright::store::feedback::{FeedbackContent, Source};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::store::trials::{Trial, TrialState};
-use gaitwright::store::{StudyId, trials};
-use gaitwright::studies::comparison::open_question;
-use gaitwright::studies::plan::NewStudy;
-use gaitwright::studies::snapshot::StudySnapshot;
-use gaitwright::workers::{Attempt, InProcess};
+use gaitwright_service::studies::comparison::open_question;
+use gaitwright_service::studies::plan::NewStudy;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::workers::{Attempt, InProcess};
+use gaitwright_store::feedback::{FeedbackContent, Source};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{StudyId, trials};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::away::Away;
 use gaitwright_tests::service::Service;

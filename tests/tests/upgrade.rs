@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::store::{FORM, Store, backup, verify};
+use gaitwright_store::{FORM, Store, backup, verify};
 use gaitwright_tests::cli;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use sqlx::{AssertSqlSafe, Row};

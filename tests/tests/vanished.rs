@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright::store::{Store, StoreError, anchor, verify};
+use gaitwright_store::{Store, StoreError, anchor, verify};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
@@ -71,7 +71,7 @@ async fn writes_are_refused_when_the_log_or_the_file_was_cut() {
         sqlx::query(SUBJECT).execute(&mut **writer).await.unwrap();
         let file = std::fs::OpenOptions::new().write(true).open(beside(&database, ending)).unwrap();
         file.set_len(100).unwrap();
-        let refused = gaitwright::store::commit(writer).await;
+        let refused = gaitwright_store::commit(writer).await;
         assert!(matches!(refused, Err(StoreError::RecordVanished { .. })), "{ending}: {refused:?}");
         assert_eq!(add_subjects(&service, "after", 20).await, (0, 20), "{ending}");
         service.abandon().await;
@@ -97,7 +97,7 @@ async fn log_that_is_cut_within_a_commit_is_noticed_and_never_reaches_the_file()
             log.set_len(if lost == 9999 { 100 } else { length - lost }).unwrap();
             true
         });
-        let refused = gaitwright::store::commit(writer).await;
+        let refused = gaitwright_store::commit(writer).await;
         assert!(matches!(refused, Err(StoreError::RecordVanished { .. })), "{lost}: {refused:?}");
         assert_eq!(add_subjects(&service, "after", 5).await, (0, 5), "{lost}");
         service.abandon().await;
@@ -171,7 +171,7 @@ async fn an_earlier_state_of_the_record_is_refused_by_each_anchor_until_it_is_re
         let mut writer = store.write().await.unwrap();
         let sql = "insert into subjects (id, pseudonym, height_m, body_mass_kg, created_at) values (?, ?, 1.8, 70, '')";
         sqlx::query(sql).bind(name).bind(name).execute(&mut **writer).await.unwrap();
-        gaitwright::store::commit(writer).await.unwrap();
+        gaitwright_store::commit(writer).await.unwrap();
         store.close().await;
     };
     add("S1").await;
@@ -324,7 +324,7 @@ async fn a_backup_that_is_not_recorded_leaves_no_file_and_one_whose_request_ends
     }
     let names = copies();
     assert!(names.len() == 1 && !names[0].starts_with('.'), "{names:?}");
-    gaitwright::store::backup::check(&folder.path().join(&names[0])).await.unwrap();
+    gaitwright_store::backup::check(&folder.path().join(&names[0])).await.unwrap();
     let mut recorded = service.fetch("/api/v1/audit").await.text;
     for _ in 0..500 {
         if recorded.contains(&names[0]) {
@@ -350,16 +350,16 @@ async fn scheduled_copies_are_made_checked_and_the_oldest_removed() {
     std::fs::write(out.path().join(".a.db.scheduled-1.9999999-0.copying"), "of a killed process").unwrap();
     let mut made = Vec::new();
     for _ in 0..4 {
-        let (file, bytes) = gaitwright::store::backup::into_folder(&service.store, out.path(), 2).await.unwrap();
+        let (file, bytes) = gaitwright_store::backup::into_folder(&service.store, out.path(), 2).await.unwrap();
         assert!(bytes > 0);
-        gaitwright::store::backup::check(&file).await.unwrap();
+        gaitwright_store::backup::check(&file).await.unwrap();
         made.push(file.file_name().unwrap().to_str().unwrap().to_owned());
         tokio::time::sleep(std::time::Duration::from_millis(20)).await;
     }
     let mut expected = vec!["a.db.backup-by-hand".to_owned(), made[2].clone(), made[3].clone()];
     expected.sort();
     assert_eq!(cli::files(out.path()), expected);
-    let kept = gaitwright::store::backup::scheduled(&database, out.path()).unwrap();
+    let kept = gaitwright_store::backup::scheduled(&database, out.path()).unwrap();
     assert!(kept[0].0.ends_with(&made[3]), "{kept:?}");
     service.stop().await;
 }

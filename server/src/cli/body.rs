@@ -1,9 +1,9 @@
 //! Flags that say who walks and in which variant.
 
 use super::numbers::subject;
-use crate::error::Error;
 use clap::{Args, ValueEnum};
 use gait_optimizer::Subject;
+use gaitwright_service::error::Error;
 
 /// Who walks: one of the paper's subjects, or a height and a mass.
 #[derive(Debug, Clone, Args)]

@@ -2,10 +2,10 @@
 
 use super::gait_file::read_gait;
 use super::output::data;
-use crate::compute::Pool;
-use crate::error::Error;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
+use gaitwright_compute::Pool;
+use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

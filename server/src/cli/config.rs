@@ -3,11 +3,11 @@
 use super::numbers::workers;
 use super::output::data;
 use super::scheduled_backups::BackupPlan;
-use crate::access::sign_in::Limits as SessionLimits;
-use crate::error::Error;
-use crate::http::connections::Limits;
-use crate::http::{NETWORKS, Network, Proxies, ProxyHeaders};
 use clap::{Args, Subcommand};
+use gaitwright_http::connections::Limits;
+use gaitwright_http::{NETWORKS, Network, Proxies, ProxyHeaders};
+use gaitwright_service::access::sign_in::Limits as SessionLimits;
+use gaitwright_service::error::Error;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};

@@ -3,12 +3,12 @@
 use super::gait_file::read_gait;
 use super::out_file::OutFile;
 use super::output::data;
-use crate::error::Error;
-use crate::gait_table::gait_csv;
-use crate::plots::Figure;
 use clap::{Args, ValueEnum};
 use gait_optimizer::export::motion_file;
 use gait_optimizer::walking::stick_figure::stick_figures;
+use gaitwright_charts::Figure;
+use gaitwright_charts::gait_table::gait_csv;
+use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
 /// What a gait is converted to.

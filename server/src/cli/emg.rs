@@ -3,11 +3,11 @@
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem::read;
-use crate::csv_table::{Cell, CsvTable};
-use crate::error::Error;
-use crate::studies::lab::{EmgReading, FileForm};
 use clap::Args;
 use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
+use gaitwright_charts::csv_table::{Cell, CsvTable};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::lab::{EmgReading, FileForm};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

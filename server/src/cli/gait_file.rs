@@ -1,9 +1,9 @@
 //! Files that hold a gait: what `solve --out` wrote, or the gait alone, as the service gives it.
 
 use super::problem::read;
-use crate::document;
-use crate::error::Error;
 use gait_optimizer::{Gait, SolveOutcome};
+use gaitwright_service::document;
+use gaitwright_service::error::Error;
 use serde_json::Value;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Logs: to stderr. `RUST_LOG` or the setting `log` decides how much, `log_format` how.
 
 use super::output::tell;
-use crate::error::Error;
+use gaitwright_service::error::Error;
 use std::io::IsTerminal;
 use tracing_subscriber::EnvFilter;
 

@@ -25,10 +25,10 @@ mod unattended;
 mod users;
 mod worker;
 
-use crate::error::Error;
-use crate::http::openapi;
 use clap::{Parser, Subcommand};
 use config::{Flags, Settings, unknown_variables};
+use gaitwright_http::openapi;
+use gaitwright_service::error::Error;
 use output::{data, tell};
 use std::process::ExitCode;
 

@@ -1,6 +1,6 @@
 //! Numbers of the command line: what is refused is refused with its range.
 
-use crate::studies::plan::LARGEST_SEED;
+use gaitwright_service::studies::plan::LARGEST_SEED;
 use std::fmt::Display;
 use std::str::FromStr;
 

@@ -2,8 +2,8 @@
 //! error in its name. What is appended before the end is there even if the process is killed.
 
 use super::output::tell;
-use crate::error::Error;
-use crate::store::whole_file::sync_folder;
+use gaitwright_service::error::Error;
+use gaitwright_store::whole_file::sync_folder;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! What the commands print: data to stdout, words to stderr. A reader that goes away early (`| head`) is no fault.
 
-use crate::error::Error;
+use gaitwright_service::error::Error;
 use std::io::{ErrorKind, Write};
 
 /// A line of data on stdout.

@@ -5,15 +5,15 @@ use super::lineage::{Lineage, Start, basin_of_answer};
 use super::numbers::iterations;
 use super::output::tell;
 use super::serve::interrupted;
-use crate::document;
-use crate::error::Error;
-use crate::studies::device;
 use clap::Args;
 use gait_optimizer::nlp::NlpSettings;
 use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherBasin, ReferenceGait, SolveOptions, SolveOutcome,
     TunedBounds,
 };
+use gaitwright_service::document;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::device;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};

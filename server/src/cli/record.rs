@@ -1,11 +1,11 @@
 //! `gaitwright audit` and `gaitwright backup`, `gaitwright restore`: care of the record.
 
 use super::output::{data, tell};
-use crate::error::Error;
-use crate::store::access_log::{Access, Kind};
-use crate::store::audit::Actor;
-use crate::store::{access_spool, backup, restore, verify};
 use clap::{Args, Subcommand};
+use gaitwright_service::error::Error;
+use gaitwright_store::access_log::{Access, Kind};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{access_spool, backup, restore, verify};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

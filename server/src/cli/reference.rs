@@ -3,9 +3,9 @@
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem::read;
-use crate::error::Error;
-use crate::studies::recording::{Form, NewReferenceGait, Strikes, Unit};
 use clap::Args;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::recording::{Form, NewReferenceGait, Strikes, Unit};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

@@ -1,9 +1,9 @@
 //! Copies of the record that the service makes by itself.
 
-use crate::error::Error;
-use crate::store::audit::{self, Actor};
-use crate::store::{Store, backup, commit};
-use crate::supervise::Task;
+use gaitwright_service::error::Error;
+use gaitwright_service::supervise::Task;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::{Store, backup, commit};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};

@@ -7,9 +7,6 @@ use super::out_file::OutFile;
 use super::output::data;
 use super::problem::{ProblemFlags, cancelled_by_signal, read_document};
 use super::serve::cores_or;
-use crate::compute::Pool;
-use crate::error::Error;
-use crate::studies::solve_input::SolveInput;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
@@ -17,6 +14,9 @@ use gait_optimizer::{
     BasinChoice, ColdGuess, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
     TunedBounds, solve,
 };
+use gaitwright_compute::Pool;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::solve_input::SolveInput;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

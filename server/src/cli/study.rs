@@ -4,17 +4,17 @@ use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem::read;
 use super::record::{exists, note_export};
-use crate::compute::OnPool;
-use crate::error::Error;
-use crate::store::audit::{self, Actor};
-use crate::store::{Store, StudyId, commit, gaits, studies};
-use crate::studies::archive::{self, PublicKey, SigningKey};
-use crate::studies::belief::Beliefs;
-use crate::studies::choice::ranking_to_show;
-use crate::studies::recommended;
-use crate::studies::retention::{self, Dropped};
-use crate::studies::snapshot::StudySnapshot;
 use clap::Args;
+use gaitwright_compute::OnPool;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::archive::{self, PublicKey, SigningKey};
+use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::choice::ranking_to_show;
+use gaitwright_service::studies::recommended;
+use gaitwright_service::studies::retention::{self, Dropped};
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::{Store, StudyId, commit, gaits, studies};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -115,7 +115,7 @@ impl Prune {
 /// # Errors
 /// What the database or the learner reports.
 pub async fn prune(store: &mut Store, days: u32) -> Result<u64, Error> {
-    let before = crate::store::now().plus_seconds(-86_400 * i64::from(days));
+    let before = gaitwright_store::now().plus_seconds(-86_400 * i64::from(days));
     let mut dropped = 0;
     let ended = studies::ended_before(&mut *store.read().await?, before).await?;
     for study in ended {

@@ -7,13 +7,13 @@ use super::output::{data, tell};
 use super::problem::{ProblemFlags, cancelled_by_signal, read};
 use super::serve::cores_or;
 use super::solve::status_word;
-use crate::compute::Pool;
-use crate::csv_table::{Cell, CsvTable, cells};
-use crate::error::Error;
 use clap::Args;
 use gait_optimizer::{
     CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus, TunedBounds, WarmStart, solve,
 };
+use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
+use gaitwright_compute::Pool;
+use gaitwright_service::error::Error;
 use indicatif::ProgressBar;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -2,11 +2,11 @@
 
 use super::output::{data, tell};
 use super::record::exists;
-use crate::access::people;
-use crate::error::Error;
-use crate::store::audit::Actor;
-use crate::store::{Store, StoreError, commit, users};
 use clap::{Args, Subcommand};
+use gaitwright_service::access::people;
+use gaitwright_service::error::Error;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{Store, StoreError, commit, users};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

@@ -3,9 +3,9 @@
 use super::config::queue_name;
 use super::numbers::workers;
 use super::serve::{cores_or, interrupted};
-use crate::error::Error;
-use crate::workers::{GaitSolver, LEASE, nats};
 use clap::Args;
+use gaitwright_service::error::Error;
+use gaitwright_service::workers::{GaitSolver, LEASE, nats};
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 

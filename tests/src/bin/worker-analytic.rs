@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright::workers::nats::Worker;
+use gaitwright_service::workers::nats::Worker;
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 use std::time::Duration;

@@ -2,9 +2,9 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright::store::TrialId;
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::trials::TrialState;
+use gaitwright_store::TrialId;
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{Clearance, without_gaits};
 use std::time::Duration;

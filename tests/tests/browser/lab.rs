@@ -2,10 +2,10 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright::store::StudyId;
-use gaitwright::store::feedback::{FeedbackRow, Source};
-use gaitwright::store::studies::StudyState;
-use gaitwright::store::trials::TrialState;
+use gaitwright_store::StudyId;
+use gaitwright_store::feedback::{FeedbackRow, Source};
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use serde_json::json;
 

@@ -3,8 +3,8 @@
 use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
-use gaitwright::store::lab_sessions;
-use gaitwright::store::studies::StudyState;
+use gaitwright_store::lab_sessions;
+use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 
 /// What axe-core has against the page that is shown, where axe-core is here.

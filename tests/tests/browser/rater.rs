@@ -2,9 +2,9 @@
 
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
-use gaitwright::store::StudyId;
-use gaitwright::store::feedback::{FeedbackRow, Source};
-use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::StudyId;
+use gaitwright_store::feedback::{FeedbackRow, Source};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 
 /// A study that waits for a comparison.

@@ -2,14 +2,14 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright::access::people::{self, NewUser};
-use gaitwright::access::{Role, secret};
-use gaitwright::http::Access;
-use gaitwright::store::audit::Actor;
-use gaitwright::store::commit;
-use gaitwright::store::members::MemberKind;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
-use gaitwright::studies::membership::{self, NewMember};
+use gaitwright_http::Access;
+use gaitwright_service::access::people::{self, NewUser};
+use gaitwright_service::access::{Role, secret};
+use gaitwright_service::studies::membership::{self, NewMember};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::commit;
+use gaitwright_store::members::MemberKind;
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 

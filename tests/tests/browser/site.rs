@@ -1,6 +1,6 @@
 //! A service that a browser can reach.
 
-use gaitwright::workers::Explain;
+use gaitwright_service::workers::Explain;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use std::net::SocketAddr;

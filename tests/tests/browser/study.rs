@@ -2,7 +2,7 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright::store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
 use std::path::PathBuf;
@@ -65,7 +65,7 @@ async fn browser_leaves_alone_what_is_typed_when_something_is_recorded() {
     page.fill("#more", "67").await;
     page.run("window.field = document.querySelector('#more')").await;
     let mut gaits = site.service.trials(study).await;
-    gaits.retain(|trial| trial.state == gaitwright::store::trials::TrialState::Converged);
+    gaits.retain(|trial| trial.state == gaitwright_store::trials::TrialState::Converged);
     let remark =
         serde_json::json!({"first": gaits[0].id, "second": gaits[1].id, "answer": "unsafe_first", "author": "K1"});
     site.service.post(&format!("/api/v1/studies/{study}/remarks"), &remark).await;

@@ -1,9 +1,9 @@
 //! With muscles against without, per subject and seed; as tables and in words.
 
-use crate::csv_table::{Cell, CsvTable, cells};
-use crate::studies::history::Milestone;
-use crate::studies::recommended::CertificateState;
 use gait_optimizer::{Gait, ReferenceGait};
+use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
+use gaitwright_service::studies::history::Milestone;
+use gaitwright_service::studies::recommended::CertificateState;
 
 /// The five coordinates of Gait RMSE.
 pub(super) const COORDINATES: [&str; 5] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R"];
@@ -325,7 +325,7 @@ mod tests {
     fn a_recommendation_holds_until_the_next_one() {
         let milestone = |iteration, rmse| Milestone {
             iteration,
-            trial_id: crate::store::TrialId::fresh(),
+            trial_id: gaitwright_store::TrialId::fresh(),
             number: iteration,
             gait_rmse_rad: rmse,
             cost_of_transport: None,

@@ -2,12 +2,12 @@
 
 use super::comparison::{Outcome, Verdict, conclusion, verdicts};
 use super::statements::{Statement, statements};
-use crate::error::Error;
-use crate::gait_charts;
-use crate::plots::{Chart, Stroke, band_in_words, gait_tiles};
 use askama::Template;
 use gait_optimizer::Gait;
 use gait_optimizer::walking::stick_figure::stick_figures;
+use gaitwright_charts::gait_charts;
+use gaitwright_charts::{Chart, Stroke, band_in_words, gait_tiles};
+use gaitwright_service::error::Error;
 
 /// The style sheet of the pages: the charts' colours and dashes are its classes.
 const STYLE: &str = include_str!("../../../../web/static/gaitwright.css");

@@ -1,7 +1,7 @@
 //! What the paper says of its experiment, and what this comparison can say to it.
 
 use super::comparison::{Outcome, Verdict};
-use crate::studies::recommended::CertificateState;
+use gaitwright_service::studies::recommended::CertificateState;
 
 /// A statement of the paper.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,0 +1,279 @@
+//! A drawing that leaves the page: as SVG that needs nothing beside it, as PNG, as the numbers behind it.
+
+use super::chart::Chart;
+use super::gait_tiles;
+use super::heat_map::HeatMap;
+use super::standalone::{self, Inside};
+use super::tree::Tree;
+use crate::csv_table::{CsvTable, cells};
+use gait_optimizer::walking::stick_figure::StickFigure;
+use resvg::usvg::fontdb::Source;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Pixels of a PNG per unit of the drawing: 1280 across a chart.
+const SCALE: f32 = 2.0;
+/// No PNG has more pixels: of a large tree each unit gets fewer.
+const MOST_PIXELS: f32 = 1.2e7;
+
+/// A drawing with the name of its file.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Name of the file without its ending: small letters, digits and hyphens.
+    pub name: String,
+    /// What is drawn.
+    pub drawing: Drawing,
+}
+
+/// What can be drawn.
+#[derive(Debug, Clone)]
+pub enum Drawing {
+    /// Lines over an axis.
+    Chart(Chart),
+    /// A stride as a row of stick figures, under a title.
+    Tiles(String, Vec<StickFigure>),
+    /// A shaded table.
+    Map(HeatMap),
+    /// The warm-start tree.
+    Tree(Tree),
+}
+
+/// Why there is no PNG.
+#[derive(Debug, Error)]
+pub enum PngError {
+    /// The SVG cannot be read.
+    #[error("drawing a figure: {0}")]
+    Svg(#[from] resvg::usvg::Error),
+    /// There are no pixels to draw on, or they cannot be written.
+    #[error("drawing a figure: {0}")]
+    Pixels(String),
+}
+
+impl Figure {
+    /// A chart; `group` tells charts of the same title apart.
+    pub fn chart(group: &str, chart: Chart) -> Self {
+        Self { name: file_name(group, &chart.title), drawing: Drawing::Chart(chart) }
+    }
+
+    /// A shaded table; `group` tells maps of the same title apart.
+    pub fn map(group: &str, map: HeatMap) -> Self {
+        Self { name: file_name(group, &map.title), drawing: Drawing::Map(map) }
+    }
+
+    /// The warm-start tree.
+    pub fn tree(tree: Tree) -> Self {
+        Self { name: file_name("", &tree.title), drawing: Drawing::Tree(tree) }
+    }
+
+    /// The stride as a row of pictures.
+    pub fn tiles(title: &str, figures: Vec<StickFigure>) -> Self {
+        Self { name: file_name("", title), drawing: Drawing::Tiles(title.to_owned(), figures) }
+    }
+
+    /// What it shows.
+    pub fn title(&self) -> &str {
+        match &self.drawing {
+            Drawing::Chart(chart) => &chart.title,
+            Drawing::Tiles(title, _) => title,
+            Drawing::Map(map) => &map.title,
+            Drawing::Tree(tree) => &tree.title,
+        }
+    }
+
+    /// As SVG with its own style, on white.
+    pub fn svg(&self) -> String {
+        match &self.drawing {
+            Drawing::Chart(chart) => {
+                let inside = Inside { class: "chart", size: Chart::SIZE, body: chart.body() };
+                standalone::svg(self.title(), &inside, &chart.legend())
+            }
+            Drawing::Tiles(title, figures) => {
+                let inside = Inside { class: "tiles", size: gait_tiles::SIZE, body: gait_tiles::body(figures) };
+                standalone::svg(title, &inside, &[])
+            }
+            Drawing::Map(map) => {
+                let inside = Inside { class: "chart map", size: map.size(), body: map.body() };
+                standalone::svg(self.title(), &inside, &[])
+            }
+            Drawing::Tree(tree) => {
+                let inside = Inside { class: "tree", size: tree.size(), body: tree.body() };
+                standalone::svg(self.title(), &inside, &[])
+            }
+        }
+    }
+
+    /// As PNG. Text is set in DejaVu Sans, which the program carries: no font of the machine is used.
+    ///
+    /// # Errors
+    /// [`PngError`], for a fault of the program.
+    pub fn png(&self) -> Result<Vec<u8>, PngError> {
+        let mut options = resvg::usvg::Options { font_family: "DejaVu Sans".to_owned(), ..Default::default() };
+        options.fontdb_mut().load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
+        let tree = resvg::usvg::Tree::from_str(&self.svg(), &options)?;
+        let scale = SCALE.min((MOST_PIXELS / (tree.size().width() * tree.size().height())).sqrt());
+        let size = tree.size().to_int_size().scale_by(scale);
+        let size = size.ok_or_else(|| PngError::Pixels("it has no size".to_owned()))?;
+        let pixels = resvg::tiny_skia::Pixmap::new(size.width(), size.height());
+        let mut pixels = pixels.ok_or_else(|| PngError::Pixels("it is too large".to_owned()))?;
+        let transform = resvg::tiny_skia::Transform::from_scale(scale, scale);
+        resvg::render(&tree, transform, &mut pixels.as_mut());
+        pixels.encode_png().map_err(|e| PngError::Pixels(e.to_string()))
+    }
+
+    /// The numbers behind it: a row for each point of each line.
+    pub fn csv(&self) -> String {
+        let table = match &self.drawing {
+            Drawing::Chart(chart) => chart_csv(chart),
+            Drawing::Tiles(_, figures) => tiles_csv(figures),
+            Drawing::Map(map) => map_csv(map),
+            Drawing::Tree(tree) => tree_csv(tree),
+        };
+        table.into_text()
+    }
+}
+
+fn chart_csv(chart: &Chart) -> CsvTable {
+    let mut table = CsvTable::new(["line", &chart.x_label, &chart.y_label]);
+    for series in &chart.series {
+        for (x, y) in series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+            table.row(cells![&series.label, x, y]);
+        }
+    }
+    for band in &chart.bands {
+        for (x, low, high) in &band.points {
+            table.row(cells![&band.label, x, low]);
+            table.row(cells![&band.label, x, high]);
+        }
+    }
+    table
+}
+
+fn tiles_csv(figures: &[StickFigure]) -> CsvTable {
+    let mut table = CsvTable::new(["time_s", "point", "forward_m", "up_m"]);
+    for figure in figures {
+        let mut points = vec![("hip", figure.hip), ("shoulder", figure.shoulder)];
+        for (leg, names) in [
+            (&figure.left, ["left knee", "left ankle", "left heel", "left toe"]),
+            (&figure.right, ["right knee", "right ankle", "right heel", "right toe"]),
+        ] {
+            points.extend(names.into_iter().zip([leg.knee, leg.ankle, leg.heel, leg.toe]));
+        }
+        for (name, [x, z]) in points {
+            table.row(cells![figure.time_s, name, x, z]);
+        }
+    }
+    table
+}
+
+fn map_csv(map: &HeatMap) -> CsvTable {
+    let (columns, rows) = (&map.columns, &map.rows);
+    let mut table = CsvTable::new([rows.0.as_str(), &columns.0, &map.title, "beside it"]);
+    for (row, cells) in rows.1.iter().zip(&map.cells) {
+        for (column, value) in columns.1.iter().zip(cells) {
+            table.row(cells![row, column, value.value, &value.below]);
+        }
+    }
+    table
+}
+
+fn tree_csv(tree: &Tree) -> CsvTable {
+    let mut table = CsvTable::new(["what", "grew_out_of", "state"]);
+    for node in &tree.nodes {
+        let parent = node.parent.and_then(|parent| tree.nodes.get(parent)).map_or("", |parent| &parent.label);
+        table.row(cells![&node.label, parent, node.class]);
+    }
+    table
+}
+
+/// `angles`, `Right hip (prosthesis side)` as `angles-right-hip-prosthesis-side`.
+fn file_name(group: &str, title: &str) -> String {
+    let words = format!("{group} {title}");
+    let words = words.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Cell, Node, Stroke};
+
+    fn figure() -> Figure {
+        let chart = Chart::new("Knee, \"left\" <a>", "cycle, %", "angle, °")
+            .with_band("deviation", 7, vec![(0.0, 0.0, 2.0), (1.0, 1.0, 3.0)])
+            .with("this gait", 0, Stroke::Solid, vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]);
+        Figure::chart("angles", chart)
+    }
+
+    #[test]
+    fn a_figure_stands_alone() {
+        let svg = figure().svg();
+        assert!(svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("fill=\"#ffffff\""));
+        assert!(
+            !svg.contains("var(--") && svg.contains("this gait") && svg.contains("Knee, &quot;left&quot; &lt;a&gt;")
+        );
+        assert_eq!(figure().name, "angles-knee-left-a");
+        let tree = resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).unwrap();
+        assert!(tree.size().width() > 600.0);
+    }
+
+    #[test]
+    fn a_map_stands_alone_and_gives_its_numbers() {
+        let one = |value: f64| Cell { value, text: format!("{value:+.2}"), below: "± 0.10".to_owned(), framed: true };
+        let map = HeatMap {
+            title: "Utility".to_owned(),
+            columns: ("a5: clearance, m".to_owned(), vec![0.0, 0.013]),
+            rows: ("a6: lean, rad".to_owned(), vec![0.1]),
+            cells: vec![vec![one(0.25), one(-0.5)]],
+            range: (-0.5, 0.25),
+        };
+        let figure = Figure::map("a5-a6", map);
+        assert_eq!(figure.name, "a5-a6-utility");
+        let svg = figure.svg();
+        assert!(svg.contains(".chart.map .value") && svg.contains("fill-opacity") && !svg.contains("var(--"), "{svg}");
+        resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).unwrap();
+        let expected =
+            "\"a6: lean, rad\",\"a5: clearance, m\",Utility,beside it\n0.1,0,0.25,± 0.10\n0.1,0.013,-0.5,± 0.10\n";
+        assert_eq!(figure.csv(), expected);
+    }
+
+    #[test]
+    fn a_large_tree_stands_alone_says_what_its_marks_mean_and_is_no_larger_than_a_png_may_be() {
+        let node = |i: usize| Node {
+            parent: i.checked_sub(1),
+            label: format!("trial {}", i + 1),
+            link: "/trials/x".to_owned(),
+            class: if i == 3 { "best" } else { "not_converged" },
+        };
+        let forest = (0..400).map(|i| Node { parent: node(i).parent.map(|p| p / 2), ..node(i) }).collect();
+        let figure = Figure::tree(Tree { title: "Warm starts".to_owned(), nodes: forest });
+        let svg = figure.svg();
+        assert!(svg.contains(".tree circle") && !svg.contains("var(--") && !svg.contains("href"), "{}", &svg[..3000]);
+        assert!(svg.contains(">not converged</text>") && svg.contains(">best</text>"));
+        assert!(
+            figure.csv().starts_with("what,grew_out_of,state\ntrial 1,,not_converged\ntrial 2,trial 1,not_converged\n")
+        );
+        let pixels = resvg::tiny_skia::Pixmap::decode_png(&figure.png().unwrap()).unwrap();
+        assert!((pixels.width() * pixels.height()) as f32 <= MOST_PIXELS * 1.01);
+    }
+
+    #[test]
+    fn a_png_has_text_lines_and_a_white_ground() {
+        let png = figure().png().unwrap();
+        let pixels = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
+        let colour = |x, y| pixels.pixel(x, y).map(|p| (p.red(), p.green(), p.blue(), p.alpha()));
+        assert_eq!(colour(1, 1), Some((255, 255, 255, 255)));
+        // The title stands alone above the drawing: what is not white there is text.
+        let dark = (0..pixels.width()).any(|x| (4..40).any(|y| colour(x, y).is_some_and(|(r, ..)| r < 100)));
+        assert!(dark, "no title was drawn");
+        let blue = |p: &resvg::tiny_skia::PremultipliedColorU8| (p.red(), p.green(), p.blue()) == (0x0a, 0x6f, 0x8a);
+        assert!(pixels.pixels().iter().any(blue), "no line in its colour was drawn");
+        assert_eq!(png, figure().png().unwrap());
+    }
+
+    #[test]
+    fn the_numbers_are_those_that_are_drawn() {
+        let expected = "line,\"cycle, %\",\"angle, °\"\nthis gait,0,1\nthis gait,2,3\ndeviation,0,0\ndeviation,0,2\n\
+                        deviation,1,1\ndeviation,1,3\n";
+        assert_eq!(figure().csv(), expected);
+    }
+}

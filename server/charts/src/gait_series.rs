@@ -1,0 +1,65 @@
+//! A gait as one series of points over the stride, for tables and plots.
+
+use gait_optimizer::Gait;
+use gait_optimizer::gait::{Axis, FootPoint, Side};
+
+/// Ground force components: point, side, axis.
+pub const FORCE_NAMES: [&str; 8] = [
+    "heel_left_x",
+    "heel_left_z",
+    "toe_left_x",
+    "toe_left_z",
+    "heel_right_x",
+    "heel_right_z",
+    "toe_right_x",
+    "toe_right_z",
+];
+
+/// The ten muscles, in the order of the optimizer.
+pub const MUSCLES: [&str; 10] =
+    ["HAM_L", "GLU_L", "HFL_L", "GAS_L", "VAS_L", "SOL_L", "TA_L", "HAM_R", "GLU_R", "HFL_R"];
+
+/// One node.
+#[derive(Debug)]
+pub struct Point<'a> {
+    /// Time since right heel strike, s.
+    pub time_s: f64,
+    /// Name of the domain.
+    pub domain: &'a str,
+    /// Coordinates.
+    pub q: &'a [f64; 9],
+    /// Velocities.
+    pub qd: &'a [f64; 9],
+    /// Torques, N m.
+    pub u: &'a [f64; 6],
+    /// Ground forces in the order of [`FORCE_NAMES`], N.
+    pub forces: [f64; 8],
+    /// Activations.
+    pub activation: Option<&'a [f64; 10]>,
+    /// Fibre lengths over optimal lengths.
+    pub fibre_length: Option<&'a [f64; 10]>,
+}
+
+/// The nodes of all domains, in time. A domain's last point and the next one's first have the same time:
+/// between them velocities and forces may jump.
+pub fn points(gait: &Gait) -> Vec<Point<'_>> {
+    let mut points = Vec::new();
+    for domain in &gait.domains {
+        let rows = domain.q.iter().zip(&domain.qd).zip(&domain.u).zip(&domain.contact_forces);
+        for (i, (((q, qd), u), given)) in rows.enumerate() {
+            let mut forces = [0.0; 8];
+            for (name, value) in domain.contact_rows.iter().zip(given) {
+                let side = if name.side == Side::Left { 0 } else { 4 };
+                let point = if name.point == FootPoint::Heel { 0 } else { 2 };
+                let axis = usize::from(name.axis == Axis::Z);
+                forces[side + point + axis] = *value;
+            }
+            let muscles = domain.muscles.as_ref();
+            let activation = muscles.and_then(|muscles| muscles.activation.get(i));
+            let fibre_length = muscles.and_then(|muscles| muscles.fibre_length.get(i));
+            let time_s = domain.time_s.get(i).copied().unwrap_or_default();
+            points.push(Point { time_s, domain: &domain.name, q, qd, u, forces, activation, fibre_length });
+        }
+    }
+    points
+}

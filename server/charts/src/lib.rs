@@ -1,0 +1,30 @@
+//! Plots as SVG, drawn on the server: no script is needed to see them, and nothing comes from elsewhere.
+//!
+//! Colours, strokes and fonts are classes of the style sheet, so that one drawing serves light and dark. What leaves a
+//! page ([`Figure`]) takes its rules along.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod axis;
+mod chart;
+pub mod csv_table;
+mod figure;
+pub mod gait_charts;
+pub mod gait_series;
+pub mod gait_table;
+mod gait_tiles;
+mod heat_map;
+mod reference_band;
+mod sparkline;
+mod standalone;
+mod tree;
+
+pub use axis::power_of_ten;
+pub use chart::{Band, Chart, Series, Span, Stroke};
+pub use figure::{Drawing, Figure, PngError};
+pub use gait_tiles::gait_tiles;
+pub use heat_map::{Cell, HeatMap};
+pub use reference_band::{band_in_words, over_reference};
+pub use sparkline::sparkline;
+pub use tree::{Node, Tree};

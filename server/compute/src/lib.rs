@@ -1,0 +1,113 @@
+//! Long computing: off the threads that answer requests, a bounded number at a time, never inside a connection.
+//!
+//! Two types hold this. A function that computes for long takes an [`OnPool`], which only a thread of a [`Pool`] has.
+//! And `Store::compute` of the record borrows the store exclusively, while every connection borrows it shared: the
+//! compiler refuses to compute while a connection is held.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod priority;
+
+use priority::{COMPUTING, STACK_BYTES, stand_back};
+use std::sync::Arc;
+use thiserror::Error;
+use tokio::sync::{Semaphore, oneshot};
+
+/// Proof that the caller runs on a thread of a [`Pool`]: nothing else makes one.
+#[derive(Debug)]
+pub struct OnPool(());
+
+/// A long computation gave no answer.
+#[derive(Debug, Error)]
+pub enum ComputeError {
+    /// It panicked.
+    #[error("a computation panicked")]
+    Panicked,
+    /// There is no thread to be had.
+    #[error("no thread for a computation: {0}")]
+    NoThread(#[from] std::io::Error),
+    /// The service is shutting down.
+    #[error("a computation was not begun: the service is shutting down")]
+    Closed,
+}
+
+/// Runs at most so many long computations at a time; others wait without holding a thread.
+#[derive(Debug, Clone)]
+pub struct Pool {
+    places: Arc<Semaphore>,
+    stands_back: bool,
+}
+
+impl Default for Pool {
+    /// One computation for each core, and two at least; they give way to the threads that answer.
+    fn default() -> Self {
+        let size = std::thread::available_parallelism().map_or(2, |cores| cores.get().max(2));
+        Self { stands_back: true, ..Self::new(size) }
+    }
+}
+
+impl Pool {
+    /// A pool of so many threads; at least one.
+    pub fn new(size: usize) -> Self {
+        Self { places: Arc::new(Semaphore::new(size.max(1))), stands_back: false }
+    }
+
+    /// Computes when a thread is free. Work that began goes on when the caller goes away, and keeps its place until it ends.
+    ///
+    /// # Errors
+    /// [`ComputeError`] when the work panics or the process ends.
+    pub async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&OnPool) -> T + Send + 'static,
+    ) -> Result<T, ComputeError> {
+        let place = Arc::clone(&self.places).acquire_owned().await.map_err(|_| ComputeError::Closed)?;
+        let (tell, told) = oneshot::channel();
+        let stands_back = self.stands_back;
+        let work = move || {
+            let _place = place;
+            if stands_back {
+                stand_back(COMPUTING);
+            }
+            // Nobody listens any more where the caller went away.
+            let _ = tell.send(work(&OnPool(())));
+        };
+        std::thread::Builder::new().name("compute".to_owned()).stack_size(STACK_BYTES).spawn(work)?;
+        told.await.map_err(|_| ComputeError::Panicked)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn no_more_computations_run_at_a_time_than_the_pool_has_threads() {
+        let pool = Pool::new(2);
+        let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
+        let all = (0..8).map(|_| {
+            let (pool, running, most) = (pool.clone(), Arc::clone(&running), Arc::clone(&most));
+            tokio::spawn(async move {
+                let work = move |_: &OnPool| {
+                    most.fetch_max(running.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+                    std::thread::sleep(Duration::from_millis(20));
+                    running.fetch_sub(1, Ordering::SeqCst);
+                };
+                pool.run(work).await.unwrap();
+            })
+        });
+        for one in all.collect::<Vec<_>>() {
+            one.await.unwrap();
+        }
+        assert_eq!(most.load(Ordering::SeqCst), 2);
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_an_error_and_gives_its_thread_back() {
+        let pool = Pool::new(1);
+        assert!(matches!(pool.run(|_| panic!("as asked")).await, Err::<(), _>(ComputeError::Panicked)));
+        assert_eq!(pool.run(|_| 1).await.unwrap(), 1);
+    }
+}

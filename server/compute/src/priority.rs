@@ -1,0 +1,42 @@
+//! Threads that give way to others.
+
+use std::io;
+use tokio::sync::oneshot;
+
+/// Of threads that compute what somebody waits for: they give way to those that answer.
+pub const COMPUTING: i32 = 5;
+/// Of threads that solve: they give way to whoever waits for an answer.
+pub const SOLVER: i32 = 10;
+/// Of threads that look into what was solved: they give way to every solve, too.
+pub const AFTERWARDS: i32 = 19;
+/// Stack of threads that solve: block factorisations recurse deeper than the default leaves room for.
+pub const STACK_BYTES: usize = 16 << 20;
+
+/// Lowers the priority of this thread alone; where that is not possible it stays as it is.
+pub fn stand_back(niceness: i32) {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::setpriority_process(None, niceness) {
+        tracing::debug!(%error, niceness, "a thread keeps its priority");
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = niceness;
+}
+
+/// Does some work on a thread of its own that gives way to every solve. A panic is not reported; nobody waits for the
+/// thread when the receiver is dropped.
+///
+/// # Errors
+/// When there is no thread to be had.
+pub fn behind_solves<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<oneshot::Receiver<T>> {
+    let (tell, told) = oneshot::channel();
+    let work = move || {
+        stand_back(AFTERWARDS);
+        // Nobody listens any more when the process is shutting down.
+        let _ = tell.send(work());
+    };
+    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES).spawn(work)?;
+    Ok(told)
+}

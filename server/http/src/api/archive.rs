@@ -1,0 +1,117 @@
+//! A whole study as one file, and where a study came from.
+
+use crate::AppState;
+use crate::may::May;
+use crate::problem::Refusal;
+use crate::reached::Id;
+use crate::shown::Shown;
+use axum::Json;
+use axum::body::{Body, Bytes};
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use futures_util::{StreamExt, stream};
+use gaitwright_service::access::{Administer, Read};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::archive;
+use gaitwright_store::imports::{self, Import};
+use gaitwright_store::{StudyId, audit, commit, consents, studies};
+use serde_json::json;
+use std::io::Write;
+use tokio::sync::mpsc::{self, Sender};
+use tokio_stream::wrappers::ReceiverStream;
+
+/// Bytes that are sent together.
+const CHUNK_BYTES: usize = 1 << 16;
+
+/// `GET /studies/{id}/archive`: every row, blind sessions included, as `gaitwright export` writes it.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/archive",
+    operation_id = "get_study_archive",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "An archive for `gaitwright import`, not signed", body = Vec<u8>, content_type = "application/octet-stream")),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn of_study(
+    may: May<Administer>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Administer>,
+) -> Result<Response, Refusal> {
+    // Who takes a study away is on record before the first byte leaves.
+    let mut writer = app.write().await?;
+    let study = studies::get(&mut writer, id).await?;
+    consents::may_be_shown(&mut writer, id).await?;
+    let detail = json!({ "name": study.plan.name });
+    audit::append(&mut writer, &may.caller.actor, "study.export", &format!("study {id}"), &detail).await?;
+    commit(writer).await?;
+
+    let (sender, mut chunks) = mpsc::channel(4);
+    let database = app.store().path().to_owned();
+    let out = Chunks { sender, buffer: Vec::with_capacity(CHUNK_BYTES) };
+    let export = tokio::spawn(async move { archive::export(&database, id, out, None).await.map(drop) });
+    let Some(first) = chunks.recv().await else {
+        export.await.map_err(|e| Error::Internal(e.to_string()))??;
+        return Err(Error::Internal("the archive is empty".to_owned()).into());
+    };
+    // An archive that cannot be written to its end breaks off, so that nobody takes it for whole.
+    let failure = stream::once(export).filter_map(async |done| match done {
+        Ok(Ok(())) => None,
+        Ok(Err(error)) => Some(Err(std::io::Error::other(error.to_string()))),
+        Err(error) => Some(Err(std::io::Error::other(error))),
+    });
+    let whole = stream::iter([Ok(first)]).chain(ReceiverStream::new(chunks).map(Ok)).chain(failure);
+    let headers = [
+        (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
+        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"study-{}.gait\"", id.short())),
+    ];
+    Ok((headers, Body::from_stream(whole)).into_response())
+}
+
+/// Sends what is written, in pieces; what was not flushed is dropped.
+struct Chunks {
+    sender: Sender<Bytes>,
+    buffer: Vec<u8>,
+}
+
+impl Chunks {
+    fn send(&mut self) -> std::io::Result<()> {
+        let chunk = std::mem::replace(&mut self.buffer, Vec::with_capacity(CHUNK_BYTES));
+        self.sender.blocking_send(chunk.into()).map_err(|_| std::io::ErrorKind::BrokenPipe.into())
+    }
+}
+
+impl Write for Chunks {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.buffer.extend_from_slice(bytes);
+        if self.buffer.len() >= CHUNK_BYTES {
+            self.send()?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        if self.buffer.is_empty() { Ok(()) } else { self.send() }
+    }
+}
+
+/// `GET /studies/{id}/imports`: where a study came from that was not made here.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/imports",
+    operation_id = "list_study_imports",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "One import for each record that it came through, the last one into this record; empty: the study was made here", body = Vec<Import>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn imports_of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+) -> Result<Json<Vec<Import>>, Refusal> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    Ok(Json(imports::of_study(&mut reader, id).await?))
+}

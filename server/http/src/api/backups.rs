@@ -1,0 +1,100 @@
+//! Copies of the record, made by the service that owns it.
+
+use crate::AppState;
+use crate::once::Once;
+use crate::problem::Refusal;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gaitwright_service::access::Administer;
+use gaitwright_service::error::Error;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{Writer, audit, backup, commit};
+use serde::Serialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A copy of the record.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Copy {
+    /// Its name; it lies beside the record.
+    pub(crate) file: String,
+    /// Its size.
+    bytes: u64,
+}
+
+impl Copy {
+    /// Copies the record to a new file beside it, and checks the copy.
+    async fn make(app: &AppState) -> Result<Self, Refusal> {
+        let (file, bytes) = backup::beside_record(app.store()).await?;
+        Ok(Self { file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(), bytes })
+    }
+
+    /// Writes down that it was made.
+    async fn record(&self, writer: &mut Writer, actor: &Actor) -> Result<(), Refusal> {
+        let detail = json!({ "bytes": self.bytes });
+        audit::append(writer, actor, "record.backup", &format!("file {}", self.file), &detail).await?;
+        Ok(())
+    }
+
+    /// Makes one for somebody at a page.
+    pub(crate) async fn for_page(app: AppState, actor: Actor) -> Result<Self, Refusal> {
+        to_its_end(async move {
+            let copy = Self::make(&app).await?;
+            let recorded = async {
+                let mut writer = app.write().await?;
+                copy.record(&mut writer, &actor).await?;
+                Ok(commit(writer).await?)
+            };
+            let recorded = recorded.await;
+            copy.unless_refused(&app, recorded).map(|()| copy)
+        })
+        .await
+    }
+
+    /// A copy that the audit trail does not know is none.
+    fn unless_refused<T>(&self, app: &AppState, recorded: Result<T, Refusal>) -> Result<T, Refusal> {
+        if recorded.is_err()
+            && let Err(error) = std::fs::remove_file(app.store().path().with_file_name(&self.file))
+        {
+            tracing::warn!(file = self.file, %error, "a copy that was not recorded is left over");
+        }
+        recorded
+    }
+}
+
+/// Goes on when whoever asked goes away or the answer takes too long.
+async fn to_its_end<T: Send + 'static>(
+    work: impl Future<Output = Result<T, Refusal>> + Send + 'static,
+) -> Result<T, Refusal> {
+    tokio::spawn(work).await.map_err(|error| Error::Internal(error.to_string()))?
+}
+
+/// `POST`: copies the record to a new file beside it, and checks the copy.
+#[utoipa::path(
+    post,
+    path = "/backups",
+    operation_id = "create_backup",
+    tag = "operation",
+    responses((status = 201, description = "Copied and checked", body = Copy)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn create(State(app): State<AppState>, once: Once<Administer>) -> Result<Response, Refusal> {
+    to_its_end(async move {
+        if let Some(before) = once.answered_before(&app).await? {
+            return Ok(before);
+        }
+        let copy = Copy::make(&app).await?;
+        let recorded = async {
+            let mut writer = match once.begin(&app).await? {
+                Ok(writer) => writer,
+                Err(before) => return Ok(before),
+            };
+            copy.record(&mut writer, &once.actor).await?;
+            once.finish(&app, writer, StatusCode::CREATED, None, &copy).await
+        };
+        let recorded = recorded.await;
+        copy.unless_refused(&app, recorded)
+    })
+    .await
+}

@@ -1,0 +1,112 @@
+//! Several studies side by side.
+
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use crate::problem::Refusal;
+use crate::reached::Named;
+use axum::Json;
+use axum::extract::State;
+use gait_optimizer::TunedBounds;
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::Read;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::choice::ranking_to_show;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::{self, StudyState};
+use gaitwright_store::trials::{self, TrialCounts};
+use gaitwright_store::{StudyId, consents, schema};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use utoipa::ToSchema;
+
+/// Most studies that are compared at once.
+const MOST: usize = 20;
+
+/// Which studies.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Which {
+    ids: String,
+}
+
+/// A study beside others.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Compared {
+    id: StudyId,
+    name: String,
+    muscles: bool,
+    seed: u64,
+    state: StudyState,
+    trials: TrialCounts,
+    /// Number of the recommended trial.
+    best_trial: Option<u32>,
+    /// Its action.
+    #[schema(value_type = Option<schema::Bounds>)]
+    best_action: Option<TunedBounds>,
+    /// Its Gait RMSE, rad.
+    best_gait_rmse_rad: Option<f64>,
+    /// Its cost of transport.
+    best_cost_of_transport: Option<f64>,
+    /// Time of all solves together, s.
+    solve_seconds: f64,
+}
+
+/// `GET /compare`: several studies side by side, in the order in which they are named.
+#[utoipa::path(
+    get,
+    path = "/compare",
+    operation_id = "compare_studies",
+    tag = "studies",
+    params(("ids" = String, Query, description = "2 to 20 identifiers of studies, with commas between them")),
+    responses((status = 200, description = "One row per study", body = Vec<Compared>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    may: May<Read>,
+    State(mut app): State<AppState>,
+    Params(which): Params<Which>,
+) -> Result<Json<Vec<Compared>>, Refusal> {
+    let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
+    if !(2..=MOST).contains(&named.len()) {
+        return Err(
+            Error::invalid("ids", which.ids, &format!("2 to {MOST} identifiers, with commas between them")).into()
+        );
+    }
+    let mut rows = Vec::with_capacity(named.len());
+    for id in named {
+        let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "identifiers of studies"))?;
+        let id = id.reached(&mut *app.read().await?, may.caller.reach()).await?;
+        rows.push(row(&mut app, id).await?);
+    }
+    Ok(Json(rows))
+}
+
+async fn row(app: &mut AppState, id: StudyId) -> Result<Compared, Refusal> {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    consents::may_be_shown(&mut reader, id).await?;
+    let counts = trials::counts(&mut reader, id).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
+    drop(reader);
+    let beliefs = Arc::clone(&app.beliefs);
+    let rank = move |pool: &OnPool| {
+        let best = ranking_to_show(pool, &snapshot, &beliefs);
+        (snapshot, best)
+    };
+    let (snapshot, best) = app.compute(rank).await?;
+    let best = best.map_err(Error::Learner)?.first().and_then(|id| snapshot.trial(*id));
+    Ok(Compared {
+        id,
+        name: snapshot.study.plan.name.clone(),
+        muscles: snapshot.study.plan.muscles,
+        seed: snapshot.study.plan.seed,
+        state: snapshot.study.state,
+        trials: counts,
+        best_trial: best.map(|trial| trial.number),
+        best_action: best.map(|trial| trial.action),
+        best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
+        best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        solve_seconds: snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum(),
+    })
+}

@@ -1,0 +1,79 @@
+//! The best action by iteration.
+
+use crate::AppState;
+use crate::may::May;
+use crate::negotiate::{csv_answer, wants_csv};
+use crate::problem::Refusal;
+use crate::shown::Shown;
+use axum::Json;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::{IntoResponse, Response};
+use gaitwright_charts::csv_table::{CsvTable, cells};
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::Read;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::choice::ranking_to_show;
+use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::{StudyId, studies};
+use std::sync::Arc;
+
+/// `GET /studies/{id}/history`.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/history",
+    operation_id = "get_study_history",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "By iteration; CSV where `Accept` asks for it", content((Vec<Milestone> = "application/json"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+    headers: HeaderMap,
+) -> Result<Response, Refusal> {
+    let history = read(&mut app, id).await?;
+    if wants_csv(&headers) { Ok(table(id, &history)) } else { Ok(Json(history).into_response()) }
+}
+
+/// `GET /studies/{id}/history.csv`.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/history.csv",
+    operation_id = "get_study_history_csv",
+    tag = "studies",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "By iteration", body = String, content_type = "text/csv")),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study_csv(
+    _: May<Read>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+) -> Result<Response, Refusal> {
+    Ok(table(id, &read(&mut app, id).await?))
+}
+
+async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Refusal> {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study).await?;
+    drop(reader);
+    let beliefs = Arc::clone(&app.beliefs);
+    let compute = move |pool: &OnPool| {
+        let best = ranking_to_show(pool, &snapshot, &beliefs)?.first().copied();
+        Ok(history::of(&snapshot, best))
+    };
+    app.compute(compute).await?.map_err(Error::Learner).map_err(Refusal)
+}
+
+fn table(study: StudyId, history: &[Milestone]) -> Response {
+    let mut table = CsvTable::new(["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"]);
+    for m in history {
+        table.row(cells![m.iteration, m.number, m.gait_rmse_rad, m.cost_of_transport]);
+    }
+    csv_answer(&format!("history-{}.csv", study.short()), table)
+}

@@ -1,0 +1,299 @@
+//! Lab sessions: planned here, walked in the lab, closed, unblinded.
+
+use super::exports;
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use crate::once::{Once, OnceWith};
+use crate::problem::Refusal;
+use crate::reached::Id;
+use crate::shown::Shown;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::{Administer, Device, Rate, Read, Run};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::lab::{self, GaitOfWalk, InTheLab, NewAnswer, NewSession, RecordedWalk, SessionView};
+use gaitwright_store::{LabSessionId, StudyId, commit, lab_sessions, studies};
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+/// `GET /studies/{id}/lab-sessions`: in their order.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/lab-sessions",
+    operation_id = "list_lab_sessions",
+    tag = "lab",
+    params(("id" = StudyId, Path, description = "The study")),
+    responses((status = 200, description = "Every session, without what is blinded", body = Vec<SessionView>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+) -> Result<Json<Vec<SessionView>>, Refusal> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    Ok(Json(lab_sessions::of_study(&mut reader, id).await?.iter().map(SessionView::from).collect()))
+}
+
+/// `POST /studies/{id}/lab-sessions`: plans one: a walk without the device, then one with each gait, in an order that is
+/// drawn now and kept.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/lab-sessions",
+    operation_id = "plan_lab_session",
+    tag = "lab",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = NewSession,
+    responses((status = 201, description = "Planned", body = SessionView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    OnceWith(once, new): OnceWith<Run, NewSession>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = lab::plan(&mut writer, &once.actor, id, &new).await?;
+    let location = format!("/api/v1/lab-sessions/{}", session.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &SessionView::from(&session)).await
+}
+
+/// `GET /lab-sessions/{id}`.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}",
+    operation_id = "get_lab_session",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "The session, without what is blinded", body = SessionView)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<LabSessionId, Read>,
+) -> Result<Json<SessionView>, Refusal> {
+    Ok(Json(SessionView::from(&lab_sessions::get(&mut *app.read().await?, id).await?)))
+}
+
+/// Which walk.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfWalk {
+    walk: u8,
+    #[serde(default = "exports::two_hundred")]
+    rate_hz: f64,
+}
+
+/// `GET /lab-sessions/{id}/controller.json`: what the device's controller needs for a walk.
+///
+/// It names no trial, but whoever holds it against the controller files of the two gaits learns the order. So it is for the
+/// device: a token with the scope `device` and no other. Of everybody else who fetches it, that is recorded, in the session and
+/// in the audit trail, and their later answers are not blind.
+#[utoipa::path(
+    get,
+    path = "/lab-sessions/{id}/controller.json",
+    operation_id = "get_walk_controller_file",
+    tag = "lab",
+    params(
+        ("id" = LabSessionId, Path, description = "The session"),
+        ("walk" = u8, Query, description = "2 or 3: walk 1 is without the device"),
+        ("rate_hz" = Option<f64>, Query, description = "Samples per second: 10 to 5000; by default 200")
+    ),
+    responses((status = 200, description = "Controller file", body = Object)),
+    security(("token" = ["device"]), ("session" = ["device"])),
+)]
+pub(super) async fn controller(
+    may: May<Device>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<LabSessionId, Device>,
+    Params(of): Params<OfWalk>,
+) -> Result<Response, Refusal> {
+    let mut reader = app.read().await?;
+    let session = lab_sessions::get(&mut reader, id).await?;
+    // Both files are made, whichever is given out: a refusal of one of them, or the time it takes, would tell the order.
+    let (one, two) = lab::gaits_to_walk_with(&mut reader, &session, of.walk).await?;
+    let of_one = one.trajectory(&mut reader).await?;
+    let of_two = two.trajectory(&mut reader).await?;
+    drop(reader);
+    let write = move |pool: &OnPool| {
+        let one = one.blinded_controller_file(&of_one.unpack(pool)?, of.rate_hz)?;
+        let two = two.blinded_controller_file(&of_two.unpack(pool)?, of.rate_hz)?;
+        Ok::<_, Error>((one, two))
+    };
+    let (one, two) = app.compute(write).await??;
+    let mut writer = app.write().await?;
+    let gait = lab::for_device(&mut writer, &may.caller, id, of.walk).await?;
+    commit(writer).await?;
+    let text = match gait {
+        GaitOfWalk::One => one,
+        GaitOfWalk::Two => two,
+    };
+    Ok(exports::file("application/json", &format!("controller-walk-{}.json", of.walk), text))
+}
+
+/// A note at the end.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Closing {
+    /// At most 2000 characters; may be left out.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    note: String,
+}
+
+/// `POST /lab-sessions/{id}/close`: nothing is recorded any more.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/close",
+    operation_id = "close_lab_session",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = Closing,
+    responses((status = 200, description = "Closed", body = SessionView)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn close(
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Run>,
+    OnceWith(once, closing): OnceWith<Run, Closing>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = lab::close(&mut writer, &once.actor, id, &closing.note).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
+}
+
+/// Why the session is unblinded.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Told {
+    /// 1 to 2000 characters.
+    #[schema(min_length = 1, max_length = 2000)]
+    reason: String,
+}
+
+/// `POST /lab-sessions/{id}/unblind`: shows which walk is with which gait, from now on to everybody who may read. It is in
+/// the audit trail, what is walked from now on is marked, and what the person who walked said becomes a preference of the
+/// study.
+#[utoipa::path(
+    post,
+    path = "/lab-sessions/{id}/unblind",
+    operation_id = "unblind_lab_session",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = Told,
+    responses((status = 200, description = "The session with the conditions of its walks", body = SessionView)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn unblind(
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Administer>,
+    OnceWith(once, told): OnceWith<Administer, Told>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = lab::unblind(&mut writer, &once.actor, id, &told.reason).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &SessionView::from(&session)).await
+}
+
+/// `GET /lab/{id}`: the session as the person who walks and the rater see it.
+#[utoipa::path(
+    get,
+    path = "/lab/{id}",
+    operation_id = "get_next_walk",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "Which walk is next, and nothing that could tell a gait", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn in_the_lab(
+    _: May<Rate>,
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+) -> Result<Json<InTheLab>, Refusal> {
+    Ok(Json(lab::in_the_lab(&mut *app.read().await?, id).await?))
+}
+
+/// `POST /lab/{id}/walks`: the next walk was recorded.
+#[utoipa::path(
+    post,
+    path = "/lab/{id}/walks",
+    operation_id = "record_walk",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = RecordedWalk,
+    responses((status = 201, description = "Recorded; which walk is next", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn walk(
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+    OnceWith(once, walked): OnceWith<Rate, RecordedWalk>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let next = lab::record_walk(&mut writer, &once.actor, id, &walked).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &next).await
+}
+
+/// `POST /lab/{id}/answers`: which walk the subject found better. The record keeps the number of the walk; the answer
+/// reaches the learner at unblinding.
+#[utoipa::path(
+    post,
+    path = "/lab/{id}/answers",
+    operation_id = "answer_lab_session",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    request_body = NewAnswer,
+    responses((status = 201, description = "Recorded, and read back", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn answer(
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+    OnceWith(once, new): OnceWith<Rate, NewAnswer>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let seen = lab::answer(&mut writer, &once.caller, id, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &seen).await
+}
+
+/// `POST /lab/{id}/take-back`: the answer that stands counts no more.
+#[utoipa::path(
+    post,
+    path = "/lab/{id}/take-back",
+    operation_id = "take_back_lab_answer",
+    tag = "lab",
+    params(("id" = LabSessionId, Path, description = "The session")),
+    responses((status = 200, description = "Taken back; the question is open again", body = InTheLab)),
+    security(("token" = ["rate"]), ("session" = ["rate"])),
+)]
+pub(super) async fn take_back(
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+    once: Once<Rate>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let seen = lab::take_back(&mut writer, &once.caller, id).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &seen).await
+}

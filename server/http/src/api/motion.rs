@@ -1,0 +1,72 @@
+//! The motion of a gait: what an animation draws.
+
+use crate::AppState;
+use crate::may::May;
+use crate::problem::Refusal;
+use crate::shown::Shown;
+use axum::Json;
+use axum::extract::State;
+use gait_optimizer::Gait;
+use gait_optimizer::walking::stick_figure::{StickFigure, stick_figures};
+use gaitwright_charts::gait_series::points;
+use gaitwright_service::access::Read;
+use gaitwright_service::error::Error;
+use gaitwright_store::{TrialId, gaits};
+use serde::Serialize;
+
+/// A gait in motion, over one stride from right heel strike.
+#[derive(Debug, Serialize)]
+pub(crate) struct Motion {
+    /// Stride time, s.
+    stride_time_s: f64,
+    /// How far one stride goes, m.
+    stride_length_m: f64,
+    /// Mesh points in time; between two of them positions change evenly.
+    frames: Vec<Frame>,
+}
+
+#[derive(Debug, Serialize)]
+struct Frame {
+    #[serde(flatten)]
+    figure: StickFigure,
+    /// Name of the domain.
+    domain: String,
+    /// Ground forces on left heel, left toe, right heel, right toe: forward and up, N.
+    forces_n: [[f64; 2]; 4],
+    /// Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R; absent without
+    /// muscles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    activations: Option<[f64; 10]>,
+}
+
+/// `GET /trials/{id}/motion`.
+#[utoipa::path(
+    get,
+    path = "/trials/{id}/motion",
+    operation_id = "get_gait_motion",
+    tag = "trials",
+    params(("id" = TrialId, Path, description = "The trial")),
+    responses((status = 200, description = "Stick figures over one stride", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<TrialId, Read>,
+) -> Result<Json<Motion>, Refusal> {
+    let gait = gaits::get(&mut *app.read().await?, id).await?;
+    Ok(Json(app.compute(move |pool| motion(&gait.unpack(pool)?)).await??))
+}
+
+pub(crate) fn motion(gait: &Gait) -> Result<Motion, Error> {
+    let frames = stick_figures(gait)?
+        .into_iter()
+        .zip(points(gait))
+        .map(|(figure, point)| {
+            let f = point.forces;
+            let forces_n = [[f[0], f[1]], [f[2], f[3]], [f[4], f[5]], [f[6], f[7]]];
+            Frame { figure, domain: point.domain.to_owned(), forces_n, activations: point.activation.copied() }
+        })
+        .collect();
+    Ok(Motion { stride_time_s: gait.stride_time_s, stride_length_m: gait.stride_length_m, frames })
+}

@@ -1,0 +1,177 @@
+//! Preferences: answers to comparisons.
+
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use crate::negotiate::{csv_answer, wants_csv};
+use crate::once::OnceWith;
+use crate::pages_of::{After, linked_after};
+use crate::problem::Refusal;
+use crate::reached::Id;
+use crate::shown::Shown;
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::Response;
+use gaitwright_charts::csv_table::{CsvTable, cells};
+use gaitwright_service::access::{self, Read};
+use gaitwright_service::studies::answer::{self, Answer};
+use gaitwright_store::feedback::{self, FeedbackContent, FeedbackRow};
+use gaitwright_store::{FeedbackId, StudyId, studies};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// `GET /studies/{id}/preferences`: as given, retracted ones included, by pages; the `Link` header has the address of
+/// the next one.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/preferences",
+    operation_id = "list_preferences",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study"), ("after" = Option<i64>, Query, description = "After this `seq`"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
+    responses((status = 200, description = "A page, by time; all of them as CSV where `Accept` asks for it. In a preference `trial_a` of the table is the winner", content((Vec<FeedbackRow> = "application/json"), (String = "text/csv")))),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_study(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+    Params(page): Params<After<i64>>,
+    headers: HeaderMap,
+) -> Result<Response, Refusal> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    if wants_csv(&headers) {
+        return Ok(table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?));
+    }
+    let limit = page.limit(1000)?;
+    let rows = feedback::comparisons(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
+    Ok(linked_after(&format!("/api/v1/studies/{id}/preferences"), rows, limit, |row| row.seq.to_string()))
+}
+
+fn table(study: StudyId, rows: &[FeedbackRow]) -> Response {
+    let mut table = CsvTable::new([
+        "seq",
+        "id",
+        "kind",
+        "trial_a",
+        "trial_b",
+        "source",
+        "author",
+        "note",
+        "created_at",
+        "retracted_at",
+        "retraction_reason",
+    ]);
+    for row in rows {
+        let (kind, a, b) = match row.said {
+            FeedbackContent::Preference { winner, loser } => ("preference", winner, loser),
+            FeedbackContent::Tie { a, b } => ("tie", a, b),
+            FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => continue,
+        };
+        let retraction = row.retraction.as_ref();
+        table.row(cells![
+            row.seq,
+            row.id.to_string(),
+            kind,
+            a.to_string(),
+            b.to_string(),
+            row.source.as_str(),
+            &row.author,
+            &row.note,
+            row.created_at.to_string(),
+            retraction.map(|r| r.created_at.to_string()),
+            retraction.map(|r| &r.reason),
+        ]);
+    }
+    csv_answer(&format!("preferences-{}.csv", study.short()), table)
+}
+
+/// `GET /preferences/{id}`.
+#[utoipa::path(
+    get,
+    path = "/preferences/{id}",
+    operation_id = "get_preference",
+    tag = "preferences",
+    params(("id" = FeedbackId, Path, description = "The answer")),
+    responses((status = 200, description = "The answer", body = FeedbackRow)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Shown(id, _): Shown<FeedbackId, Read>,
+) -> Result<Json<FeedbackRow>, Refusal> {
+    Ok(Json(feedback::get(&mut *app.read().await?, id).await?))
+}
+
+/// An answer as recorded.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Recorded {
+    #[serde(flatten)]
+    row: FeedbackRow,
+    /// Answers of others to the same comparison, the newest twenty at most: all of them count.
+    other_answers: Vec<FeedbackId>,
+}
+
+/// `POST /studies/{id}/preferences`.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/preferences",
+    operation_id = "create_preference",
+    tag = "preferences",
+    params(("id" = StudyId, Path, description = "The study")),
+    request_body = Answer,
+    responses((status = 201, description = "Recorded", body = Recorded)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, access::Answer>,
+    OnceWith(once, answer): OnceWith<access::Answer, Answer>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let given = answer::give(&mut writer, &once.caller, id, &answer).await?;
+    let row = feedback::get(&mut writer, given).await?;
+    let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
+    let location = format!("/api/v1/preferences/{given}");
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &Recorded { row, other_answers }).await
+}
+
+/// Why an answer or a remark is taken back.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Retract {
+    #[schema(min_length = 1, max_length = 2000)]
+    pub(super) reason: String,
+    /// By default the name of the caller.
+    #[serde(default)]
+    pub(super) author: Option<String>,
+}
+
+/// `POST /preferences/{id}/retract`.
+#[utoipa::path(
+    post,
+    path = "/preferences/{id}/retract",
+    operation_id = "retract_preference",
+    tag = "preferences",
+    params(("id" = FeedbackId, Path, description = "The answer")),
+    request_body = Retract,
+    responses((status = 200, description = "Taken back: the row stays, the learner does not hear it any more", body = FeedbackRow)),
+    security(("token" = ["answer"]), ("session" = ["answer"])),
+)]
+pub(super) async fn retract(
+    State(app): State<AppState>,
+    Id(id, _): Id<FeedbackId, access::Answer>,
+    OnceWith(once, why): OnceWith<access::Answer, Retract>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = answer::retract(&mut writer, &once.caller, None, id, why.author.as_deref(), &why.reason).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &row).await
+}

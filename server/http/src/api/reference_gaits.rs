@@ -1,0 +1,94 @@
+//! Reference gaits: the built-in one, and those made of recordings.
+
+use crate::AppState;
+use crate::may::May;
+use crate::once::OnceWith;
+use crate::problem::Refusal;
+use crate::reached::Id;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gaitwright_service::access::{Read, Run};
+use gaitwright_service::studies::recording::{self, Match, NewReferenceGait};
+use gaitwright_store::reference_gaits::{self, ReferenceGait};
+use gaitwright_store::{ReferenceGaitId, SubjectId, subjects};
+
+/// `GET`: all of them.
+#[utoipa::path(
+    get,
+    path = "/reference-gaits",
+    operation_id = "list_reference_gaits",
+    tag = "reference-gaits",
+    responses((status = 200, description = "All of them", body = Vec<ReferenceGait>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Result<Json<Vec<ReferenceGait>>, Refusal> {
+    Ok(Json(reference_gaits::all(&mut *app.read().await?).await?))
+}
+
+/// `POST`: makes one of a recording: cuts it at right heel strikes, averages its strides. The very same recording
+/// gives the reference gait that is there already.
+#[utoipa::path(
+    post,
+    path = "/reference-gaits",
+    operation_id = "create_reference_gait",
+    tag = "reference-gaits",
+    request_body = NewReferenceGait,
+    responses((status = 201, description = "Imported; its provenance says what was done", body = ReferenceGait)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(mut app): State<AppState>,
+    OnceWith(once, new): OnceWith<Run, NewReferenceGait>,
+) -> Result<Response, Refusal> {
+    if let Some(before) = once.answered_before(&app).await? {
+        return Ok(before);
+    }
+    let definition = new.definition_aside(app.store_mut()).await?;
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let added = recording::add(&mut writer, &once.actor, &definition).await?;
+    let location = format!("/api/v1/reference-gaits/{}", added.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &added).await
+}
+
+/// `GET {id}`.
+#[utoipa::path(
+    get,
+    path = "/reference-gaits/{id}",
+    operation_id = "get_reference_gait",
+    tag = "reference-gaits",
+    params(("id" = ReferenceGaitId, Path, description = "The reference gait")),
+    responses((status = 200, description = "The reference gait", body = ReferenceGait)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<ReferenceGaitId, Read>,
+) -> Result<Json<ReferenceGait>, Refusal> {
+    Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?))
+}
+
+/// `GET /subjects/{id}/reference-gaits`: all of them, the nearest to the subject in height and body mass first.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/reference-gaits",
+    operation_id = "list_nearest_reference_gaits",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "The nearest first; those that do not say whose they are come last", body = Vec<Match>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn of_subject(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Result<Json<Vec<Match>>, Refusal> {
+    let mut reader = app.read().await?;
+    let subject = subjects::get(&mut reader, id).await?;
+    Ok(Json(recording::matches(&mut reader, &subject.body()).await?))
+}

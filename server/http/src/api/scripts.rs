@@ -1,0 +1,79 @@
+//! Ask and tell: for scripts of the lab that evaluate trials themselves.
+
+use crate::AppState;
+use crate::once::OnceWith;
+use crate::problem::Refusal;
+use crate::reached::Id;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gaitwright_service::access::Run;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::script::{self, Ask, Tell};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{StudyId, TrialId};
+use std::sync::Arc;
+
+/// So often a decision is made anew when the study moved on meanwhile.
+const TRIES: usize = 20;
+
+/// `POST /studies/{id}/ask`: a trial to evaluate. Asking again before telling gives the same one.
+#[utoipa::path(
+    post,
+    path = "/studies/{id}/ask",
+    operation_id = "ask_for_trial",
+    tag = "scripts",
+    params(("id" = StudyId, Path, description = "The study: one with `evaluation` = `script`")),
+    request_body(content = Ask, description = "May be left out"),
+    responses((status = 200, description = "The trial to evaluate", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn ask(
+    State(mut app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    OnceWith(once, ask): OnceWith<Run, Ask>,
+) -> Result<Response, Refusal> {
+    let worker = ask.worker.as_deref().unwrap_or(&once.caller.name).trim();
+    for _ in 0..TRIES {
+        let beliefs = Arc::clone(&app.beliefs);
+        let suggestion = script::suggest(app.store_mut(), id, worker, &beliefs).await;
+        let mut writer = match once.begin(&app).await? {
+            Ok(writer) => writer,
+            Err(before) => return Ok(before),
+        };
+        if let Some(trial) = script::give_out(&mut writer, &once.caller, worker, &suggestion?).await? {
+            return once.finish(&app, writer, StatusCode::OK, None, &trial).await;
+        }
+    }
+    Err(Error::conflict("the study changes too fast; try again").into())
+}
+
+/// `POST /trials/{id}/tell`: what a trial gave. That there is no gait is a result, too; a failure of the script is
+/// none: cancel the trial then.
+#[utoipa::path(
+    post,
+    path = "/trials/{id}/tell",
+    operation_id = "tell_outcome",
+    tag = "scripts",
+    params(("id" = TrialId, Path, description = "The trial")),
+    request_body = Tell,
+    responses((status = 200, description = "Recorded", body = Trial)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn tell(
+    State(mut app): State<AppState>,
+    Id(id, _): Id<TrialId, Run>,
+    OnceWith(once, tell): OnceWith<Run, Tell>,
+) -> Result<Response, Refusal> {
+    for _ in 0..TRIES {
+        let heard = script::hear(app.store_mut(), id, &tell).await;
+        let mut writer = match once.begin(&app).await? {
+            Ok(writer) => writer,
+            Err(before) => return Ok(before),
+        };
+        if let Some(trial) = script::record(&mut writer, &once.caller, id, &heard?).await? {
+            return once.finish(&app, writer, StatusCode::OK, None, &trial).await;
+        }
+    }
+    Err(Error::conflict("the study changes too fast; try again").into())
+}

@@ -1,0 +1,63 @@
+//! Sessions of people who signed in: one's own, and all for administrators.
+
+use crate::AppState;
+use crate::may::May;
+use crate::once::Once;
+use crate::problem::Refusal;
+use crate::reached::Id;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gaitwright_service::access::{Anything, Right, sign_in};
+use gaitwright_service::error::Error;
+use gaitwright_store::SessionId;
+use gaitwright_store::sessions::{self, Session};
+
+/// `GET /sessions`: the newest first.
+#[utoipa::path(
+    get,
+    path = "/sessions",
+    operation_id = "list_sessions",
+    tag = "access",
+    responses((status = 200, description = "Sessions that have not ended: the caller's own; an administrator gets everybody's", body = Vec<Session>)),
+    security(("token" = []), ("session" = [])),
+)]
+pub(super) async fn list(may: May<Anything>, State(app): State<AppState>) -> Result<Json<Vec<Session>>, Refusal> {
+    let mut reader = app.read().await?;
+    let now = app.access.clock.now(&mut reader).await?;
+    let of = match may.caller.user {
+        _ if may.caller.may(Right::Administer) => None,
+        // A program has no session.
+        None => return Ok(Json(Vec::new())),
+        own => own,
+    };
+    Ok(Json(sign_in::live(&mut reader, of, app.access.limits, now).await?))
+}
+
+/// `POST /sessions/{id}/end`: one's own; an administrator ends any.
+#[utoipa::path(
+    post,
+    path = "/sessions/{id}/end",
+    operation_id = "end_session",
+    tag = "access",
+    params(("id" = SessionId, Path, description = "The session")),
+    responses((status = 200, description = "It has ended", body = Session)),
+    security(("token" = []), ("session" = [])),
+)]
+pub(super) async fn end(
+    State(app): State<AppState>,
+    Id(id, _): Id<SessionId, Anything>,
+    once: Once<Anything>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let session = sessions::get(&mut writer, id)
+        .await?
+        .filter(|session| once.caller.may(Right::Administer) || once.caller.user == Some(session.user_id));
+    let session = session.ok_or_else(|| Error::NotFound { what: "session".to_owned(), id: id.to_string() })?;
+    sign_in::end(&mut writer, &once.actor, &session).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &session).await
+}

@@ -1,0 +1,243 @@
+//! Subjects.
+
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use crate::once::OnceWith;
+use crate::pages_of::{Before, linked};
+use crate::problem::Refusal;
+use crate::reached::Id;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gait_optimizer::muscle::MuscleParameters;
+use gaitwright_service::access::{Read, Run};
+use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
+use gaitwright_service::studies::person::{self, NewCorrection, NewSubject};
+use gaitwright_store::SubjectId;
+use gaitwright_store::consents::{self, Consent};
+use gaitwright_store::subjects::{self, Correction, Subject};
+
+/// `GET`: newest first, by pages; the `Link` header has the address of the next one.
+#[utoipa::path(
+    get,
+    path = "/subjects",
+    operation_id = "list_subjects",
+    tag = "subjects",
+    params(("before" = Option<SubjectId>, Query, description = "Older than this one"), ("limit" = Option<u32>, Query, description = "At most so many: 1 to 1000")),
+    responses((status = 200, description = "A page", body = Vec<Subject>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn list(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Params(page): Params<Before<SubjectId>>,
+) -> Result<Response, Refusal> {
+    let limit = page.limit(1000)?;
+    let found = subjects::page(&mut *app.read().await?, page.before, limit + 1).await?;
+    Ok(linked("/api/v1/subjects", found, limit, |subject| subject.id.to_string()))
+}
+
+/// `GET {id}`.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}",
+    operation_id = "get_subject",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "The subject", body = Subject)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn get(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Result<Json<Subject>, Refusal> {
+    Ok(Json(subjects::get(&mut *app.read().await?, id).await?))
+}
+
+/// `POST`: adds one.
+#[utoipa::path(
+    post,
+    path = "/subjects",
+    operation_id = "create_subject",
+    tag = "subjects",
+    request_body = NewSubject,
+    responses((status = 201, description = "Added", body = Subject)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    OnceWith(once, new): OnceWith<Run, NewSubject>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let subject = person::add(&mut writer, &once.actor, &new).await?;
+    let location = format!("/api/v1/subjects/{}", subject.id);
+    once.finish(&app, writer, StatusCode::CREATED, Some(location), &subject).await
+}
+
+/// `GET {id}/consents`: what the subject signed and withdrew, oldest first; the last one counts.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/consents",
+    operation_id = "list_consents",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "Oldest first", body = Vec<Consent>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn consents(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Result<Json<Vec<Consent>>, Refusal> {
+    let mut reader = app.read().await?;
+    subjects::get(&mut reader, id).await?;
+    Ok(Json(consents::of_subject(&mut reader, id).await?))
+}
+
+/// `POST {id}/consents`: what the subject signed.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/consents",
+    operation_id = "record_consent",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body = NewConsent,
+    responses((status = 201, description = "Written down", body = Consent)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn consent(
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    OnceWith(once, new): OnceWith<Run, NewConsent>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = consent::give(&mut writer, &once.actor, id, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+}
+
+/// `POST {id}/withdraw`: the subject does not take part any more. Every study of the subject stops; the record is
+/// kept, but nothing is added to it and nothing is given out.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/withdraw",
+    operation_id = "withdraw_consent",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body = Withdrawal,
+    responses((status = 200, description = "Written down, and done", body = Consent)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn withdraw(
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    OnceWith(once, why): OnceWith<Run, Withdrawal>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let (row, cancelled) = consent::withdraw(&mut writer, &once.actor, id, &why).await?;
+    let answer = once.finish(&app, writer, StatusCode::OK, None, &row).await?;
+    for trial in cancelled {
+        app.scheduler.cancel_solve(trial).await;
+    }
+    Ok(answer)
+}
+
+/// `GET {id}/corrections`: corrections of height and mass, oldest first; the last one counts.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/corrections",
+    operation_id = "list_subject_corrections",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "Oldest first", body = Vec<Correction>)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn corrections(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Result<Json<Vec<Correction>>, Refusal> {
+    let mut reader = app.read().await?;
+    subjects::get(&mut reader, id).await?;
+    Ok(Json(subjects::corrections(&mut reader, id).await?))
+}
+
+/// `POST {id}/corrections`: the right height and mass. Studies made from now on solve with them; those that are there keep
+/// the numbers that they were made with.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/corrections",
+    operation_id = "correct_subject",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body = NewCorrection,
+    responses((status = 201, description = "Corrected", body = Correction)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn correct(
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    OnceWith(once, new): OnceWith<Run, NewCorrection>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let row = person::correct(&mut writer, &once.actor, id, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &row).await
+}
+
+/// `GET {id}/muscles`: how the subject's muscles differ from the published table.
+#[utoipa::path(
+    get,
+    path = "/subjects/{id}/muscles",
+    operation_id = "get_subject_muscles",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    responses((status = 200, description = "As in `gait_settings.muscles` of a study", body = Object)),
+    security(("token" = ["read"]), ("session" = ["read"])),
+)]
+pub(super) async fn muscles(
+    _: May<Read>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Read>,
+) -> Result<Json<MuscleParameters>, Refusal> {
+    let mut reader = app.read().await?;
+    subjects::get(&mut reader, id).await?;
+    Ok(Json(subjects::muscles(&mut reader, id).await?))
+}
+
+/// `POST {id}/muscles`: writes it down; studies made from now on take it up.
+#[utoipa::path(
+    post,
+    path = "/subjects/{id}/muscles",
+    operation_id = "set_subject_muscles",
+    tag = "subjects",
+    params(("id" = SubjectId, Path, description = "The subject")),
+    request_body(content = Object, description = "As in `gait_settings.muscles` of a study; empty: the published table"),
+    responses((status = 201, description = "Written down", body = Object)),
+    security(("token" = ["run"]), ("session" = ["run"])),
+)]
+pub(super) async fn set_muscles(
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    OnceWith(once, muscles): OnceWith<Run, MuscleParameters>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    person::set_muscles(&mut writer, &once.actor, id, &muscles).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &muscles).await
+}

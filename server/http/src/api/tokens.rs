@@ -1,0 +1,83 @@
+//! Tokens of scripts.
+
+use crate::AppState;
+use crate::may::May;
+use crate::once::{Once, OnceWith};
+use crate::problem::Refusal;
+use crate::reached::Id;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::Response;
+use gaitwright_service::access::Administer;
+use gaitwright_service::access::tokens::{self as making, NewToken};
+use gaitwright_store::TokenId;
+use gaitwright_store::tokens::{self, Token};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// A token that was just made.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct MadeToken {
+    /// The token.
+    #[serde(flatten)]
+    token: Token,
+    /// Its secret, shown once: send it as `Authorization: Bearer ...`.
+    secret: String,
+}
+
+/// `GET /tokens`: oldest first.
+#[utoipa::path(
+    get,
+    path = "/tokens",
+    operation_id = "list_tokens",
+    tag = "access",
+    responses((status = 200, description = "All of them, without their secrets", body = Vec<Token>)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn list(_: May<Administer>, State(app): State<AppState>) -> Result<Json<Vec<Token>>, Refusal> {
+    Ok(Json(tokens::all(&mut *app.read().await?).await?))
+}
+
+/// `POST /tokens`. Never repeated: an Idempotency-Key is refused, because the secret is not stored.
+#[utoipa::path(
+    post,
+    path = "/tokens",
+    operation_id = "create_token",
+    tag = "access",
+    request_body = NewToken,
+    responses((status = 201, description = "Made; the secret is shown once", body = MadeToken)),
+    extensions(("x-shown-once" = json!(true))),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn create(
+    State(app): State<AppState>,
+    OnceWith(once, new): OnceWith<Administer, NewToken>,
+) -> Result<Response, Refusal> {
+    let mut writer = once.begin_secret(&app).await?;
+    let (token, secret) = making::make(&mut writer, &once.actor, &new).await?;
+    once.finish(&app, writer, StatusCode::CREATED, None, &MadeToken { token, secret }).await
+}
+
+/// `POST /tokens/{id}/revoke`.
+#[utoipa::path(
+    post,
+    path = "/tokens/{id}/revoke",
+    operation_id = "revoke_token",
+    tag = "access",
+    params(("id" = TokenId, Path, description = "The token")),
+    responses((status = 200, description = "Ended", body = Token)),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn revoke(
+    State(app): State<AppState>,
+    Id(id, _): Id<TokenId, Administer>,
+    once: Once<Administer>,
+) -> Result<Response, Refusal> {
+    let mut writer = match once.begin(&app).await? {
+        Ok(writer) => writer,
+        Err(before) => return Ok(before),
+    };
+    let token = making::revoke(&mut writer, &once.actor, id).await?;
+    once.finish(&app, writer, StatusCode::OK, None, &token).await
+}

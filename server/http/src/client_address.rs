@@ -1,0 +1,128 @@
+//! The address of the client. One function says it; sign-in limits, sessions and logs all ask here.
+
+use super::{AppState, forwarded};
+use crate::problem::Refusal;
+use axum::extract::{ConnectInfo, FromRequestParts, Request, State};
+use axum::http::request::Parts;
+use axum::http::{Extensions, HeaderValue, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use std::convert::Infallible;
+use std::fmt;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+/// A browser that was here through TLS comes through TLS for a year.
+const ONLY_SECURELY: HeaderValue = HeaderValue::from_static("max-age=31536000");
+
+/// The address that a request comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ClientAddress(IpAddr);
+
+impl ClientAddress {
+    /// An address; an IPv4 address that is written as IPv6 is the same client.
+    pub fn new(address: IpAddr) -> Self {
+        Self(address.to_canonical())
+    }
+
+    /// The address itself.
+    pub fn ip(self) -> IpAddr {
+        self.0
+    }
+
+    /// The network that one client controls: an IPv4 address, or the /64 of an IPv6 address, in which a client takes a
+    /// new address whenever it wants.
+    pub fn network(self) -> String {
+        match self.0 {
+            IpAddr::V4(address) => address.to_string(),
+            IpAddr::V6(address) => {
+                let [a, b, c, d, ..] = address.segments();
+                format!("{}/64", Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0))
+            }
+        }
+    }
+}
+
+impl fmt::Display for ClientAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// Whether the browser reaches the service through TLS, its own or that of a trusted proxy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Secure(pub(crate) bool);
+
+impl Secure {
+    /// The scheme of addresses that the browser can follow.
+    pub(crate) fn scheme(self) -> &'static str {
+        if self.0 { "https" } else { "http" }
+    }
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Secure {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        Ok(parts.extensions.get::<Self>().copied().unwrap_or_default())
+    }
+}
+
+/// The peer of the connection. A request without a connection (a test) comes from 0.0.0.0.
+fn client_address(extensions: &Extensions) -> ClientAddress {
+    let peer = extensions.get::<ConnectInfo<SocketAddr>>().map(|ConnectInfo(peer)| peer.ip());
+    ClientAddress::new(peer.unwrap_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED)))
+}
+
+/// Puts the [`ClientAddress`] and [`Secure`] into the request, and the host that the browser asked for into its Host
+/// header: from the connection, or where that is of a trusted proxy, as the proxy says. Everything behind this, the checks
+/// of host and origin too, sees the request as the client sent it. What goes to a browser through TLS stays there.
+pub(super) async fn note(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Refusal> {
+    let peer = client_address(request.extensions());
+    let believed = app.proxies.believe(peer.ip(), request.headers())?;
+    let secure = Secure(believed.secure.unwrap_or(app.access.secure));
+    forwarded::remove(request.headers_mut());
+    // With two Host headers, the request is refused as it is.
+    if let Some(host) = believed.host
+        && request.headers().get_all(header::HOST).iter().count() < 2
+    {
+        request.headers_mut().insert(header::HOST, host);
+    }
+    request.extensions_mut().insert(ClientAddress::new(believed.client));
+    request.extensions_mut().insert(secure);
+    let mut answer = next.run(request).await;
+    if secure.0 {
+        answer.headers_mut().insert(header::STRICT_TRANSPORT_SECURITY, ONLY_SECURELY);
+        for (name, cookie) in answer.headers_mut().iter_mut() {
+            if name == header::SET_COOKIE
+                && let Ok(text) = cookie.to_str()
+                && !text.split(';').any(|part| part.trim().eq_ignore_ascii_case("secure"))
+                && let Ok(kept) = HeaderValue::from_str(&format!("{text}; Secure"))
+            {
+                *cookie = kept;
+            }
+        }
+    }
+    Ok(answer)
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for ClientAddress {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        Ok(parts.extensions.get::<Self>().copied().unwrap_or_else(|| client_address(&parts.extensions)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_of_one_ipv6_network_are_one_client() {
+        let network = |text: &str| ClientAddress::new(text.parse().unwrap()).network();
+        assert_eq!(network("2001:db8:1:2:3:4:5:6"), "2001:db8:1:2::/64");
+        assert_eq!(network("2001:db8:1:2:ffff::1"), network("2001:db8:1:2:3:4:5:6"));
+        assert_ne!(network("2001:db8:1:3::1"), network("2001:db8:1:2::1"));
+        assert_eq!(network("::ffff:10.0.0.7"), "10.0.0.7");
+    }
+}

@@ -1,0 +1,63 @@
+//! Extractors whose refusals are problem documents.
+
+use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
+use crate::problem::Refusal;
+use axum::extract::{FromRequest, FromRequestParts, Query, Request};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode, header};
+use gaitwright_service::document;
+use gaitwright_service::error::Error;
+use serde::de::DeserializeOwned;
+
+/// Reads a JSON body, naming the field that cannot be read.
+pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
+    // No body is an empty document: what may be left out, may all be left out.
+    let absent = bytes.is_empty();
+    let bytes = if absent { b"{}" } else { bytes };
+    let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("");
+    if !absent && !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
+        return Err(Error::UnsupportedMediaType(format!("content type {kind:?}: this needs application/json")));
+    }
+    document::read(bytes)
+}
+
+/// A body that could not be taken in.
+pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
+    if status == StatusCode::PAYLOAD_TOO_LARGE {
+        Error::TooLarge(format!(
+            "the body is larger than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} where a recording is uploaded)"
+        ))
+    } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
+        Error::UnsupportedMediaType(reason.to_owned())
+    } else {
+        Error::Malformed(format!("the body cannot be read: {reason}"))
+    }
+}
+
+/// The query string.
+#[derive(Debug)]
+pub(crate) struct Params<T>(pub(crate) T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
+    type Rejection = Refusal;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Refusal> {
+        let Query(value) =
+            Query::<T>::from_request_parts(parts, state).await.map_err(|e| Error::Malformed(e.body_text()))?;
+        Ok(Self(value))
+    }
+}
+
+/// A submitted form.
+#[derive(Debug)]
+pub(crate) struct Form<T>(pub(crate) T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Form<T> {
+    type Rejection = super::pages::error::PageError;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Self::Rejection> {
+        let axum::Form(value) =
+            axum::Form::<T>::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
+        Ok(Self(value))
+    }
+}

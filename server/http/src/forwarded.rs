@@ -1,0 +1,293 @@
+//! What a reverse proxy says of the request that it forwards: who sent it, by which scheme, to which host.
+//!
+//! It is believed from the networks that the administrator names, and in the one kind of header that the administrator
+//! names: a proxy replaces the header that it knows and passes the other kind on as the client wrote it.
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use gaitwright_service::error::Error;
+use std::net::{IpAddr, SocketAddr};
+use std::str::FromStr;
+use std::sync::Arc;
+
+const FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
+const PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
+const HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
+
+/// An address, or all addresses that begin with the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Network {
+    address: IpAddr,
+    bits: u8,
+}
+
+impl Network {
+    fn holds(self, other: IpAddr) -> bool {
+        match (self.address, other.to_canonical()) {
+            (IpAddr::V4(own), IpAddr::V4(other)) => {
+                let kept = u32::MAX.checked_shl(32 - u32::from(self.bits)).unwrap_or(0);
+                own.to_bits() & kept == other.to_bits() & kept
+            }
+            (IpAddr::V6(own), IpAddr::V6(other)) => {
+                let kept = u128::MAX.checked_shl(128 - u32::from(self.bits)).unwrap_or(0);
+                own.to_bits() & kept == other.to_bits() & kept
+            }
+            _ => false,
+        }
+    }
+}
+
+/// What is accepted as a [`Network`].
+pub const NETWORKS: &str = "addresses and networks such as 127.0.0.1, 10.1.0.0/16, fd00::/8; commas between";
+
+impl FromStr for Network {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (address, bits) = text.split_once('/').map_or((text, None), |(address, bits)| (address, Some(bits)));
+        let address: IpAddr = address.parse().map_err(|_| NETWORKS)?;
+        let most = if address.is_ipv4() { 32 } else { 128 };
+        let bits = bits.map_or(Ok(most), str::parse).map_err(|_| NETWORKS)?;
+        if bits <= most { Ok(Self { address, bits }) } else { Err(NETWORKS) }
+    }
+}
+
+/// Which headers the proxies write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ProxyHeaders {
+    /// `X-Forwarded-For`, `-Proto` and `-Host`.
+    #[default]
+    XForwarded,
+    /// `Forwarded` (RFC 7239).
+    Forwarded,
+}
+
+/// The reverse proxies that are believed.
+#[derive(Debug, Clone, Default)]
+pub struct Proxies {
+    trusted: Arc<[Network]>,
+    headers: ProxyHeaders,
+}
+
+/// What is believed of a request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Believed {
+    /// Who sent it.
+    pub(super) client: IpAddr,
+    /// Whether it came through TLS; `None`: the proxy does not say.
+    pub(super) secure: Option<bool>,
+    /// The host that it was sent to; `None`: the proxy does not say.
+    pub(super) host: Option<HeaderValue>,
+}
+
+/// One step of the way of a request, as a proxy wrote it down: the peer it heard from, the scheme and host it was asked by.
+#[derive(Debug, Default, Clone)]
+struct Hop {
+    from: Option<String>,
+    proto: Option<String>,
+    host: Option<String>,
+}
+
+impl Proxies {
+    /// Proxies in these networks, which write these headers.
+    pub fn new(trusted: &[Network], headers: ProxyHeaders) -> Self {
+        Self { trusted: trusted.into(), headers }
+    }
+
+    /// Whether there are any.
+    pub fn are_any(&self) -> bool {
+        !self.trusted.is_empty()
+    }
+
+    /// Whether an address is that of a proxy.
+    pub fn trust(&self, address: IpAddr) -> bool {
+        self.trusted.iter().any(|network| network.holds(address))
+    }
+
+    /// What is believed of a request that came from `peer`.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] when a trusted proxy sends what cannot be read.
+    pub(super) fn believe(&self, peer: IpAddr, headers: &HeaderMap) -> Result<Believed, Error> {
+        let mut believed = Believed { client: peer.to_canonical(), secure: None, host: None };
+        if !self.trust(peer) {
+            return Ok(believed);
+        }
+        let hops = match self.headers {
+            ProxyHeaders::XForwarded => x_forwarded(headers)?,
+            ProxyHeaders::Forwarded => forwarded(headers)?,
+        };
+        // The nearest proxy wrote the last hop. Each hop that came from another trusted proxy makes the one before count.
+        for hop in hops.iter().rev() {
+            if !self.trust(believed.client) {
+                break;
+            }
+            if let Some(from) = &hop.from {
+                believed.client = address_in(from).ok_or_else(|| unreadable("for", from))?.to_canonical();
+            }
+            if let Some(proto) = &hop.proto {
+                believed.secure = Some(match proto.to_ascii_lowercase().as_str() {
+                    "https" => true,
+                    "http" => false,
+                    _ => return Err(unreadable("proto", proto)),
+                });
+            }
+            if let Some(host) = &hop.host {
+                believed.host = Some(HeaderValue::from_str(host).map_err(|_| unreadable("host", host))?);
+            }
+            if hop.from.is_none() {
+                break;
+            }
+        }
+        Ok(believed)
+    }
+}
+
+/// Takes away what proxies write: nothing behind this module reads it.
+pub(super) fn remove(headers: &mut HeaderMap) {
+    for name in [FOR, PROTO, HOST, header::FORWARDED] {
+        headers.remove(name);
+    }
+}
+
+fn unreadable(what: &str, value: &str) -> Error {
+    Error::Malformed(format!("the header of the proxy cannot be read: {what} is {value:?}"))
+}
+
+/// The parts of all lines of a header, commas between them.
+fn parts(headers: &HeaderMap, name: &HeaderName) -> Result<Vec<String>, Error> {
+    let mut parts = Vec::new();
+    for line in headers.get_all(name) {
+        let text = line.to_str().map_err(|_| unreadable(name.as_str(), "not text"))?;
+        parts.extend(split(text, ',').into_iter().map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()));
+    }
+    Ok(parts)
+}
+
+/// The hops of `X-Forwarded-*`. Schemes and hosts belong to the hops one by one if there are as many of them; otherwise the
+/// nearest proxy wrote the last one.
+fn x_forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
+    let (from, protos, hosts) = (parts(headers, &FOR)?, parts(headers, &PROTO)?, parts(headers, &HOST)?);
+    let hops = from.len().max(1);
+    let at = |values: &[String], hop: usize| {
+        let place =
+            if values.len() == hops { Some(hop) } else { values.len().checked_sub(1).filter(|_| hop + 1 == hops) };
+        place.and_then(|place| values.get(place).cloned())
+    };
+    let hop = |hop| Hop { from: from.get(hop).cloned(), proto: at(&protos, hop), host: at(&hosts, hop) };
+    Ok((0..hops).map(hop).collect())
+}
+
+/// The hops of `Forwarded`: `for=192.0.2.43;proto=https;host="gait.example", for="[2001:db8::7]"`.
+fn forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
+    let mut hops = Vec::new();
+    for part in parts(headers, &header::FORWARDED)? {
+        let mut hop = Hop::default();
+        for pair in split(&part, ';').into_iter().filter(|pair| !pair.trim().is_empty()) {
+            let (name, value) = pair.split_once('=').ok_or_else(|| unreadable("Forwarded", &part))?;
+            let value = value.trim();
+            let bare = value.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+            let value = bare.map_or_else(|| value.to_owned(), |quoted| quoted.replace('\\', ""));
+            match name.trim().to_ascii_lowercase().as_str() {
+                "for" => hop.from = Some(value),
+                "proto" => hop.proto = Some(value),
+                "host" => hop.host = Some(value),
+                _ => {}
+            }
+        }
+        hops.push(hop);
+    }
+    Ok(hops)
+}
+
+/// Splits where the separator is not in quotes.
+fn split(text: &str, separator: char) -> Vec<&str> {
+    let mut quoted = false;
+    text.split(|c| {
+        quoted ^= c == '"';
+        c == separator && !quoted
+    })
+    .collect()
+}
+
+/// `192.0.2.43`, `192.0.2.43:4711`, `2001:db8::7`, `[2001:db8::7]`, `[2001:db8::7]:4711`.
+fn address_in(text: &str) -> Option<IpAddr> {
+    let bare = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(text);
+    bare.parse().ok().or_else(|| text.parse().ok().map(|address: SocketAddr| address.ip()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn proxies(headers: ProxyHeaders) -> Proxies {
+        let trusted = ["127.0.0.1", "10.1.0.0/16", "fd00::/8"].map(|text| text.parse().unwrap());
+        Proxies::new(&trusted, headers)
+    }
+
+    fn headers(lines: &[(&'static str, &str)]) -> HeaderMap {
+        let mut map = HeaderMap::new();
+        for (name, value) in lines {
+            map.append(*name, value.parse().unwrap());
+        }
+        map
+    }
+
+    fn believed(peer: &str, kind: ProxyHeaders, lines: &[(&'static str, &str)]) -> (String, Option<bool>, String) {
+        let found = proxies(kind).believe(peer.parse().unwrap(), &headers(lines)).unwrap();
+        let host = found.host.map(|host| host.to_str().unwrap().to_owned()).unwrap_or_default();
+        (found.client.to_string(), found.secure, host)
+    }
+
+    #[test]
+    fn networks_hold_their_addresses_and_no_others() {
+        let network = |text: &str| text.parse::<Network>();
+        for (text, inside, outside) in [
+            ("10.1.0.0/16", "10.1.255.7", "10.2.0.1"),
+            ("127.0.0.1", "::ffff:127.0.0.1", "127.0.0.2"),
+            ("fd00::/8", "fdff::1", "fe80::1"),
+            ("0.0.0.0/0", "192.0.2.1", "::1"),
+        ] {
+            let network = network(text).unwrap();
+            assert!(network.holds(inside.parse().unwrap()) && !network.holds(outside.parse().unwrap()), "{text}");
+        }
+        for bad in ["", "10.0.0.0/33", "::/129", "proxy.example", "10.0.0.0/-1", "10.0.0.0/8/8"] {
+            assert!(network(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn forwarded_headers_are_believed_from_trusted_proxies_only() {
+        let lines =
+            [("x-forwarded-for", "192.0.2.9"), ("x-forwarded-proto", "https"), ("x-forwarded-host", "gait.example")];
+        let x = ProxyHeaders::XForwarded;
+        assert_eq!(believed("127.0.0.1", x, &lines), ("192.0.2.9".into(), Some(true), "gait.example".into()));
+        assert_eq!(believed("192.0.2.7", x, &lines), ("192.0.2.7".into(), None, String::new()));
+        // The other kind of header is what the client wrote.
+        assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &lines), ("127.0.0.1".into(), None, String::new()));
+        let other = [("forwarded", "for=192.0.2.9;proto=https")];
+        assert_eq!(believed("127.0.0.1", x, &other), ("127.0.0.1".into(), None, String::new()));
+    }
+
+    #[test]
+    fn a_client_cannot_put_hops_before_its_own() {
+        let x = ProxyHeaders::XForwarded;
+        let forged = [
+            ("x-forwarded-for", "127.0.0.1, 10.1.0.9"),
+            ("x-forwarded-for", "192.0.2.9, 10.1.2.3"),
+            ("x-forwarded-proto", "http, http, https, http"),
+        ];
+        assert_eq!(believed("127.0.0.1", x, &forged), ("192.0.2.9".into(), Some(true), String::new()));
+        let forged =
+            [("forwarded", "for=10.1.0.9;proto=http;host=evil, For=\"[2001:db8::7]:47\";Proto=HTTPS;host=\"a,b:1\"")];
+        let expected = ("2001:db8::7".into(), Some(true), "a,b:1".into());
+        assert_eq!(believed("fd00::1", ProxyHeaders::Forwarded, &forged), expected);
+    }
+
+    #[test]
+    fn what_a_trusted_proxy_garbles_is_refused() {
+        for lines in [[("x-forwarded-for", "somebody")], [("x-forwarded-proto", "gopher")]] {
+            let refused = proxies(ProxyHeaders::XForwarded).believe("127.0.0.1".parse().unwrap(), &headers(&lines));
+            assert!(refused.is_err(), "{lines:?}");
+        }
+    }
+}

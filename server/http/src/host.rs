@@ -1,0 +1,95 @@
+//! The names that the service answers to.
+//!
+//! A page of another site whose name suddenly means this machine (DNS rebinding) is of the same origin for a browser;
+//! only the name in the request tells it apart.
+
+use crate::problem::Refusal;
+use axum::extract::{Request, State};
+use axum::http::{Version, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use gaitwright_service::error::Error;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
+
+/// The names that the service answers to.
+#[derive(Debug, Clone)]
+pub struct Hosts {
+    listen: IpAddr,
+    names: Arc<[String]>,
+}
+
+impl Hosts {
+    /// The address that is listened to, and names that point at it.
+    pub fn new(listen: SocketAddr, names: &[String]) -> Self {
+        Self { listen: listen.ip(), names: names.iter().map(|name| name.to_ascii_lowercase()).collect() }
+    }
+
+    /// Whether a Host header (`name`, `name:port`, `[v6]:port`) means this service. The port does not matter: it may be
+    /// mapped.
+    fn answers_to(&self, host: &str) -> bool {
+        if let Some(address) = address_in(host) {
+            let here = self.listen.is_loopback() && address.is_loopback();
+            return here || self.listen.is_unspecified() || address == self.listen;
+        }
+        let name = host.rsplit_once(':').map_or(host, |(name, _)| name).trim_end_matches('.').to_ascii_lowercase();
+        name == "localhost" || self.names.contains(&name)
+    }
+}
+
+fn address_in(host: &str) -> Option<IpAddr> {
+    let bare = host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(host);
+    bare.parse().ok().or_else(|| host.parse().ok().map(|address: SocketAddr| address.ip()))
+}
+
+/// Refuses a request for another name, and one that does not say clearly which name it means.
+pub(super) async fn check(State(hosts): State<Hosts>, request: Request, next: Next) -> Result<Response, Refusal> {
+    match named(&request)? {
+        Some(host) if !hosts.answers_to(host) => {
+            let reason = format!("this service does not answer to the name {host:?}; `serve --host-name` makes it");
+            Err(Error::Forbidden(reason).into())
+        }
+        _ => Ok(next.run(request).await),
+    }
+}
+
+/// The one name in a request. HTTP/1.1 demands exactly one Host header: with two, or with another name in the request
+/// line, a proxy and this service could mean different ones. HTTP/1.0 knows requests without a name.
+fn named(request: &Request) -> Result<Option<&str>, Error> {
+    let malformed = |reason: &str| Err(Error::Malformed(format!("Host header: {reason}")));
+    let mut all = request.headers().get_all(header::HOST).iter();
+    let (first, second) = (all.next(), all.next());
+    if second.is_some() {
+        return malformed("given more than once; exactly one is accepted");
+    }
+    let Some(first) = first else {
+        return if request.version() < Version::HTTP_11 { Ok(None) } else { malformed("it must be there") };
+    };
+    let Ok(host) = first.to_str() else { return malformed("it has characters that no name has") };
+    match request.uri().authority() {
+        Some(other) if !other.as_str().eq_ignore_ascii_case(host) => malformed("the request line names another host"),
+        _ => Ok(Some(host)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_service_answers_to_its_address_to_localhost_and_to_names_it_was_given() {
+        let hosts = |listen: &str| Hosts::new(listen.parse().unwrap(), &["Gait.Clinic.example".to_owned()]);
+        let here = hosts("127.0.0.1:8080");
+        for host in ["127.0.0.1:8080", "127.0.0.1", "localhost:9999", "LOCALHOST", "[::1]:8080", "gait.clinic.example"]
+        {
+            assert!(here.answers_to(host), "{host}");
+        }
+        for host in
+            ["evil.example", "evil.example:8080", "localhost.evil.example", "10.0.0.7:8080", "", "127.0.0.1.nip.io"]
+        {
+            assert!(!here.answers_to(host), "{host}");
+        }
+        assert!(hosts("0.0.0.0:80").answers_to("10.0.0.7") && hosts("10.0.0.7:80").answers_to("10.0.0.7:80"));
+        assert!(!hosts("0.0.0.0:80").answers_to("evil.example"));
+    }
+}

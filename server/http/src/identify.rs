@@ -1,0 +1,157 @@
+//! Finds out who makes a request, once, before any handler: a token, a session, or nobody.
+
+use super::AppState;
+use crate::problem::Refusal;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use gaitwright_service::access::sign_in::{self, Recognised};
+use gaitwright_service::access::{Caller, Role};
+use gaitwright_service::error::Error;
+use gaitwright_store::{Instant, commit};
+
+/// Name of the session cookie.
+const COOKIE: &str = "gaitwright_session";
+
+/// Name of the cookie that stays when a session ends. It lets nobody in: back-off tells by it a browser in which a user
+/// has signed in before from others in the same network.
+const BROWSER: &str = "gaitwright_browser";
+const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
+
+/// Whose answer this is, for the pages that errors become.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AnsweredTo(pub(super) Option<Role>);
+
+/// Puts the [`Caller`] into the request, and the caller's role into the answer. A token that is not good is refused; a
+/// session that is not, is nobody.
+pub(super) async fn identify(
+    State(app): State<AppState>,
+    mut request: Request,
+    next: Next,
+) -> Result<Response, Refusal> {
+    let (path, headers) = (request.uri().path().to_owned(), request.headers().clone());
+    let mut answered_to = None;
+    if let Some(caller) = caller(&app, &path, &headers).await? {
+        answered_to = Some(AnsweredTo(caller.role));
+        request.extensions_mut().insert(caller);
+    }
+    let mut answer = next.run(request).await;
+    if let Some(to) = answered_to {
+        answer.extensions_mut().insert(to);
+    }
+    Ok(answer)
+}
+
+async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Option<Caller>, Error> {
+    if path.starts_with("/static/") {
+        return Ok(None);
+    }
+    let credential = Credential::of(headers)?;
+    if matches!(credential, Credential::None) {
+        return Ok(app.access.open.then(Caller::without_sign_in));
+    }
+    match credential.recognise(app).await? {
+        (Recognised::Known { caller, seen }, now) => {
+            // What a page asks for by itself keeps nobody signed in.
+            if let Some(session) = seen.filter(|_| !path.ends_with("/live") && !path.ends_with("/events")) {
+                let mut writer = app.write().await?;
+                sign_in::seen(&mut writer, session, now).await?;
+                commit(writer).await?;
+            }
+            return Ok(Some(caller));
+        }
+        (Recognised::Ended(session), now) => {
+            let mut writer = app.write().await?;
+            sign_in::note_ended(&mut writer, session, now).await?;
+            commit(writer).await?;
+        }
+        (Recognised::Nobody, _) => {}
+    }
+    match credential {
+        Credential::Token(_) => Err(Error::NotSignedIn("this token is unknown, has ended or was revoked".to_owned())),
+        Credential::Session(_) | Credential::None => Ok(app.access.open.then(Caller::without_sign_in)),
+    }
+}
+
+/// What a request says of who sends it.
+#[derive(Clone)]
+pub(super) enum Credential {
+    Token(String),
+    Session(String),
+    None,
+}
+
+impl Credential {
+    pub(super) fn of(headers: &HeaderMap) -> Result<Self, Error> {
+        if let Some(token) = bearer(headers)? {
+            return Ok(Self::Token(token.to_owned()));
+        }
+        Ok(session_of(headers).map_or(Self::None, |session| Self::Session(session.to_owned())))
+    }
+
+    /// Whose it is, and at what instant that was decided. Writes nothing.
+    async fn recognise(&self, app: &AppState) -> Result<(Recognised, Instant), Error> {
+        let mut reader = app.read().await?;
+        let now = app.access.clock.now(&mut reader).await?;
+        let found = match self {
+            Self::Token(token) => sign_in::of_token(&mut reader, token, now).await?,
+            Self::Session(session) => sign_in::of_session(&mut reader, session, app.access.limits, now).await?,
+            Self::None => Recognised::Nobody,
+        };
+        Ok((found, now))
+    }
+
+    /// Who it still is, for what goes on after its request was answered.
+    pub(super) async fn caller(&self, app: &AppState) -> Result<Option<Caller>, Error> {
+        Ok(match self.recognise(app).await?.0 {
+            Recognised::Known { caller, .. } => Some(caller),
+            Recognised::Ended(_) | Recognised::Nobody => match self {
+                Self::Token(_) => None,
+                Self::Session(_) | Self::None => app.access.open.then(Caller::without_sign_in),
+            },
+        })
+    }
+}
+
+fn bearer(headers: &HeaderMap) -> Result<Option<&str>, Error> {
+    let Some(value) = headers.get(header::AUTHORIZATION) else { return Ok(None) };
+    let token = value.to_str().ok().and_then(|text| text.split_once(' '));
+    match token {
+        Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => Ok(Some(token.trim())),
+        _ => Err(Error::NotSignedIn("Authorization: a bearer token is expected".to_owned())),
+    }
+}
+
+/// The secret of the session in the cookie.
+pub(super) fn session_of(headers: &HeaderMap) -> Option<&str> {
+    cookie_in(headers, COOKIE)
+}
+
+/// The secret that stays in a browser in which somebody has signed in.
+pub(super) fn browser_of(headers: &HeaderMap) -> Option<&str> {
+    cookie_in(headers, BROWSER)
+}
+
+fn cookie_in<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
+    let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
+    let mut pairs = cookies.flat_map(|text| text.split(';')).filter_map(|pair| pair.trim().split_once('='));
+    pairs.find_map(|(name, value)| (name == wanted && !value.is_empty()).then_some(value))
+}
+
+/// The header that gives a browser its session, or takes it away. Scripts cannot read it, other sites cannot use it.
+pub(super) fn cookie(session: Option<&str>, secure: bool) -> Result<HeaderValue, Error> {
+    let secure = if secure { "; Secure" } else { "" };
+    let text = match session {
+        Some(secret) => format!("{COOKIE}={secret}; Path=/; HttpOnly; SameSite=Lax{secure}"),
+        None => format!("{COOKIE}=; Path=/; HttpOnly; SameSite=Lax; Max-Age=0{secure}"),
+    };
+    HeaderValue::from_str(&text).map_err(|e| Error::Internal(e.to_string()))
+}
+
+/// The header that gives a browser what it is known by when its session has ended.
+pub(super) fn browser_cookie(browser: &str, secure: bool) -> Result<HeaderValue, Error> {
+    let secure = if secure { "; Secure" } else { "" };
+    let text = format!("{BROWSER}={browser}; Path=/; HttpOnly; SameSite=Lax; Max-Age={BROWSER_SECONDS}{secure}");
+    HeaderValue::from_str(&text).map_err(|e| Error::Internal(e.to_string()))
+}

@@ -1,0 +1,44 @@
+//! The HTTP face: REST under `/api/v1`, pages for people, static files.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod access_log;
+mod answers;
+pub mod api;
+mod blind_motion;
+mod client_address;
+pub mod connections;
+mod event_stream;
+mod extract;
+mod forwarded;
+mod host;
+mod identify;
+mod may;
+pub mod metrics;
+mod negotiate;
+mod once;
+pub mod openapi;
+mod openapi_rules;
+pub mod pages;
+mod pages_of;
+mod problem;
+mod problem_kinds;
+mod reached;
+mod revision;
+mod router;
+mod same_origin;
+mod shown;
+mod state;
+mod static_files;
+
+pub use client_address::ClientAddress;
+pub use forwarded::{NETWORKS, Network, Proxies, ProxyHeaders};
+pub use host::Hosts;
+pub use router::{router, with_layers};
+pub use state::{Access, AppState};
+
+/// Largest request body.
+const BODY_LIMIT_BYTES: usize = 1 << 20;
+/// The same where a recording is uploaded: minutes of motion capture as text.
+const RECORDING_LIMIT_BYTES: usize = 16 << 20;

@@ -1,0 +1,76 @@
+//! Authorisation as a handler's argument: a handler that does not ask for a right does not learn who calls it.
+
+use crate::pages::error::{PageError, is_for_programs};
+use crate::problem::Refusal;
+use axum::extract::{FromRequestParts, OriginalUri};
+use axum::http::Extensions;
+use axum::http::request::Parts;
+use axum::response::{IntoResponse, Response};
+use gaitwright_service::access::{Caller, Permission};
+use gaitwright_service::error::Error;
+use std::convert::Infallible;
+use std::marker::PhantomData;
+
+/// The caller, who has the right `P`.
+#[derive(Debug)]
+pub(crate) struct May<P> {
+    /// Who calls.
+    pub(crate) caller: Caller,
+    right: PhantomData<P>,
+}
+
+/// The refusal: a problem document for programs, a page for people.
+#[derive(Debug)]
+pub(crate) struct Refused {
+    error: Error,
+    for_program: bool,
+}
+
+impl Refused {
+    /// The refusal of this request.
+    pub(crate) fn of(parts: &Parts, error: Error) -> Self {
+        // Nested routers see the rest of the path alone.
+        let whole = parts.extensions.get::<OriginalUri>().map_or(&parts.uri, |original| &original.0);
+        Self { error, for_program: is_for_programs(whole.path()) }
+    }
+}
+
+impl IntoResponse for Refused {
+    fn into_response(self) -> Response {
+        if self.for_program { Refusal(self.error).into_response() } else { PageError::from(self.error).into_response() }
+    }
+}
+
+/// The caller in a request, if the right is there.
+pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller, Error> {
+    let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    match P::NEEDED {
+        Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
+            "this needs the right {:?}, which {} does not have",
+            needed.as_str(),
+            caller.name
+        ))),
+        _ => Ok(caller.clone()),
+    }
+}
+
+impl<P: Permission, S: Send + Sync> FromRequestParts<S> for May<P> {
+    type Rejection = Refused;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refused> {
+        let caller = permitted::<P>(&parts.extensions).map_err(|error| Refused::of(parts, error))?;
+        Ok(Self { caller, right: PhantomData })
+    }
+}
+
+/// Who has signed in; none: nobody.
+#[derive(Debug)]
+pub(crate) struct SignedIn(pub(crate) Option<Caller>);
+
+impl<S: Send + Sync> FromRequestParts<S> for SignedIn {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        Ok(Self(parts.extensions.get::<Caller>().cloned()))
+    }
+}

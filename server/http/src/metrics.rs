@@ -1,0 +1,107 @@
+//! Figures for Prometheus: what is in the record, and what was asked of the service.
+
+use super::AppState;
+use super::may::May;
+use crate::problem::Refusal;
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::{Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use gaitwright_service::access::Read;
+use gaitwright_store::totals;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Upper ends of the buckets, s.
+const BUCKETS: [f64; 8] = [0.001, 0.005, 0.025, 0.1, 0.25, 1.0, 5.0, 30.0];
+
+/// Requests by method, route and status class.
+#[derive(Debug, Default)]
+pub struct Requests(Mutex<BTreeMap<(String, String, u16), Timed>>);
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Timed {
+    count: u64,
+    seconds: f64,
+    within: [u64; BUCKETS.len()],
+}
+
+impl Requests {
+    fn add(&self, method: String, route: String, status: StatusCode, seconds: f64) {
+        let mut map = self.map();
+        let timed = map.entry((method, route, status.as_u16())).or_default();
+        timed.count += 1;
+        timed.seconds += seconds;
+        for (within, end) in timed.within.iter_mut().zip(BUCKETS) {
+            *within += u64::from(seconds <= end);
+        }
+    }
+
+    fn map(&self) -> MutexGuard<'_, BTreeMap<(String, String, u16), Timed>> {
+        // The map is whole between any two statements that hold the lock.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Counts and times a request by its route, not by its address: addresses are without number.
+pub(super) async fn count(State(app): State<AppState>, request: Request, next: Next) -> Response {
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
+    let method = named(request.method()).to_owned();
+    let begun = Instant::now();
+    let answer = next.run(request).await;
+    app.requests.add(method, route, answer.status(), begun.elapsed().as_secs_f64());
+    answer
+}
+
+/// Methods are without number, too: anybody may invent one.
+fn named(method: &Method) -> &str {
+    let known = [Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::PATCH, Method::DELETE, Method::OPTIONS];
+    if known.contains(method) { method.as_str() } else { "other" }
+}
+
+/// `GET /metrics`.
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Result<Response, Refusal> {
+    let totals = totals::read(&mut *app.read().await?).await?;
+    let mut text = String::new();
+    for (name, label, meaning, rows) in [
+        ("gaitwright_studies", "state", "Studies by state", &totals.studies),
+        ("gaitwright_trials", "state", "Trials by state", &totals.trials),
+        ("gaitwright_jobs", "state", "Solves by state", &totals.jobs),
+    ] {
+        line(&mut text, format_args!("# HELP {name} {meaning}\n# TYPE {name} gauge"));
+        for (state, count) in rows {
+            line(&mut text, format_args!("{name}{{{label}=\"{state}\"}} {count}"));
+        }
+    }
+    for (name, meaning, value) in [
+        ("gaitwright_workers", "Solves that can run at the same time", app.scheduler.workers() as f64),
+        ("gaitwright_solves_running", "Solves that run in this process", app.scheduler.board().running() as f64),
+        ("gaitwright_database_bytes", "Size of the record", totals.bytes as f64),
+        ("gaitwright_oldest_queued_seconds", "How long the oldest solve has waited", totals.oldest_queued_seconds),
+    ] {
+        line(&mut text, format_args!("# HELP {name} {meaning}\n# TYPE {name} gauge\n{name} {value}"));
+    }
+    requests(&mut text, &app.requests);
+    Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response())
+}
+
+fn requests(text: &mut String, requests: &Requests) {
+    let name = "gaitwright_request_seconds";
+    line(text, format_args!("# HELP {name} Requests by route\n# TYPE {name} histogram"));
+    for ((method, route, status), timed) in requests.map().iter() {
+        let labels = format!("method=\"{method}\",route=\"{route}\",status=\"{status}\"");
+        for (end, within) in BUCKETS.iter().zip(timed.within) {
+            line(text, format_args!("{name}_bucket{{{labels},le=\"{end}\"}} {within}"));
+        }
+        line(text, format_args!("{name}_bucket{{{labels},le=\"+Inf\"}} {}", timed.count));
+        line(text, format_args!("{name}_sum{{{labels}}} {}", timed.seconds));
+        line(text, format_args!("{name}_count{{{labels}}} {}", timed.count));
+    }
+}
+
+fn line(text: &mut String, line: std::fmt::Arguments<'_>) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{line}");
+}

@@ -1,0 +1,146 @@
+//! Requests that may be repeated: with an Idempotency-Key, the effect happens once and the answer stays the same.
+
+use super::AppState;
+use super::extract::{body, unreadable};
+use super::may::permitted;
+use crate::problem::Refusal;
+use axum::body::Bytes;
+use axum::extract::{FromRequest, Request};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use gaitwright_service::access::{Caller, Permission};
+use gaitwright_service::error::Error;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::idempotency::{self, KEY_UNIQUE, Kept, fingerprint};
+use gaitwright_store::{LentWriter, OnConstraint, commit};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::marker::PhantomData;
+
+static IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
+static REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
+
+/// A request that changes something, by somebody who has the right `P`: who sends it, its key and its fingerprint.
+#[derive(Debug)]
+pub(crate) struct Once<P> {
+    /// Who sends it.
+    pub(crate) actor: Actor,
+    /// The same, with what it may do.
+    pub(crate) caller: Caller,
+    key: Option<String>,
+    request: String,
+    right: PhantomData<P>,
+}
+
+/// [`Once`] with a JSON body.
+#[derive(Debug)]
+pub(crate) struct OnceWith<P, T>(pub(crate) Once<P>, pub(crate) T);
+
+impl<P: Permission> Once<P> {
+    /// Begins the transaction of the effect. `Err` of the inner result: the answer that was given before.
+    pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<LentWriter<'a>, Response>, Error> {
+        let mut writer = app.write().await?;
+        let Some(key) = &self.key else { return Ok(Ok(writer)) };
+        match idempotency::find(&mut writer, &self.actor, key).await? {
+            None => Ok(Ok(writer)),
+            Some(kept) if kept.request == self.request => {
+                let mut answer = response(&kept);
+                answer.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
+                Ok(Err(answer))
+            }
+            Some(_) => Err(Error::conflict("this Idempotency-Key was used for another request: take a new one")),
+        }
+    }
+
+    /// The answer that was given to this key before, if there is one.
+    pub(crate) async fn answered_before(&self, app: &AppState) -> Result<Option<Response>, Error> {
+        if self.key.is_none() {
+            return Ok(None);
+        }
+        Ok(self.begin(app).await?.err())
+    }
+
+    /// Begins the transaction of an effect whose answer holds a secret: nothing of it may be kept for repetition.
+    pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
+        if self.key.is_some() {
+            let reason = "Idempotency-Key: the answer holds a secret that is shown once; send this without a key";
+            return Err(Error::Malformed(reason.to_owned()));
+        }
+        Ok(app.write().await?)
+    }
+
+    /// Keeps the answer, makes the effect durable and tells the scheduler.
+    pub(crate) async fn finish<T: Serialize>(
+        &self,
+        app: &AppState,
+        mut writer: LentWriter<'_>,
+        status: StatusCode,
+        location: Option<String>,
+        body: &T,
+    ) -> Result<Response, Refusal> {
+        let body = serde_json::to_string(body).map_err(|e| Error::Internal(e.to_string()))?;
+        let kept = Kept { request: self.request.clone(), status: status.as_u16(), location, body };
+        if let Some(key) = &self.key {
+            // Two requests with one key at the same time, of a handler that looks for its answer before it begins.
+            idempotency::keep(&mut writer, &self.actor, key, &kept).await.on_constraint(KEY_UNIQUE, || {
+                Error::conflict("a request with this Idempotency-Key has just been answered; send it again")
+            })?;
+        }
+        commit(writer).await?;
+        app.scheduler.changed();
+        Ok(response(&kept))
+    }
+
+    fn new(caller: Caller, headers: &HeaderMap, method: &str, path: &str, bytes: &[u8]) -> Result<Self, Error> {
+        let key = match headers.get(&IDEMPOTENCY_KEY) {
+            None => None,
+            Some(value) => Some(value.to_str().ok().filter(|key| (1..=200).contains(&key.len())).ok_or_else(|| {
+                Error::Malformed("Idempotency-Key: 1 to 200 printable ASCII characters are accepted".to_owned())
+            })?),
+        };
+        Ok(Self {
+            actor: caller.actor.clone(),
+            caller,
+            key: key.map(str::to_owned),
+            request: fingerprint(method, path, bytes),
+            right: PhantomData,
+        })
+    }
+}
+
+fn response(kept: &Kept) -> Response {
+    let status = StatusCode::from_u16(kept.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    let mut answer = (status, [(header::CONTENT_TYPE, "application/json")], kept.body.clone()).into_response();
+    if let Some(location) = kept.location.as_ref().and_then(|l| HeaderValue::from_str(l).ok()) {
+        answer.headers_mut().insert(header::LOCATION, location);
+    }
+    answer
+}
+
+async fn read<P: Permission, S: Send + Sync>(
+    request: Request,
+    state: &S,
+) -> Result<(Once<P>, HeaderMap, Bytes), Error> {
+    let caller = permitted::<P>(request.extensions())?;
+    let (method, path) = (request.method().as_str().to_owned(), request.uri().path().to_owned());
+    let headers = request.headers().clone();
+    let bytes = Bytes::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
+    Ok((Once::new(caller, &headers, &method, &path, &bytes)?, headers, bytes))
+}
+
+impl<P: Permission, S: Send + Sync> FromRequest<S> for Once<P> {
+    type Rejection = Refusal;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
+        Ok(read(request, state).await?.0)
+    }
+}
+
+impl<P: Permission, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for OnceWith<P, T> {
+    type Rejection = Refusal;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
+        let (once, headers, bytes) = read(request, state).await?;
+        Ok(Self(once, body(&headers, &bytes)?))
+    }
+}

@@ -1,0 +1,349 @@
+//! What the description says of values beyond their types: ranges, lengths, patterns, words.
+//!
+//! Whatever fits the description is accepted, unless the state of the record is against it. Names and notes have the same
+//! rules wherever they come in, so they are stated here once. The settings of solver and learner are asked for theirs: their
+//! own checks say which range a value is out of.
+
+use gait_learner::LearnerSettings;
+use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
+use gait_optimizer::{Device, GaitSettings, SolveOptions, Subject, TunedBounds};
+use gaitwright_service::document;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::plan::LARGEST_SEED;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value, json};
+
+/// Characters that neither print nor part lines, and those that turn text around.
+const UNPRINTABLE: &str =
+    r"\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069";
+
+/// Words of people that are no note: `name` is a component and its field.
+const NAMES: [(&str, &str, u32); 11] = [
+    ("NewUser", "name", 80),
+    ("NewToken", "name", 80),
+    ("Invitation", "name", 80),
+    ("NewMember", "name", 120),
+    ("NewStudy", "name", 120),
+    ("Change", "name", 120),
+    ("Fork", "name", 120),
+    ("Ask", "worker", 80),
+    ("Answer", "author", 80),
+    ("RemarkToMake", "author", 80),
+    ("Suggestion", "author", 80),
+];
+
+/// What a schema cannot say of a recording.
+const RECORDING: &str = "A file of the given form, with its columns, as optimizer/data/README.md describes it: five joint angles over at least \
+                         one whole stride of a walking person. Heel strikes and columns that are named must be in it.";
+
+/// Adds the rules to a description.
+pub(super) fn state(document: &mut Value) {
+    let optional = format!("^[^{UNPRINTABLE}]*$");
+    let needed = format!(r"^[^{UNPRINTABLE}]*[^\s{UNPRINTABLE}][^{UNPRINTABLE}]*$");
+    let one_line = format!(r"^[^\t\r\n{UNPRINTABLE}]*[^\s{UNPRINTABLE}][^\t\r\n{UNPRINTABLE}]*$");
+    if let Some(schemas) = document.pointer_mut("/components/schemas").and_then(Value::as_object_mut) {
+        for (component, field, longest) in NAMES {
+            let rule = json!({ "minLength": 1, "maxLength": longest, "pattern": one_line });
+            add(schemas, component, field, &rule);
+        }
+        for component in ["SafetyReviewToMake", "Retract"] {
+            add(schemas, component, "author", &json!({ "minLength": 1, "maxLength": 80, "pattern": one_line }));
+        }
+        for component in ["SafetyReviewToMake", "Withdrawal", "NewCorrection", "Unblind", "Retract", "Told"] {
+            add(schemas, component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
+        }
+        add(schemas, "NewConsent", "form", &json!({ "pattern": needed }));
+        for component in
+            ["Answer", "RemarkToMake", "Suggestion", "RaterAnswer", "NewLabAnswer", "RecordedWalk", "Closing"]
+        {
+            add(schemas, component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
+        }
+        for component in ["Tell", "Why"] {
+            add(schemas, component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
+        }
+        for component in ["NewSubject", "NewSession"] {
+            add(schemas, component, "notes", &json!({ "pattern": optional }));
+        }
+        // A code of the site: no address, no date, no long number.
+        let pseudonym = r"^(?!(.*[0-9]){6})[A-Za-z0-9_.:/#+()\-][A-Za-z0-9 _.:/#+()\-]*$";
+        add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
+        add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": ["read", "run", "answer", "rate"] } }));
+        for component in ["Answer", "RemarkToMake", "Suggestion"] {
+            let people = json!({ "type": ["string", "null"], "enum": ["subject", "clinician", "script", null] });
+            set(schemas, component, "source", people);
+        }
+        let remarks = json!({ "enum": ["cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both"] });
+        set(schemas, "RemarkToMake", "answer", remarks);
+        let said = json!({ "enum": [
+            "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
+        ] });
+        for component in ["RaterAnswer", "NewLabAnswer"] {
+            set(schemas, component, "answer", said.clone());
+        }
+        for field in ["gait_rmse_rad", "cost_of_transport"] {
+            add(schemas, "Tell", field, &json!({ "minimum": 0, "exclusiveMaximum": 1e6 }));
+        }
+        if let Some(tell) = schemas.get_mut("Tell").and_then(Value::as_object_mut) {
+            let reason = json!({ "required": ["reason"], "properties": { "reason": { "pattern": r"\S" } } });
+            let rmse =
+                json!({ "required": ["gait_rmse_rad"], "properties": { "gait_rmse_rad": { "type": "number" } } });
+            tell.insert("if".to_owned(), json!({ "properties": { "outcome": { "const": "converged" } } }));
+            tell.insert("then".to_owned(), rmse);
+            tell.insert("else".to_owned(), reason);
+        }
+        add(schemas, "NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
+        add(schemas, "NewReferenceGait", "recording", &json!({ "minLength": 1, "x-depends": RECORDING }));
+        for (field, (least, most)) in
+            [("height_m", Subject::HEIGHT_RANGE_M), ("body_mass_kg", Subject::BODY_MASS_RANGE_KG)]
+        {
+            add(schemas, "NewReferenceGait", field, &json!({ "minimum": least, "maximum": most }));
+        }
+        for component in ["NewStudy", "Fork"] {
+            add(schemas, component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
+            add(schemas, component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
+        }
+        add(schemas, "NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
+        add(schemas, "NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
+        add(schemas, "NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));
+        for (name, (least, most)) in TunedBounds::NAMES.iter().zip(TunedBounds::RANGES) {
+            add(schemas, "Bounds", name, &json!({ "minimum": least, "maximum": most }));
+        }
+        add(schemas, "Dimension", "name", &json!({ "enum": TunedBounds::NAMES }));
+        add(schemas, "Dimension", "values", &json!({ "minItems": 1, "maxItems": 1000, "uniqueItems": true }));
+        for field in ["base_bounds", "search_space"] {
+            describe(schemas, field);
+        }
+        set(
+            schemas,
+            "NewStudy",
+            "gait_settings",
+            settings(GaitSettings::default(), |s: &GaitSettings| s.validate().err().map(Error::from)),
+        );
+        set(
+            schemas,
+            "NewStudy",
+            "solve_options",
+            settings(SolveOptions::default(), |s: &SolveOptions| s.validate().err().map(Error::from)),
+        );
+        set(
+            schemas,
+            "NewStudy",
+            "learner",
+            settings(LearnerSettings::default(), |s: &LearnerSettings| s.validate().err().map(Error::Learner)),
+        );
+    }
+    let muscles = muscles();
+    if let Some(present) =
+        document.pointer_mut("/components/schemas/NewStudy/properties/gait_settings/properties/muscles")
+    {
+        *present = muscles.clone();
+    }
+    let device = device(&one_line);
+    for (path, part, schema) in [
+        ("devices", "post/requestBody", device),
+        ("subjects~1{id}~1muscles", "post/requestBody", muscles.clone()),
+        ("subjects~1{id}~1muscles", "post/responses/201", muscles.clone()),
+        ("subjects~1{id}~1muscles", "get/responses/200", muscles),
+    ] {
+        let place = format!("/paths/~1api~1v1~1{path}/{part}/content/application~1json/schema");
+        if let Some(present) = document.pointer_mut(&place) {
+            *present = schema;
+        }
+    }
+    if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
+        for (path, item) in paths {
+            let operations = item.as_object_mut().into_iter().flatten();
+            for parameter in
+                operations.filter_map(|(_, operation)| operation.get_mut("parameters")?.as_array_mut()).flatten()
+            {
+                state_parameter(path, parameter);
+            }
+        }
+    }
+}
+
+fn state_parameter(path: &str, parameter: &mut Value) {
+    let rule = match parameter.get("name").and_then(Value::as_str).unwrap_or_default() {
+        "limit" => json!({ "minimum": 1, "maximum": if path == "/api/v1/studies" { 200 } else { 1000 } }),
+        "rate_hz" => json!({ "minimum": 10, "maximum": 5000 }),
+        "walk" => json!({ "minimum": 2, "maximum": 3 }),
+        "after" | "Last-Event-ID" => json!({ "minimum": 0 }),
+        "token" => json!({ "pattern": "^[0-9a-f]{64}$" }),
+        "ids" => {
+            let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
+            json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })
+        }
+        "Idempotency-Key" => json!({ "pattern": "^[!-~]([ -~]*[!-~])?$" }),
+        "right" | "down" => json!({ "enum": TunedBounds::NAMES }),
+        _ => return,
+    };
+    if let Some(schema) = parameter.get_mut("schema").and_then(Value::as_object_mut) {
+        merge(schema, &rule);
+    }
+}
+
+fn merge(schema: &mut Map<String, Value>, rule: &Value) {
+    for (name, value) in rule.as_object().into_iter().flatten() {
+        schema.insert(name.clone(), value.clone());
+    }
+}
+
+fn property<'a>(
+    schemas: &'a mut Map<String, Value>,
+    component: &str,
+    field: &str,
+) -> Option<&'a mut Map<String, Value>> {
+    schemas.get_mut(component)?.get_mut("properties")?.get_mut(field)?.as_object_mut()
+}
+
+/// Adds rules to a field.
+fn add(schemas: &mut Map<String, Value>, component: &str, field: &str, rule: &Value) {
+    if let Some(schema) = property(schemas, component, field) {
+        merge(schema, rule);
+    }
+}
+
+/// Puts a schema in place of that of a field; what is said of the field stays.
+fn set(schemas: &mut Map<String, Value>, component: &str, field: &str, mut schema: Value) {
+    let Some(present) = property(schemas, component, field) else { return };
+    let nested = present.get("oneOf").and_then(|parts| parts.get(0)).and_then(|part| part.get("description"));
+    if let (Some(said), Some(new)) = (present.get("description").or(nested), schema.as_object_mut()) {
+        new.insert("description".to_owned(), said.clone());
+    }
+    if let Value::Object(schema) = schema {
+        *present = schema;
+    }
+}
+
+/// Says of a field what a schema cannot: how its parts depend on each other.
+fn describe(schemas: &mut Map<String, Value>, field: &str) {
+    const DEPENDS: &str = "a3 is smaller than a4 by 0.001 or more. The values of a dimension increase, each within the range of its \
+                           bound; its lengthscale lies between a hundredth of their smallest step and 10,000 times their range.";
+    add(schemas, "NewStudy", field, &json!({ "x-depends": DEPENDS }));
+}
+
+/// The schema of a device file; no two devices have one name.
+fn device(name: &str) -> Value {
+    let mut properties = Map::new();
+    properties.insert("name".to_owned(), json!({ "type": "string", "minLength": 1, "maxLength": 80, "pattern": name }));
+    properties.insert("carried_limb".to_owned(), json!({ "type": "boolean" }));
+    for field in &Device::FIELDS {
+        properties.insert(field.name.to_owned(), number(field.meaning, field.minimum, field.maximum, &json!("number")));
+    }
+    let required: Vec<String> = properties.keys().cloned().collect();
+    let texts = json!({ "type": "object", "additionalProperties": { "type": "string" } });
+    properties.insert("sources".to_owned(), texts);
+    json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+}
+
+/// The schema of muscle parameters: what is left out stays as in the published table, and a muscle has lever arms only at
+/// the joints that it spans.
+fn muscles() -> Value {
+    let published = MuscleParameters::default();
+    let mut properties = Map::new();
+    properties.insert("scaled_to_body".to_owned(), json!({ "type": "boolean" }));
+    let anybody = Subject { height_m: Subject::HEIGHT_RANGE_M.0, body_mass_kg: Subject::BODY_MASS_RANGE_KG.0 };
+    for (kind, _) in published.overrides() {
+        let Some(muscle) = published.muscle_of_kind(&anybody, kind) else { continue };
+        let fields = MuscleOverride::FIELDS.iter().filter(|field| (field.value)(&muscle).is_some());
+        let numbers: Map<String, Value> = fields
+            .map(|f| (f.name.to_owned(), number(f.meaning, f.minimum, f.maximum, &json!(["number", "null"]))))
+            .collect();
+        let schema = json!({ "type": "object", "properties": numbers, "additionalProperties": false });
+        properties.insert(kind.to_owned(), schema);
+    }
+    json!({ "type": "object", "properties": properties, "additionalProperties": false })
+}
+
+fn number(meaning: &str, minimum: f64, maximum: f64, kind: &Value) -> Value {
+    json!({ "type": kind, "description": meaning, "minimum": minimum, "maximum": maximum })
+}
+
+/// The schema of settings: the shape of their defaults, with what their own checks say when a value is far out of range.
+fn settings<T>(default: T, check: impl Fn(&T) -> Option<Error>) -> Value
+where
+    T: Serialize + DeserializeOwned,
+{
+    let Ok(default) = serde_json::to_value(default) else { return json!({ "type": "object" }) };
+    let refusal = |changed: &Value| -> Option<Error> {
+        match serde_json::to_vec(changed).map(|bytes| document::read::<T>(&bytes)) {
+            Ok(Ok(settings)) => check(&settings),
+            Ok(Err(error)) => Some(error),
+            Err(_) => None,
+        }
+    };
+    shape(&default, "", &default, &refusal)
+}
+
+/// The schema of the part of a document at a place.
+fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> Option<Error>) -> Value {
+    let with = |value: Value| {
+        let mut changed = whole.clone();
+        *changed.pointer_mut(place)? = value;
+        refusal(&changed)
+    };
+    match part {
+        Value::Object(fields) => {
+            let properties: Map<String, Value> = fields
+                .iter()
+                .map(|(name, part)| (name.clone(), shape(whole, &format!("{place}/{name}"), part, refusal)))
+                .collect();
+            json!({ "type": "object", "properties": properties, "additionalProperties": false })
+        }
+        Value::Bool(_) => json!({ "type": "boolean" }),
+        Value::Number(number) => number_shape(number.is_f64(), with),
+        Value::String(_) => match with(json!("\u{1}")).as_ref().map(words_in) {
+            Some(words) if !words.is_empty() => json!({ "enum": words }),
+            _ => json!({ "type": "string" }),
+        },
+        Value::Array(items) => {
+            let item = items.first().map(|part| shape(whole, &format!("{place}/0"), part, refusal));
+            json!({ "type": "array", "items": item.unwrap_or_else(|| json!({})) })
+        }
+        Value::Null => {
+            // Settings that are nothing by default are numbers: a fraction is read or refused by its range, or it is none.
+            let fraction = with(json!(0.5));
+            let is_fraction = fraction.as_ref().is_none_or(|refused| range_in(refused).is_some());
+            let mut schema = number_shape(is_fraction, with);
+            schema["type"] = json!([schema["type"], "null"]);
+            schema
+        }
+    }
+}
+
+/// The schema of a number; `with` tells why a value in its place is refused.
+fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Value {
+    let mut schema = json!({ "type": if is_fraction { "number" } else { "integer" } });
+    for far in [json!(1_000_000_000_u32), json!(-1_000_000_000_i64)] {
+        if let Some((least, most)) = with(far).as_ref().and_then(range_in) {
+            (schema["minimum"], schema["maximum"]) = (json!(least), json!(most));
+        }
+    }
+    if !is_fraction && schema.get("minimum").is_none() {
+        schema["minimum"] = json!(u8::from(with(json!(0)).is_some()));
+    }
+    schema
+}
+
+/// `0.1 to 5` of a refused field, or `between 0.1 and 5` of a setting of the learner.
+fn range_in(error: &Error) -> Option<(f64, f64)> {
+    if let Error::Invalid(field) | Error::Unreadable(field) = error {
+        let (least, most) = field.allowed.as_deref()?.split_once(" to ")?;
+        return Some((least.trim().parse().ok()?, most.trim().parse().ok()?));
+    }
+    let text = error.to_string();
+    let (least, most) = text.split_once("between ")?.1.split_once(" and ")?;
+    let most: String = most.chars().take_while(|c| c.is_ascii_digit() || "+-.e".contains(*c)).collect();
+    Some((least.trim().parse().ok()?, most.parse().ok()?))
+}
+
+/// The words that a refused field accepts: `a, b, c`, or `a or b`.
+fn words_in(error: &Error) -> Vec<String> {
+    let (Error::Invalid(field) | Error::Unreadable(field)) = error else { return Vec::new() };
+    let allowed = field.allowed.as_deref().unwrap_or_default().trim_start_matches("one of ");
+    let words = allowed.split(", ").flat_map(|words| words.split(" or "));
+    let words: Vec<String> = words.map(|word| word.trim_matches(['`', '"', ' ']).to_owned()).collect();
+    let plain = |word: &String| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if words.iter().all(plain) { words } else { Vec::new() }
+}

@@ -1,0 +1,63 @@
+//! The access log: who saw or exported data of subjects, and who was refused.
+
+use super::error::{Page, page};
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use askama::Template;
+use axum::extract::State;
+use gaitwright_service::access::Administer;
+use gaitwright_store::SubjectId;
+use gaitwright_store::access_log::{self, AccessRow};
+use gaitwright_store::subjects;
+use serde::Deserialize;
+
+/// Rows of a page.
+const PAGE: u32 = 100;
+
+/// Which rows.
+#[derive(Debug, Deserialize)]
+pub(super) struct Choice {
+    before: Option<i64>,
+    #[serde(default)]
+    contains: String,
+    subject: Option<SubjectId>,
+}
+
+#[derive(Template)]
+#[template(path = "access_log.html")]
+struct AccessLogPage {
+    rows: Vec<AccessRow>,
+    older: Option<i64>,
+    contains: String,
+    /// The subject whose rows are shown: identifier and pseudonym.
+    subject: Option<(SubjectId, String)>,
+}
+
+impl AccessLogPage {
+    /// The rows before one, chosen in the same way.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn before(&self, row: &i64) -> String {
+        let subject = self.subject.as_ref().map(|(id, _)| ("subject", id.to_string()));
+        let mut chosen = vec![("before", row.to_string()), ("contains", self.contains.clone())];
+        chosen.extend(subject);
+        format!("/access-log?{}", serde_urlencoded::to_string(chosen).unwrap_or_default())
+    }
+}
+
+/// `GET /access-log`.
+pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+    app.access.log.write(app.store(), true).await?;
+    let mut reader = app.read().await?;
+    let subject = match choice.subject {
+        Some(id) => Some((id, subjects::get(&mut reader, id).await?.pseudonym)),
+        None => None,
+    };
+    let mut rows =
+        access_log::page(&mut reader, choice.contains.trim(), choice.subject, choice.before, PAGE + 1).await?;
+    drop(reader);
+    let more = rows.len() > PAGE as usize;
+    rows.truncate(PAGE as usize);
+    let older = rows.last().filter(|_| more).map(|row| row.seq);
+    page(&AccessLogPage { rows, older, contains: choice.contains, subject })
+}

@@ -1,0 +1,81 @@
+//! The audit trail: who did what, and whether the chain of its rows is whole.
+
+use super::error::{Page, page};
+use super::format::words;
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use askama::Template;
+use axum::extract::State;
+use gaitwright_service::access::Administer;
+use gaitwright_store::audit::{self, AuditRow, ChainCheck};
+use serde::Deserialize;
+
+/// Rows of a page.
+const PAGE: u32 = 100;
+
+/// Which rows, and whether to walk the chain.
+#[derive(Debug, Deserialize)]
+pub(super) struct Choice {
+    before: Option<i64>,
+    #[serde(default)]
+    verify: bool,
+    /// What the rows contain.
+    #[serde(default)]
+    contains: String,
+}
+
+#[derive(Template)]
+#[template(path = "audit.html")]
+struct AuditPage {
+    rows: Vec<AuditRow>,
+    older: Option<i64>,
+    verdict: Option<ChainCheck>,
+    contains: String,
+}
+
+impl AuditPage {
+    /// `lab_session.process` as `lab session: process`.
+    fn words(action: &str) -> String {
+        words(action).replacen('.', ": ", 1)
+    }
+
+    /// `study 0190...` with the end of the identifier alone, which tells it apart.
+    fn short(object: &str) -> String {
+        match object.rsplit_once('-') {
+            Some((start, end)) if end.len() == 12 => {
+                format!("{} {}", start.rsplit_once(' ').map_or("", |(kind, _)| kind), &end[4..])
+            }
+            _ => object.to_owned(),
+        }
+    }
+
+    /// The rows before one, with the same words.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn before(&self, row: &i64) -> String {
+        let query = serde_urlencoded::to_string([("contains", self.contains.as_str())]).unwrap_or_default();
+        format!("/audit?before={row}&{query}")
+    }
+
+    /// `study 0190...` as a link, where there is a page for it.
+    fn link(row: &AuditRow) -> Option<String> {
+        let (kind, id) = row.object.split_once(' ')?;
+        let folder = match kind {
+            "study" => "studies",
+            "trial" => "trials",
+            _ => return None,
+        };
+        Some(format!("/{folder}/{id}"))
+    }
+}
+
+/// `GET /audit`.
+pub(super) async fn get(_: May<Administer>, State(app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+    let mut reader = app.read().await?;
+    let mut rows = audit::page(&mut reader, choice.contains.trim(), choice.before, PAGE + 1).await?;
+    let more = rows.len() > PAGE as usize;
+    rows.truncate(PAGE as usize);
+    let older = rows.last().filter(|_| more).map(|row| row.seq);
+    let verdict = if choice.verify { Some(audit::verify(&mut reader).await?) } else { None };
+    page(&AuditPage { rows, older, verdict, contains: choice.contains })
+}

@@ -1,0 +1,91 @@
+//! The certificate on a gait's page, and the button that asks for it.
+
+use super::error::PageError;
+use super::format;
+use crate::AppState;
+use crate::may::May;
+use crate::reached::Id;
+use axum::extract::State;
+use axum::response::Redirect;
+use gait_optimizer::certificate::{Certificate, Check, RECOVERY_STRIDES};
+use gaitwright_service::access::Run;
+use gaitwright_service::studies::certification;
+use gaitwright_store::{TrialId, commit};
+
+/// A certificate in words.
+pub(super) struct InWords {
+    /// Every check is within its limit, and the gait is stable.
+    pub(super) passed: bool,
+    /// Why not.
+    pub(super) objections: Vec<String>,
+    /// Figures of the closed loop: meaning and value.
+    pub(super) figures: Vec<(&'static str, String)>,
+    /// Every check.
+    pub(super) checks: Vec<CheckInWords>,
+}
+
+impl InWords {
+    pub(super) fn new(certificate: Certificate) -> Self {
+        let mut figures = Vec::new();
+        if let Some(map) = &certificate.return_map {
+            figures.push(("Largest Poincaré multiplier", format::number(map.largest)));
+            let (found, resolved) =
+                (format::number(map.largest_by_differences), format::number(map.differences_resolve));
+            figures.push(("The same by differences, and what they resolve", format!("{found} (to {resolved})")));
+            let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
+            figures.push(("What a stride leaves of a change of speed, and elsewhere", format!("{kept}, {leak}")));
+            let distance = format::number(map.fixed_point_distance);
+            figures.push(("From the gait to the periodic motion, rad, rad/s", distance));
+        }
+        if let Some(free) = &certificate.free_hip_return_map {
+            let words = format!("{:.3} (by differences {:.3})", free.largest, free.largest_by_differences);
+            figures.push(("Multiplier of the zero dynamics (hip velocity left alone)", words));
+        }
+        if let Some(pushes) = certificate.pushes {
+            let words = format!(
+                "{:.2} m/s forwards, {:.2} m/s backwards, within {RECOVERY_STRIDES} strides",
+                pushes.forwards_m_s, pushes.backwards_m_s
+            );
+            figures.push(("Pushes at the hip that are recovered", words));
+        }
+        let checks = certificate.checks.into_iter().map(CheckInWords::new).collect();
+        Self { passed: certificate.passed, objections: certificate.objections, figures, checks }
+    }
+}
+
+/// A check with its figures as people read them.
+pub(super) struct CheckInWords {
+    pub(super) name: String,
+    pub(super) value: String,
+    pub(super) limit: String,
+    pub(super) place: String,
+}
+
+impl CheckInWords {
+    fn new(check: Check) -> Self {
+        let in_unit = |value: Option<f64>, otherwise: &str| {
+            value.map_or_else(|| otherwise.to_owned(), |value| format!("{} {}", format::number(value), check.unit))
+        };
+        Self {
+            value: in_unit(check.value, "not determined"),
+            limit: in_unit(check.limit, "reported only"),
+            name: check.name,
+            place: check.place,
+        }
+    }
+}
+
+/// `POST /trials/{id}/certify`.
+pub(super) async fn post(
+    may: May<Run>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<TrialId, Run>,
+) -> Result<Redirect, PageError> {
+    let begun =
+        certification::begin(&mut *app.read().await.map_err(gaitwright_service::error::Error::from)?, id).await?;
+    let certificate = certification::certificate(app.store_mut(), begun).await?;
+    let mut writer = app.write().await?;
+    certification::record(&mut writer, &may.caller.actor, id, &certificate).await?;
+    commit(writer).await?;
+    Ok(Redirect::to(&format!("/trials/{id}#certificate")))
+}

@@ -1,0 +1,456 @@
+//! The form for a preference between two gaits of a study.
+
+use super::drawn::Drawn;
+use super::error::{Page, PageError, page};
+use super::figures;
+use super::study::{answer_in_words, remark_in_words};
+use crate::AppState;
+use crate::extract::{Form, Params};
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::Id;
+use crate::shown::Shown;
+use askama::Template;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::Gait;
+use gait_optimizer::walking::stick_figure::stick_figures;
+use gaitwright_charts::{Figure, gait_tiles};
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::{self, Caller, Read};
+use gaitwright_service::error::Error;
+use gaitwright_service::printable;
+use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
+use gaitwright_service::studies::choice::MANY;
+use gaitwright_service::studies::comparison::{Question, open_question};
+use gaitwright_service::studies::preference::{self, StandingAnswer};
+use gaitwright_service::studies::remark::{self, NewRemark};
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::walkable;
+use gaitwright_store::feedback::{FeedbackRow, Source};
+use gaitwright_store::idempotency::{self, Kept, fingerprint};
+use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::{
+    Connection, FeedbackId, RemarkId, StudyId, TrialId, commit, events, feedback, gaits, presentations,
+    reference_gaits, remarks, studies, trials,
+};
+use serde::Deserialize;
+use std::fmt;
+use std::str::FromStr;
+
+/// Which gaits to offer, and what was just saved.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Choice {
+    a: Option<TrialId>,
+    b: Option<TrialId>,
+    saved: Option<Recorded>,
+}
+
+/// What an answer is in the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+enum Recorded {
+    Preference(FeedbackId),
+    Remark(RemarkId),
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Preference(id) => id.fmt(f),
+            Self::Remark(id) => write!(f, "{REMARK}{id}"),
+        }
+    }
+}
+
+impl TryFrom<String> for Recorded {
+    type Error = Error;
+    fn try_from(text: String) -> Result<Self, Error> {
+        match text.strip_prefix(REMARK) {
+            Some(id) => Ok(Self::Remark(identifier("saved", id)?)),
+            None => Ok(Self::Preference(identifier("saved", &text)?)),
+        }
+    }
+}
+
+/// Before the identifier of a remark.
+const REMARK: &str = "remark-";
+
+#[derive(Template)]
+#[template(path = "compare.html")]
+struct ComparePage {
+    study: Study,
+    trials: Vec<Offered>,
+    /// The two that are shown: identifier and number.
+    a: Option<(TrialId, u32)>,
+    b: Option<(TrialId, u32)>,
+    charts: Vec<Drawn>,
+    /// Both strides as pictures, for those without scripts and without motion; empty: they cannot be drawn.
+    strides: Vec<String>,
+    key: FeedbackId,
+    saved: Option<Saved>,
+    /// The learner asks for a comparison.
+    waits: bool,
+    /// So many gaits can be chosen once they are certified.
+    being_certified: usize,
+    /// The study goes on by itself: another gait is being computed, or will be at once.
+    is_going_on: bool,
+    last_event: i64,
+    typed: Submitted,
+    refused: Option<String>,
+}
+
+impl ComparePage {
+    /// What can be said besides a preference: value and words.
+    const REMARKS: [(&str, &str); 4] = [
+        ("cannot_tell", "Cannot tell"),
+        ("unsafe_a", "Gait A is unsafe"),
+        ("unsafe_b", "Gait B is unsafe"),
+        ("unsafe_both", "Both are unsafe"),
+    ];
+}
+
+/// A gait that can be compared.
+struct Offered {
+    id: TrialId,
+    number: u32,
+    as_a: bool,
+    as_b: bool,
+}
+
+/// An answer as read back from the record.
+struct Saved {
+    id: Recorded,
+    text: String,
+    at: String,
+    retracted: bool,
+    /// What others answered to the same comparison: who, and what.
+    other_answers: Vec<(String, String)>,
+}
+
+/// So many trials of a large study are offered.
+const OFFERED: u32 = 200;
+
+/// So many of the newest gaits without a certificate are certified because somebody wants to compare gaits.
+const CERTIFIED_AT_ONCE: usize = 10;
+
+/// `GET /studies/{id}/compare`.
+pub(super) async fn get(
+    may: May<Read>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<StudyId, Read>,
+    Params(choice): Params<Choice>,
+) -> Page {
+    // Who signed in need not say so again; whoever may see this page is of the staff, unless told otherwise.
+    let mut typed = Submitted::default();
+    if may.caller.user.is_some() {
+        (typed.author, typed.source) = (may.caller.name, Source::Clinician.as_str().to_owned());
+    }
+    if choice.a.is_some() && choice.a == choice.b {
+        let refused = "Gait A and gait B were the same: choose two different ones.".to_owned();
+        return Box::pin(show(&mut app, id, Choice { a: None, b: None, ..choice }, typed, Some(refused))).await;
+    }
+    Box::pin(show(&mut app, id, choice, typed, None)).await
+}
+
+async fn show(app: &mut AppState, id: StudyId, choice: Choice, typed: Submitted, refused: Option<String>) -> Page {
+    let mut reader = app.read().await?;
+    let last_event = events::last(&mut reader, id).await?;
+    let study = studies::get(&mut reader, id).await?;
+    let is_going_on = matches!(study.state, StudyState::Running | StudyState::Waiting);
+    let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
+    let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
+    let snapshot = if large {
+        StudySnapshot::newest(&mut reader, study, OFFERED).await?
+    } else {
+        StudySnapshot::read(&mut reader, study).await?
+    };
+    let saved = match choice.saved {
+        Some(saved) => read_back(&mut reader, &snapshot, saved).await?,
+        None => None,
+    };
+    drop(reader);
+    let ask = move |pool: &OnPool| {
+        let question = if large { Ok(Question::None) } else { open_question(pool, &snapshot) };
+        (snapshot, question)
+    };
+    let (snapshot, question) = app.compute(ask).await.map_err(Error::from)?;
+    let question = question.map_err(Error::Learner)?.trials();
+    let mut reader = app.read().await?;
+    let waits = question.is_some();
+    let mut being_certified = 0;
+    for trial in
+        snapshot.trials.iter().rev().filter(|trial| snapshot.waits_for_certificate(trial)).take(CERTIFIED_AT_ONCE)
+    {
+        being_certified += usize::from(app.scheduler.certify(trial.id));
+    }
+    let mut trials: Vec<Offered> = snapshot
+        .trials
+        .iter()
+        .filter(|trial| snapshot.walkable(trial).is_ok())
+        .map(|trial| Offered { id: trial.id, number: trial.number, as_a: false, as_b: false })
+        .collect();
+    if refused.is_none()
+        && let (Some(a), Some(b)) = (choice.a, choice.b)
+    {
+        walkable::admit_pair(&mut reader, id, ("a", "b"), (a, b)).await?;
+    }
+    let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
+    let (a, b) = match (choice.a, choice.b, question) {
+        (Some(a), Some(b), _) => (Some(a), Some(b)),
+        (_, _, Some((new, old))) => (Some(old), Some(new)),
+        _ => (newest(2), newest(1)),
+    };
+    for trial in &mut trials {
+        (trial.as_a, trial.as_b) = (a == Some(trial.id), b == Some(trial.id));
+    }
+    let a = trials.iter().find(|trial| trial.as_a).map(|trial| (trial.id, trial.number));
+    let b = trials.iter().find(|trial| trial.as_b).map(|trial| (trial.id, trial.number));
+    let pair = match (a, b) {
+        (Some((a, of_a)), Some((b, of_b))) if a != b => {
+            let gaits = gaits::find(&mut reader, a).await?.zip(gaits::find(&mut reader, b).await?);
+            gaits.map(|(gait_a, gait_b)| ((a, of_a, gait_a), (b, of_b, gait_b)))
+        }
+        _ => None,
+    };
+    drop(reader);
+    let draw = move |pool: &OnPool| {
+        let Some(((a, of_a, gait_a), (b, of_b, gait_b))) = pair else { return Ok((Vec::new(), Vec::new())) };
+        let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
+        let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
+        let drawn = |figure: &Figure| Drawn::of(figure, &files, &query);
+        let charts = figures::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
+        let stride = |gait: &Gait| stick_figures(gait).ok().map(|figures| gait_tiles(&figures));
+        Ok::<_, Error>((charts, [&gait_a, &gait_b].into_iter().filter_map(stride).collect()))
+    };
+    let (charts, strides) = app.compute(draw).await.map_err(Error::from)??;
+    page(&ComparePage {
+        study: snapshot.study,
+        trials,
+        a,
+        b,
+        charts,
+        strides,
+        key: FeedbackId::fresh(),
+        saved,
+        waits,
+        being_certified,
+        is_going_on,
+        last_event,
+        typed,
+        refused,
+    })
+}
+
+/// What the record holds; none when it speaks of trials that are not at hand.
+async fn read_back(db: &mut Connection, snapshot: &StudySnapshot, saved: Recorded) -> Result<Option<Saved>, Error> {
+    Ok(match saved {
+        Recorded::Preference(id) => {
+            let row = feedback::get(db, id).await?;
+            if row.study_id != snapshot.study.id {
+                return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
+            }
+            let said = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
+            let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(said).collect();
+            answer_in_words(&row, snapshot).map(|text| Saved {
+                id: saved,
+                text,
+                at: row.created_at.minute(),
+                retracted: row.retraction.is_some(),
+                other_answers,
+            })
+        }
+        Recorded::Remark(id) => {
+            let remark = remarks::get(db, id).await?;
+            if remark.study_id != snapshot.study.id {
+                return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
+            }
+            remark_in_words(&remark, snapshot).map(|text| Saved {
+                id: saved,
+                text,
+                at: remark.created_at.minute(),
+                retracted: remark.retraction.is_some(),
+                other_answers: Vec::new(),
+            })
+        }
+    })
+}
+
+/// The form as typed, so that a refused one comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Submitted {
+    a: String,
+    b: String,
+    #[serde(default)]
+    answer: String,
+    source: String,
+    author: String,
+    #[serde(default)]
+    note: String,
+    key: String,
+}
+
+/// What a form says.
+enum Said {
+    Preference(Answer),
+    Remark(NewRemark),
+}
+
+impl Said {
+    fn is_about_safety(&self) -> bool {
+        matches!(self, Self::Remark(remark) if remark.answer.is_about_safety())
+    }
+}
+
+impl Submitted {
+    fn read(&self) -> Result<(Said, FeedbackId), Error> {
+        let source = Source::from_str(&self.source)
+            .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician, script"))?;
+        let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
+        let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
+        let preference = |answer| {
+            let (author, note) = (author.clone(), note.clone());
+            Said::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
+        };
+        let remark = |answer| {
+            let (author, note) = (author.clone(), note.clone());
+            Said::Remark(NewRemark { first: a, second: b, answer, source, author, note })
+        };
+        let said = match self.answer.as_str() {
+            "a" => preference(PairAnswer::A),
+            "b" => preference(PairAnswer::B),
+            "no_difference" => preference(PairAnswer::NoDifference),
+            "cannot_tell" => remark(presentations::Judgement::CannotTell),
+            "unsafe_a" => remark(presentations::Judgement::UnsafeFirst),
+            "unsafe_b" => remark(presentations::Judgement::UnsafeSecond),
+            "unsafe_both" => remark(presentations::Judgement::UnsafeBoth),
+            other => {
+                let allowed = "a, b, no_difference, cannot_tell, unsafe_a, unsafe_b, unsafe_both: choose one";
+                return Err(Error::invalid("answer", other, allowed));
+            }
+        };
+        Ok((said, identifier("key", &self.key)?))
+    }
+
+    /// What tells this answer from another one with the same key.
+    fn fingerprint(&self, study: StudyId) -> String {
+        let Self { a, b, answer, source, author, note, key } = self;
+        let said = [a, b, answer, source, author, note, key].map(|part| format!("{}:{part}", part.len())).join(" ");
+        fingerprint("form", &format!("/studies/{study}/compare"), said.as_bytes())
+    }
+}
+
+fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
+    text.parse().map_err(|_| Error::invalid(field, text, "an identifier of this form"))
+}
+
+/// What became of a submitted form.
+enum Given {
+    /// It is recorded, now or before.
+    Saved(Recorded),
+    /// The same form was sent before with another answer: that one is recorded.
+    Before(Recorded),
+    /// The same person has answered this comparison before: that answer is recorded.
+    Elsewhere(Recorded),
+}
+
+/// `POST /studies/{id}/compare`.
+pub(super) async fn post(
+    may: May<access::Answer>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<StudyId, access::Answer>,
+    Form(form): Form<Submitted>,
+) -> Result<Response, PageError> {
+    let (saved, status, why) = match give(&app, &may.caller, id, &form).await {
+        Ok(Given::Saved(saved)) => {
+            return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={saved}")).into_response());
+        }
+        Ok(Given::Before(saved)) => {
+            let why = "This form was sent before with another answer. Recorded is the one above; this second one was \
+                       not taken. To change the answer, take the first one back and save again.";
+            (Some(saved), StatusCode::CONFLICT, why.to_owned())
+        }
+        Ok(Given::Elsewhere(saved)) => {
+            let why = "You have answered this comparison already, perhaps in another tab or window. Your first answer is \
+                       shown above and counts; this one was not taken. To change your mind, retract the first answer \
+                       and save again.";
+            (Some(saved), StatusCode::CONFLICT, why.to_owned())
+        }
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            (None, Problem::from(&error).status(), error.to_string())
+        }
+        Err(other) => return Err(other.into()),
+    };
+    let choice = Choice { a: form.a.parse().ok(), b: form.b.parse().ok(), saved };
+    Ok((status, Box::pin(show(&mut app, id, choice, form, Some(why))).await?).into_response())
+}
+
+async fn give(app: &AppState, caller: &Caller, id: StudyId, form: &Submitted) -> Result<Given, Error> {
+    let (said, key) = form.read()?;
+    let mut writer = app.write().await?;
+    // The key of the form: sent twice (double click, reload, two tabs), the answer counts once.
+    let key = format!("form {key}");
+    let request = form.fingerprint(id);
+    if let Some(before) = idempotency::find(&mut writer, &caller.actor, &key).await? {
+        let same = before.request == request;
+        let recorded = Recorded::try_from(before.body)?;
+        return Ok(if same { Given::Saved(recorded) } else { Given::Before(recorded) });
+    }
+    // The door refuses a second answer; here the page shows the first one. A safety report is always taken.
+    if !said.is_about_safety()
+        && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
+    {
+        return Ok(Given::Elsewhere(saved));
+    }
+    let saved = match said {
+        Said::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
+        Said::Remark(new) => Recorded::Remark(remark::give(&mut writer, caller, id, &new).await?),
+    };
+    let kept = Kept { request, status: 303, location: None, body: saved.to_string() };
+    idempotency::keep(&mut writer, &caller.actor, &key, &kept).await?;
+    commit(writer).await?;
+    app.scheduler.changed();
+    Ok(Given::Saved(saved))
+}
+
+/// The answer of the same person to the same comparison that stands: it was given in another tab or elsewhere.
+async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &Submitted) -> Result<Option<Recorded>, Error> {
+    let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
+    let author = printable::name("author", &form.author, 80)?;
+    Ok(preference::standing_answer(db, study, pair, author).await?.map(|answer| match answer {
+        StandingAnswer::Preference(id) => Recorded::Preference(id),
+        StandingAnswer::Note(id) => Recorded::Remark(id),
+    }))
+}
+
+/// Taking an answer back.
+#[derive(Debug, Deserialize)]
+pub(super) struct Retract {
+    saved: Recorded,
+    author: String,
+    reason: String,
+}
+
+/// `POST /studies/{id}/retract`.
+pub(super) async fn retract(
+    may: May<access::Answer>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, access::Answer>,
+    Form(form): Form<Retract>,
+) -> Result<Redirect, PageError> {
+    let mut writer = app.write().await?;
+    let author = Some(form.author.as_str());
+    match form.saved {
+        Recorded::Preference(given) => {
+            answer::retract(&mut writer, &may.caller, Some(id), given, author, &form.reason).await?;
+        }
+        Recorded::Remark(made) => {
+            remark::retract(&mut writer, &may.caller, Some(id), made, (author, &form.reason)).await?;
+        }
+    }
+    commit(writer).await?;
+    app.scheduler.changed();
+    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))
+}

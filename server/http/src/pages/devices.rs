@@ -1,0 +1,141 @@
+//! Devices: the list, and each with the form that makes another one of it.
+
+use super::error::{Page, PageError, page};
+use super::format;
+use crate::AppState;
+use crate::extract::Form;
+use crate::may::May;
+use crate::reached::Id;
+use askama::Template;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::{Device as Definition, DeviceField};
+use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::studies::device;
+use gaitwright_store::devices::{self, Device};
+use gaitwright_store::{DeviceId, commit};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+#[derive(Template)]
+#[template(path = "devices.html")]
+struct DevicesPage {
+    devices: Vec<Device>,
+}
+
+/// `GET /devices`.
+pub(super) async fn list(_: May<Read>, State(app): State<AppState>) -> Page {
+    page(&DevicesPage { devices: devices::all(&mut *app.read().await?).await? })
+}
+
+/// What was typed, by the name of the field.
+type Typed = BTreeMap<String, String>;
+
+#[derive(Template)]
+#[template(path = "device.html")]
+struct DevicePage {
+    device: Device,
+    rows: Vec<Row>,
+    name: String,
+    carried_limb: bool,
+    may_run: bool,
+    refused: Option<FieldError>,
+}
+
+struct Row {
+    field: DeviceField,
+    allowed: String,
+    value: String,
+    source: String,
+}
+
+impl DevicePage {
+    fn of(device: Device, may_run: bool) -> Self {
+        let of_device = |field: &DeviceField| Row {
+            field: *field,
+            allowed: format::range(field.minimum, field.maximum),
+            value: (field.value)(&device.definition).to_string(),
+            source: device.definition.sources.get(field.name).cloned().unwrap_or_default(),
+        };
+        let rows = Definition::FIELDS.iter().map(of_device).collect();
+        let (name, carried_limb) = (device.name.clone(), device.definition.carried_limb);
+        Self { device, rows, name, carried_limb, may_run, refused: None }
+    }
+
+    /// The form as it was typed.
+    fn refusing(mut self, typed: &Typed, refused: FieldError) -> Self {
+        for row in &mut self.rows {
+            row.value = typed.get(row.field.name).cloned().unwrap_or_default();
+        }
+        self.name = typed.get("name").cloned().unwrap_or_default();
+        self.carried_limb = typed.contains_key("carried_limb");
+        self.refused = Some(refused);
+        self
+    }
+
+    fn refuses(&self, field: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.field.trim_start_matches("device.") == field)
+    }
+}
+
+/// `GET /devices/{id}`.
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<DeviceId, Read>) -> Page {
+    let device = devices::get(&mut *app.read().await?, id).await?;
+    page(&DevicePage::of(device, may.caller.may(Run::NEEDED)))
+}
+
+/// `POST /devices/{id}`: another device, made of this one.
+pub(super) async fn post(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<DeviceId, Run>,
+    Form(typed): Form<Typed>,
+) -> Result<Response, PageError> {
+    let before = devices::get(&mut *app.read().await?, id).await?;
+    let mut writer = app.write().await?;
+    let added = match changed(&before.definition, &typed) {
+        Ok(definition) => device::add(&mut writer, &may.caller.actor, &definition).await,
+        Err(error) => Err(error),
+    };
+    match added {
+        Ok(added) => {
+            commit(writer).await?;
+            Ok(Redirect::to(&format!("/devices/{}", added.id)).into_response())
+        }
+        Err(Error::Invalid(refused)) => {
+            let form = page(&DevicePage::of(before, true).refusing(&typed, *refused))?;
+            Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}
+
+/// The device with what was typed. A source says where a value comes from: it does not stay with another value.
+fn changed(before: &Definition, typed: &Typed) -> Result<Definition, Error> {
+    let known = |name: &str| Definition::FIELDS.iter().any(|field| field.name == name);
+    if let Some((name, value)) =
+        typed.iter().find(|(name, _)| !known(name) && !matches!(name.as_str(), "name" | "carried_limb"))
+    {
+        return Err(Error::invalid(name, value.as_str(), "a field of this form"));
+    }
+    let mut fields = Map::new();
+    let mut sources = before.sources.clone();
+    for field in &Definition::FIELDS {
+        let text = typed.get(field.name).map_or("", String::as_str).trim();
+        let allowed = || format!("{} to {}", field.minimum, field.maximum);
+        let value: f64 = text.parse().map_err(|_| Error::invalid(field.name, text, &allowed()))?;
+        if !(field.minimum..=field.maximum).contains(&value) {
+            return Err(Error::invalid(field.name, text, &allowed()));
+        }
+        if value.to_bits() != (field.value)(before).to_bits() {
+            sources.remove(field.name);
+        }
+        fields.insert(field.name.to_owned(), json!(value));
+    }
+    fields.insert("name".to_owned(), json!(typed.get("name").map_or("", String::as_str).trim()));
+    fields.insert("carried_limb".to_owned(), json!(typed.contains_key("carried_limb")));
+    fields.insert("sources".to_owned(), json!(sources));
+    serde_json::from_value(Value::Object(fields)).map_err(|e| Error::Internal(e.to_string()))
+}

@@ -1,0 +1,74 @@
+//! Errors as pages.
+
+use crate::identify::AnsweredTo;
+use crate::problem::Problem;
+use crate::problem::Refusal;
+use askama::Template;
+use axum::http::{Method, Uri};
+use axum::response::{Html, IntoResponse, Redirect, Response};
+use gaitwright_service::access::Role;
+use gaitwright_service::error::Error;
+
+/// An error that is shown as a page.
+#[derive(Debug)]
+pub struct PageError(Error);
+
+impl<E: Into<Error>> From<E> for PageError {
+    fn from(error: E) -> Self {
+        Self(error.into())
+    }
+}
+
+#[derive(Template)]
+#[template(path = "error.html")]
+struct ErrorPage {
+    problem: Problem,
+    /// Whom it is shown to: nobody has no navigation, a rater has one of its own.
+    to: Option<AnsweredTo>,
+}
+
+impl IntoResponse for PageError {
+    fn into_response(self) -> Response {
+        if matches!(self.0, Error::NotSignedIn(_)) {
+            return Redirect::to("/sign-in").into_response();
+        }
+        // `answers::complete` makes a page of it, with the navigation of whoever asked.
+        Refusal(self.0).into_response()
+    }
+}
+
+/// A problem as a page, with the navigation of whoever asked.
+pub(crate) fn shown(problem: Problem, to: Option<AnsweredTo>) -> Response {
+    let status = problem.status();
+    match (ErrorPage { problem, to }).render() {
+        Ok(text) => (status, Html(text)).into_response(),
+        Err(_) => status.into_response(),
+    }
+}
+
+/// A page.
+pub type Page = Result<Html<String>, PageError>;
+
+/// Renders a template.
+///
+/// # Errors
+/// When the template fails.
+pub fn page(template: &impl Template) -> Page {
+    Ok(Html(template.render().map_err(|e| Error::Internal(e.to_string()))?))
+}
+
+/// Any address that is no route.
+pub(crate) async fn no_such_page(uri: Uri) -> Refusal {
+    Refusal(Error::NotFound { what: "the address".to_owned(), id: uri.path().to_owned() })
+}
+
+/// Any method that an address does not know.
+pub(crate) async fn no_such_method(method: Method, uri: Uri) -> Refusal {
+    Refusal(Error::MethodNotAllowed { method: method.to_string(), path: uri.path().to_owned() })
+}
+
+/// Whether programs ask for what is there: they get problem documents, people get pages.
+pub fn is_for_programs(path: &str) -> bool {
+    ["/api/", "/static/"].iter().any(|start| path.starts_with(start))
+        || ["/health", "/ready", "/metrics"].contains(&path)
+}

@@ -1,0 +1,197 @@
+//! Numbers as people read them.
+
+use gait_optimizer::TunedBounds;
+use gaitwright_charts::power_of_ten;
+use gaitwright_store::feedback::{FeedbackRow, Source};
+use gaitwright_store::presentations::Judgement;
+use gaitwright_store::studies::FeedbackMode;
+
+/// A figure with four decimals, or a dash.
+pub(super) fn figure(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
+}
+
+/// Seconds, or a dash.
+pub(super) fn seconds(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.1}"))
+}
+
+/// A duration as people say it.
+pub(super) fn duration(seconds: f64) -> String {
+    let minutes = seconds / 60.0;
+    if seconds < 1.0 {
+        "a second".to_owned()
+    } else if seconds < 90.0 {
+        format!("{seconds:.0} s")
+    } else if minutes < 90.0 {
+        format!("{minutes:.0} min")
+    } else {
+        format!("{:.1} h", minutes / 60.0)
+    }
+}
+
+/// A number of any size with three digits: `0.0123`, `2.46 × 10⁻⁷`.
+pub(super) fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 || (1e-3..1e5).contains(&magnitude) {
+        return minus(&significant(value));
+    }
+    let text = format!("{value:.2e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => minus(&format!("{digits} × {}", power_of_ten(exponent))),
+        None => text,
+    }
+}
+
+/// At most three digits, and no nought at the end.
+fn significant(value: f64) -> String {
+    let whole = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let last = 10_f64.powf(2.0 - whole.min(2.0));
+    ((value * last).round() / last).to_string()
+}
+
+/// With the sign that is as wide as a plus.
+fn minus(text: &str) -> String {
+    text.replace('-', "\u{2212}")
+}
+
+/// `−0.1 to 0.2`.
+pub(super) fn range(minimum: f64, maximum: f64) -> String {
+    minus(&format!("{minimum} to {maximum}"))
+}
+
+/// The same, or a dash.
+pub(super) fn optional_number(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), number)
+}
+
+/// A count with its thousands apart: `11 664`.
+pub(super) fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            // Too narrow to break a line at.
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// `not_converged` as `not converged`.
+pub(super) fn words(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// With or without muscles.
+pub(super) fn variant(muscles: bool) -> &'static str {
+    if muscles { "with muscles" } else { "without muscles" }
+}
+
+/// Who answers the comparisons.
+pub(super) fn answers_by(mode: FeedbackMode) -> &'static str {
+    match mode {
+        FeedbackMode::Automatic => "Gait RMSE",
+        FeedbackMode::Human => "people",
+        FeedbackMode::Mixed => "Gait RMSE and people",
+    }
+}
+
+/// What a study waits for besides its solves; empty: nothing.
+pub(super) fn besides_solves(mode: FeedbackMode) -> &'static str {
+    if mode == FeedbackMode::Human { ", and the time people take to answer" } else { "" }
+}
+
+/// What the person who walked said in a lab session: first is walk 2.
+pub(super) fn walks_in_words(said: Judgement) -> &'static str {
+    match said {
+        Judgement::First => "walk 2 was better, the first with the device",
+        Judgement::Second => "walk 3 was better, the second with the device",
+        Judgement::NoDifference => "no difference between walk 2 and walk 3",
+        Judgement::CannotTell => "cannot tell which walk was better",
+        Judgement::UnsafeFirst => "walk 2 was unsafe",
+        Judgement::UnsafeSecond => "walk 3 was unsafe",
+        Judgement::UnsafeBoth => "walk 2 and walk 3 were unsafe",
+        Judgement::Withdrawn => "taken back",
+    }
+}
+
+/// Where an answer comes from.
+pub(super) fn source(row: &FeedbackRow) -> &'static str {
+    // Raters may be anybody: what is known is whether they could know which gait is which.
+    match (row.by_rater, row.unblinded) {
+        (true, false) => "a rater",
+        (true, true) => "a rater, not blind",
+        (false, _) => person(row.source),
+    }
+}
+
+/// The same of what no rater said.
+pub(super) fn person(source: Source) -> &'static str {
+    match source {
+        Source::Convergence => "the solver",
+        Source::GaitRmse => "Gait RMSE",
+        Source::Subject => "the subject",
+        Source::Clinician => "a clinician",
+        Source::Script => "a script",
+    }
+}
+
+/// A probability in whole percent.
+pub(super) fn percent(probability: f64) -> String {
+    format!("{:.0} %", 100.0 * probability)
+}
+
+/// A number with two decimals and its sign.
+pub(super) fn signed(value: f64) -> String {
+    // No zero is written as -0.
+    minus(&format!("{:+.2}", if value.abs() < 0.005 { 0.0 } else { value }))
+}
+
+/// What a bound limits, with its unit; empty for what is no bound.
+pub(super) fn meaning(name: &str) -> &'static str {
+    TunedBounds::NAMES.iter().position(|known| *known == name).map_or("", |place| TunedBounds::MEANINGS[place])
+}
+
+/// The same without its unit.
+pub(super) fn limited(name: &str) -> &'static str {
+    let meaning = meaning(name);
+    meaning.rsplit_once(", ").map_or(meaning, |(limited, _)| limited)
+}
+
+/// One bound: name, value, what it limits.
+pub(super) struct Bound {
+    pub(super) name: &'static str,
+    pub(super) value: String,
+    pub(super) meaning: &'static str,
+}
+
+/// The bounds of an action.
+pub(super) fn bounds(action: &TunedBounds) -> Vec<Bound> {
+    TunedBounds::NAMES
+        .iter()
+        .zip(action.to_array())
+        .zip(TunedBounds::MEANINGS)
+        .map(|((name, value), meaning)| Bound { name, value: value.to_string(), meaning })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_and_few_noughts() {
+        let numbers = [0.0, 1.0, 0.012_345, -79.998, 1234.5, 2.46e-7, -3e-10, 1.5e8].map(number);
+        assert_eq!(
+            numbers,
+            ["0", "1", "0.0123", "−80", "1235", "2.46 × 10⁻⁷", "−3.00 × 10⁻¹⁰", "1.50 × 10⁸"].map(str::to_owned)
+        );
+    }
+
+    #[test]
+    fn counts_have_their_thousands_apart() {
+        assert_eq!([7, 999, 11_664, 1_000_000].map(count), ["7", "999", "11\u{202f}664", "1\u{202f}000\u{202f}000"]);
+    }
+}

@@ -1,0 +1,188 @@
+//! A trial and its gait.
+
+use super::bound_use::{self, BoundUse};
+use super::certificate;
+use super::drawn::Drawn;
+use super::error::{Page, page};
+use super::explanation::NoGait;
+use super::format::{self, words};
+use crate::AppState;
+use crate::may::May;
+use crate::shown::Shown;
+use askama::Template;
+use axum::extract::State;
+use gait_optimizer::walking::stick_figure::stick_figures;
+use gait_optimizer::{Gait, IterationRecord, ReferenceGait, TunedBounds};
+use gaitwright_charts::Figure;
+use gaitwright_charts::gait_charts;
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::{Answer, Permission, Read, Run};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::explanation::{self, ExplanationState};
+use gaitwright_service::studies::safety_reports::{Closed, SafetyReports};
+use gaitwright_store::studies::Study;
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{Instant, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+
+#[derive(Template)]
+#[template(path = "gait.html")]
+struct GaitPage {
+    study: Study,
+    state: String,
+    rmse: String,
+    cost: String,
+    seconds: String,
+    violation: String,
+    figures: Vec<(&'static str, String)>,
+    from: Option<(TrialId, u32)>,
+    /// Name of the reference gait.
+    reference: String,
+    has_gait: bool,
+    may_run: bool,
+    certificate: Option<certificate::InWords>,
+    groups: Vec<Group>,
+    solve: Option<Drawn>,
+    /// The stride as a row of pictures.
+    tiles: Option<Drawn>,
+    /// How near the gait comes to each bound.
+    bounds: Vec<BoundUse>,
+    /// Why there is no gait.
+    no_gait: Option<NoGait>,
+    phases: [(&'static str, &'static str); 4],
+    /// Who called it unsafe.
+    unsafe_by: Vec<Closed>,
+    /// Who did, until staff let it be walked with again.
+    lifted: Vec<Closed>,
+    /// Who may decide about that: the name, as far as it is known.
+    reviewer: Option<String>,
+    trial: Trial,
+}
+
+impl GaitPage {
+    /// When the newest of the safety reports was made.
+    fn said_until(&self) -> Option<Instant> {
+        self.unsafe_by.iter().map(|closed| closed.at).max()
+    }
+}
+
+/// `GET /trials/{id}`.
+pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Shown(id, _): Shown<TrialId, Read>) -> Page {
+    let mut reader = app.read().await?;
+    let trial = trials::get(&mut reader, id).await?;
+    let study = studies::get(&mut reader, trial.study_id).await?;
+    let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
+    let from = match trial.warm_started_from {
+        Some(from) => Some((from, trials::get(&mut reader, from).await?.number)),
+        None => None,
+    };
+    let gait = match gaits::find(&mut reader, id).await? {
+        Some(gait) => Some((gait, gaits::iterations(&mut reader, id).await?)),
+        None => None,
+    };
+    let SafetyReports { closed: mut unsafe_by, mut lifted, .. } = SafetyReports::read(&mut reader, study.id).await?;
+    for said in [&mut unsafe_by, &mut lifted] {
+        said.retain(|closed| closed.trial == id);
+    }
+    let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
+    let last_event = events::last(&mut reader, study.id).await?;
+    let explained = explanation::state(&mut reader, &trial, app.scheduler.explaining(id)).await?;
+    let may_run = may.caller.may(Run::NEEDED);
+    let reviews = may.caller.may(Answer::NEEDED);
+    // Who did not sign in has no name yet.
+    let reviewer = reviews.then(|| may.caller.user.map_or_else(String::new, |_| may.caller.name));
+    drop(reader);
+    let has_gait = gait.is_some();
+    let reference_name = reference.name.clone();
+    let action = trial.action;
+    let drawn = move |pool: &OnPool| {
+        let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
+        let (gait, iterations) = gait.transpose()?.unzip();
+        draw(id, gait.as_ref(), &reference, &iterations.unwrap_or_default(), &action)
+    };
+    let drawn = app.compute(drawn).await.map_err(Error::from)??;
+    page(&GaitPage {
+        state: words(trial.state.as_str()),
+        rmse: format::figure(trial.gait_rmse_rad),
+        cost: format::figure(trial.cost_of_transport),
+        seconds: format::seconds(trial.seconds_total),
+        violation: format::optional_number(trial.max_violation),
+        figures: figures(&trial),
+        bounds: drawn.bounds,
+        no_gait: NoGait::new(&trial, explained, last_event),
+        from,
+        reference: reference_name,
+        has_gait,
+        may_run,
+        certificate,
+        groups: drawn.groups,
+        solve: drawn.solve,
+        tiles: drawn.tiles,
+        phases: gait_charts::PHASES,
+        unsafe_by,
+        lifted,
+        reviewer,
+        trial,
+        study,
+    })
+}
+
+/// Charts that belong together.
+struct Group {
+    id: &'static str,
+    heading: &'static str,
+    hint: String,
+    charts: Vec<Drawn>,
+}
+
+/// What is computed from a gait: CPU work.
+struct Everything {
+    groups: Vec<Group>,
+    solve: Option<Drawn>,
+    tiles: Option<Drawn>,
+    bounds: Vec<BoundUse>,
+}
+
+fn draw(
+    id: TrialId,
+    gait: Option<&Gait>,
+    reference: &ReferenceGait,
+    iterations: &[IterationRecord],
+    action: &TunedBounds,
+) -> Result<Everything, Error> {
+    let files = format!("/api/v1/trials/{id}/figures");
+    let drawn = |figure: &Figure| Drawn::of(figure, &files, "");
+    let groups = gait.map(|gait| gait_charts::of_gait(gait, reference)).transpose()?.unwrap_or_default();
+    let group = |group: gait_charts::Group| Group {
+        id: group.id,
+        heading: group.heading,
+        hint: group.hint,
+        charts: group.figures.iter().map(drawn).collect(),
+    };
+    let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
+    Ok(Everything {
+        groups: groups.into_iter().map(group).collect(),
+        solve: gait_charts::solve(iterations).as_ref().map(drawn),
+        tiles: tiles.as_ref().map(drawn),
+        bounds: bound_use::of(action, gait)?,
+    })
+}
+
+fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
+    let Some(r) = &trial.report else { return Vec::new() };
+    let parts = ["torso", "left hip", "left knee", "left ankle", "right hip"];
+    let parts: Vec<String> =
+        parts.iter().zip(r.gait_rmse_parts_rad).map(|(name, value)| format!("{name} {value:.4}")).collect();
+    let rmse = (trial.state == TrialState::Converged)
+        .then(|| ("Gait RMSE is the sum over coordinates, rad", parts.join(", ")));
+    let solved = [
+        ("Walking speed, m/s", format!("{:.3}", r.speed_m_s)),
+        ("Stride length, m", format!("{:.3}", r.stride_length_m)),
+        ("Stride time, s", format!("{:.3}", r.durations_s.iter().sum::<f64>())),
+        ("Hip velocity in the four runs between impacts, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),
+        (
+            "Size of the problem",
+            format!("{} variables, {} equalities, {} inequalities", r.variables, r.equalities, r.inequalities),
+        ),
+    ];
+    rmse.into_iter().chain(solved).collect()
+}

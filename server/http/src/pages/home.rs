@@ -1,0 +1,133 @@
+//! The list of studies.
+
+use super::error::{Page, page};
+use super::format::{variant, words};
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::SignedIn;
+use crate::may::{May, Refused};
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_charts::sparkline;
+use gaitwright_service::access::{Permission, Rate, Read, sign_in};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::safety_reports;
+use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::trials::TrialCounts;
+use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
+use serde::Deserialize;
+
+/// How many studies the page shows.
+const PAGE: u32 = 100;
+
+#[derive(Template)]
+#[template(path = "home.html")]
+struct Home {
+    /// Whoever asks came by a link that works once, and has no other way in.
+    no_password: bool,
+    /// What goes on only when somebody does something.
+    waiting: Vec<Waiting>,
+    studies: Vec<Row>,
+    /// Whether newer studies come before these.
+    later: bool,
+    /// The last study of this page, when older ones follow.
+    next: Option<StudyId>,
+}
+
+/// Which studies to show.
+#[derive(Debug, Deserialize)]
+pub(super) struct Before {
+    before: Option<StudyId>,
+}
+
+struct Row {
+    study: Study,
+    subject: String,
+    variant: &'static str,
+    counts: TrialCounts,
+    state: String,
+    best_rmse: Option<String>,
+    /// The smallest Gait RMSE so far, trial by trial.
+    course: Option<String>,
+    withdrawn: bool,
+}
+
+struct Waiting {
+    study: Study,
+    what: String,
+    /// Where to do it.
+    link: String,
+}
+
+/// `GET /`: the studies; for whoever may compare gaits and nothing else, that.
+pub(super) async fn get(
+    SignedIn(caller): SignedIn,
+    may: Result<May<Read>, Refused>,
+    State(app): State<AppState>,
+    Params(Before { before }): Params<Before>,
+) -> Result<Response, Refused> {
+    match may {
+        Ok(may) => Ok(show(&app, &may, before).await.into_response()),
+        Err(_) if caller.is_some_and(|caller| caller.may(Rate::NEEDED)) => Ok(Redirect::to("/rate").into_response()),
+        Err(refused) => Err(refused),
+    }
+}
+
+async fn show(app: &AppState, may: &May<Read>, before: Option<StudyId>) -> Page {
+    let reach = may.caller.reach();
+    let mut reader = app.read().await?;
+    let mut found = studies::page(&mut reader, reach, before, PAGE + 1).await?;
+    let more = found.len() > PAGE as usize;
+    found.truncate(PAGE as usize);
+    let next = found.last().filter(|_| more).map(|study| study.id);
+    let mut rows = Vec::new();
+    for study in found {
+        rows.push(row(&mut reader, study).await?);
+    }
+    let unsafe_gaits = safety_reports::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
+    let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
+    let waiting = unsafe_gaits.chain(held).collect();
+    let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
+    page(&Home { no_password, waiting, studies: rows, later: before.is_some(), next })
+}
+
+/// Gaits that somebody called unsafe: staff look at them.
+fn unsafe_gaits((study, count): (Study, usize)) -> Waiting {
+    let what = match count {
+        1 => "a gait was called unsafe: review it".to_owned(),
+        _ => format!("{count} gaits were called unsafe: look at them and decide"),
+    };
+    Waiting { link: format!("/studies/{}", study.id), what, study }
+}
+
+fn waiting(study: Study) -> Waiting {
+    let (what, place) = match study.state {
+        StudyState::Waiting => ("a comparison waits for an answer".to_owned(), "/compare"),
+        // Why stands in the record where the program held it.
+        StudyState::Paused if study.state_reason.is_empty() => {
+            ("held: it goes on when somebody resumes it".to_owned(), "")
+        }
+        StudyState::Paused => (format!("held: it goes on when somebody resumes it ({})", study.state_reason), ""),
+        _ => ("not started yet".to_owned(), ""),
+    };
+    Waiting { link: format!("/studies/{}{place}", study.id), what, study }
+}
+
+async fn row(db: &mut Connection, study: Study) -> Result<Row, Error> {
+    let counts = trials::counts(db, study.id).await?;
+    let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+    let withdrawn = consents::is_withdrawn(db, study.id).await?;
+    let improvements = if withdrawn { Vec::new() } else { trials::improvements(db, study.id).await? };
+    let course: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
+    Ok(Row {
+        state: words(study.state.as_str()),
+        variant: variant(study.plan.muscles),
+        best_rmse: improvements.last().map(|(_, rmse)| format!("{rmse:.4}")),
+        course: sparkline("Smallest Gait RMSE by trial", &course, f64::from(counts.total)),
+        study,
+        subject,
+        counts,
+        withdrawn,
+    })
+}

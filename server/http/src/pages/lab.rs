@@ -1,0 +1,366 @@
+//! Lab sessions: those of a study with the form that plans one, and each with its walks.
+
+use super::drawn::Drawn;
+use super::error::{Page, PageError, page};
+use super::figures::measured_cycles;
+use super::format::{self, words};
+use super::lab_charts;
+use super::lab_recordings::{Forms, Settings};
+use crate::AppState;
+use crate::extract::Form;
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::Id;
+use crate::shown::Shown;
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::emg::{CycleActivity, EmgSettings};
+use gaitwright_charts::Figure;
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::lab::{
+    self, Condition, EmgView, FileForm, NewSession, SessionView, WalkActivity, WalkView,
+};
+use gaitwright_store::lab_recordings::{self, LabRecording, RecordingKind};
+use gaitwright_store::listing::{self, Listed, Listing};
+use gaitwright_store::studies::Study;
+use gaitwright_store::trials::TrialState;
+use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
+use serde::Deserialize;
+
+/// So many gaits are offered: those with the lowest Gait RMSE.
+const OFFERED: u32 = 200;
+
+#[derive(Template)]
+#[template(path = "lab_sessions.html")]
+struct SessionsPage {
+    study: Study,
+    sessions: Vec<(SessionView, String)>,
+    /// Converged trials of the study, the lowest Gait RMSE first, as many as are offered, with what they are called.
+    gaits: Vec<(TrialId, String)>,
+    may_run: bool,
+    fields: Fields,
+    refused: Option<String>,
+}
+
+impl SessionsPage {
+    fn is(chosen: &str, gait: &TrialId) -> bool {
+        chosen == gait.to_string()
+    }
+}
+
+/// The fields as typed, so that a refused form comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Fields {
+    gait_one: String,
+    gait_two: String,
+    notes: String,
+}
+
+impl Fields {
+    fn read(&self) -> Result<NewSession, Error> {
+        let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait of the list"));
+        Ok(NewSession {
+            gait_one: gait("gait_one", &self.gait_one)?,
+            gait_two: gait("gait_two", &self.gait_two)?,
+            notes: self.notes.clone(),
+        })
+    }
+}
+
+/// `GET /studies/{id}/lab`.
+pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Shown(id, _): Shown<StudyId, Read>) -> Page {
+    show_list(&app, id, may.caller.may(Run::NEEDED), Fields::default(), None).await
+}
+
+async fn show_list(app: &AppState, id: StudyId, may_run: bool, fields: Fields, refused: Option<String>) -> Page {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let sessions = lab_sessions::of_study(&mut reader, id).await?;
+    let listing = Listing {
+        sort: "gait_rmse_rad",
+        descending: false,
+        state: Some(TrialState::Converged),
+        contains: String::new(),
+        limit: OFFERED,
+        offset: 0,
+    };
+    let converged = listing::of_study(&mut reader, id, &listing).await?;
+    drop(reader);
+    let named =
+        |trial: Listed| (trial.id, format!("trial {} ({} rad)", trial.number, format::figure(trial.gait_rmse_rad)));
+    let shown = |session| {
+        let view = SessionView::from(&session);
+        let state = words(view.state.as_str());
+        (view, state)
+    };
+    page(&SessionsPage {
+        study,
+        sessions: sessions.into_iter().map(shown).collect(),
+        gaits: converged.into_iter().map(named).collect(),
+        may_run,
+        fields,
+        refused,
+    })
+}
+
+/// `POST /studies/{id}/lab`.
+pub(super) async fn plan(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    Form(fields): Form<Fields>,
+) -> Result<Response, PageError> {
+    let planned = async {
+        let new = fields.read()?;
+        let mut writer = app.write().await?;
+        let session = lab::plan(&mut writer, &may.caller.actor, id, &new).await?;
+        commit(writer).await?;
+        Ok(session.id)
+    };
+    match planned.await {
+        Ok(session) => Ok(Redirect::to(&format!("/lab-sessions/{session}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let form = show_list(&app, id, true, fields, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), form).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}
+
+#[derive(Template)]
+#[template(path = "lab_session.html")]
+struct SessionPage {
+    study: Study,
+    state: String,
+    gaits: [Named; 2],
+    walks: Vec<WalkRow>,
+    may_run: bool,
+    may_unblind: bool,
+    /// Walks that were recorded: what is measured can be brought for them.
+    recorded: Vec<u8>,
+    recordings: Vec<LabRecording>,
+    has_emg: bool,
+    forms: Forms,
+    filters: Settings,
+    measured: Option<Measured>,
+    portraits: Vec<Drawn>,
+    refused: Option<String>,
+    /// What the person who walked said, in words.
+    said: &'static str,
+    session: SessionView,
+}
+
+/// What was made of the electromyograms.
+struct Measured {
+    how: String,
+    walks: Vec<String>,
+    /// Those that are held against the walk without the device.
+    compared: Vec<String>,
+    /// Muscle, its EMG RMSE in the walks that are compared, its average activation in each walk.
+    rows: Vec<(String, Vec<String>, Vec<String>)>,
+    /// Walk, muscle as measured, muscle of the model, RMS difference, correlation.
+    model: Vec<[String; 5]>,
+    /// What makes a comparison doubtful, with the walk.
+    remarks: Vec<String>,
+    charts: Vec<Drawn>,
+}
+
+impl Measured {
+    fn of(session: &SessionView, emg: &EmgView, charts: Vec<Drawn>) -> Self {
+        let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
+        let strides = |walk: &WalkActivity| {
+            let strides = walk.channels.first().map_or(0, |channel| channel.strides);
+            format!("{strides} strides ({})", lab_charts::walk_name(session, walk.walk))
+        };
+        let counts: Vec<String> = emg.result.walks.iter().map(strides).collect();
+        let walks = || emg.result.walks.iter();
+        let name = |walk: &WalkActivity| lab_charts::walk_name(session, walk.walk);
+        let compared: Vec<_> = walks().filter_map(|walk| Some((walk, walk.emg_rmse.as_ref()?))).collect();
+        let channels = emg.result.walks.first().map_or(&[][..], |walk| &walk.channels);
+        let row = |(place, channel): (usize, &CycleActivity)| {
+            let rmse = compared.iter().map(|(_, rmse)| format::figure(rmse.parts.get(place).copied()));
+            let averages = walks().map(|walk| format::figure(walk.averages.get(place).copied()));
+            (lab_charts::muscle_name(&channel.channel).to_owned(), rmse.collect(), averages.collect())
+        };
+        let mut rows: Vec<(String, Vec<String>, Vec<String>)> = channels.iter().enumerate().map(row).collect();
+        let totals = compared.iter().map(|(_, rmse)| format::figure(Some(rmse.total))).collect();
+        rows.push(("all together".to_owned(), totals, walks().map(|_| String::new()).collect()));
+        let model = emg.model.iter().flat_map(|walk| {
+            walk.muscles.iter().map(|muscle| {
+                [
+                    lab_charts::walk_name(session, walk.walk),
+                    lab_charts::muscle_name(&muscle.channel).to_owned(),
+                    muscle.muscle.clone(),
+                    format::figure(Some(muscle.rms_difference)),
+                    muscle.correlation.map_or_else(|| "–".to_owned(), format::signed),
+                ]
+            })
+        });
+        Self {
+            how: format!(
+                "Band-pass {band_low_hz} to {band_high_hz} Hz, rectified, low-pass {envelope_hz} Hz, order {order}, all \
+                 zero-phase; means of {}. Figures are shares of the muscle's peak without the device.",
+                counts.join(", ")
+            ),
+            compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
+            remarks: compared
+                .iter()
+                .flat_map(|(walk, rmse)| rmse.remarks.iter().map(|remark| format!("{}: {remark}", name(walk))))
+                .collect(),
+            walks: walks().map(name).collect(),
+            rows,
+            model: model.collect(),
+            charts,
+        }
+    }
+}
+
+/// A trial with its number.
+struct Named {
+    id: TrialId,
+    number: u32,
+}
+
+struct WalkRow {
+    walk: WalkView,
+    /// What is known of how it is walked.
+    condition: &'static str,
+}
+
+/// `GET /lab-sessions/{id}`.
+pub(super) async fn get(
+    may: May<Read>,
+    State(mut app): State<AppState>,
+    Shown(id, _): Shown<LabSessionId, Read>,
+) -> Page {
+    show(&mut app, id, &may.caller, Forms::default(), None).await
+}
+
+/// The charts of a session.
+struct Drawings {
+    emg: Vec<Drawn>,
+    portraits: Vec<Drawn>,
+}
+
+async fn show(
+    app: &mut AppState,
+    id: LabSessionId,
+    caller: &Caller,
+    mut forms: Forms,
+    refused: Option<String>,
+) -> Page {
+    let emg = lab::emg(app.store_mut(), id).await?;
+    let cycles = measured_cycles(app.store_mut(), id).await?;
+    let mut reader = app.read().await?;
+    let session = SessionView::from(&lab_sessions::get(&mut reader, id).await?);
+    let study = studies::get(&mut reader, session.study_id).await?;
+    let one = trials::get(&mut reader, session.gait_one).await?.number;
+    let two = trials::get(&mut reader, session.gait_two).await?.number;
+    let recordings = lab_recordings::of_session(&mut reader, id).await?;
+    drop(reader);
+    let draw = move |_: &OnPool| {
+        let files = format!("/api/v1/lab-sessions/{id}/figures");
+        let drawn = |figures: &[Figure]| figures.iter().map(|figure| Drawn::of(figure, &files, "")).collect();
+        let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::electromyograms(&session, emg)));
+        let drawings = Drawings { emg: of_emg, portraits: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
+        (session, emg, drawings)
+    };
+    let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
+    page(&SessionPage {
+        study,
+        state: words(session.state.as_str()),
+        gaits: [Named { id: session.gait_one, number: one }, Named { id: session.gait_two, number: two }],
+        walks: session
+            .walks
+            .iter()
+            .map(|walk| WalkRow { walk: walk.clone(), condition: in_words(walk.condition) })
+            .collect(),
+        may_run: caller.may(Run::NEEDED),
+        may_unblind: caller.may(Administer::NEEDED),
+        recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
+        has_emg: recordings.iter().any(|recording| recording.kind == RecordingKind::Electromyogram),
+        recordings,
+        filters: forms
+            .filters
+            .take()
+            .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
+        forms,
+        measured: emg.as_ref().map(|emg| Measured::of(&session, emg, drawings.emg)),
+        portraits: drawings.portraits,
+        refused,
+        said: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
+        session,
+    })
+}
+
+fn in_words(condition: Option<Condition>) -> &'static str {
+    match condition {
+        None => "one of the two gaits: blinded",
+        Some(Condition::Normal) => "without the device",
+        Some(Condition::GaitOne) => "gait one",
+        Some(Condition::GaitTwo) => "gait two",
+    }
+}
+
+/// A note or a reason.
+#[derive(Debug, Deserialize)]
+pub(super) struct Note {
+    #[serde(default)]
+    note: String,
+}
+
+/// `POST /lab-sessions/{id}/close`.
+pub(super) async fn close(
+    may: May<Run>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Run>,
+    Form(Note { note }): Form<Note>,
+) -> Result<Response, PageError> {
+    let done = async {
+        let mut writer = app.write().await?;
+        lab::close(&mut writer, &may.caller.actor, id, &note).await?;
+        Ok(commit(writer).await?)
+    };
+    let done = done.await;
+    answer(&mut app, id, &may.caller, done, Forms::default()).await
+}
+
+/// `POST /lab-sessions/{id}/unblind`.
+pub(super) async fn unblind(
+    may: May<Administer>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Administer>,
+    Form(Note { note }): Form<Note>,
+) -> Result<Response, PageError> {
+    let done = async {
+        let mut writer = app.write().await?;
+        lab::unblind(&mut writer, &may.caller.actor, id, &note).await?;
+        Ok(commit(writer).await?)
+    };
+    let done = done.await;
+    // The learner may have heard something.
+    app.scheduler.changed();
+    answer(&mut app, id, &may.caller, done, Forms::default()).await
+}
+
+/// Shows the session anew; what was refused, with the reason.
+pub(super) async fn answer(
+    app: &mut AppState,
+    id: LabSessionId,
+    caller: &Caller,
+    done: Result<(), Error>,
+    forms: Forms,
+) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let shown = show(app, id, caller, forms, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}

@@ -1,0 +1,100 @@
+//! The charts of a lab session: muscle activity over the cycle, limit cycles.
+
+use gait_optimizer::Gait;
+use gait_optimizer::emg::CycleActivity;
+use gait_optimizer::phase_portrait::JOINTS;
+use gaitwright_charts::gait_charts::orbit;
+use gaitwright_charts::{Chart, Figure, Stroke};
+use gaitwright_service::studies::lab::{Condition, EmgView, LimitCycles, SessionView};
+
+const CYCLE: &str = "gait cycle from right heel strike, %";
+/// What the channels are called.
+const MUSCLES: [(&str, &str); 6] = [
+    ("RF_L", "left rectus femoris"),
+    ("TA_L", "left tibialis anterior"),
+    ("BF_L", "left biceps femoris"),
+    ("GAS_L", "left gastrocnemius"),
+    ("RF_R", "right rectus femoris"),
+    ("BF_R", "right biceps femoris"),
+];
+/// What the joints are called, in the order of [`JOINTS`] and of the gait's coordinates after the place of the hip.
+const JOINT_NAMES: [&str; 7] =
+    ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
+
+/// A walk as it may be called.
+pub(super) fn walk_name(session: &SessionView, walk: u8) -> String {
+    let condition = session.walks.iter().find(|known| known.number == walk).and_then(|known| known.condition);
+    match condition {
+        Some(Condition::Normal) => "without the device".to_owned(),
+        Some(Condition::GaitOne) => "gait one".to_owned(),
+        Some(Condition::GaitTwo) => "gait two".to_owned(),
+        None => format!("walk {walk}"),
+    }
+}
+
+/// What a channel is called.
+pub(super) fn muscle_name(channel: &str) -> &str {
+    MUSCLES.iter().find(|(known, _)| *known == channel).map_or(channel, |(_, name)| name)
+}
+
+/// Muscle activity over the cycle (figure 6 of the paper): a chart per channel, each walk with its deviation, the model
+/// beside it where the gait is known.
+pub(super) fn electromyograms(session: &SessionView, emg: &EmgView) -> Vec<Figure> {
+    let Some(normal) = emg.result.walks.first() else { return Vec::new() };
+    let chart = |(place, channel): (usize, &CycleActivity)| {
+        let mut chart = Chart::new(
+            &format!("EMG, {}", muscle_name(&channel.channel)),
+            CYCLE,
+            "share of the peak without the device",
+        );
+        for walk in &emg.result.walks {
+            let Some(activity) = walk.channels.get(place) else { continue };
+            let name = walk_name(session, walk.walk);
+            let (colour, stroke) = look(walk.walk);
+            let mean = activity.mean.iter().enumerate().map(|(point, value)| (point as f64, *value)).collect();
+            if walk.walk == 1 {
+                let band = activity.mean.iter().zip(&activity.standard_deviation).enumerate();
+                let band = band.map(|(point, (mean, sd))| (point as f64, mean - sd, mean + sd)).collect();
+                chart = chart.with_band("its standard deviation", colour, band);
+            }
+            chart = chart.with(&name, colour, stroke, mean);
+        }
+        for walk in &emg.model {
+            let Some(muscle) = walk.muscles.iter().find(|muscle| muscle.channel == channel.channel) else { continue };
+            let label = format!("model's {} of {}", muscle.muscle, walk_name(session, walk.walk));
+            let line = muscle.activation.iter().enumerate().map(|(point, value)| (point as f64, *value)).collect();
+            chart = chart.with(&label, 2 + usize::from(walk.walk), Stroke::Dashed, line);
+        }
+        Figure::chart("", chart)
+    };
+    normal.channels.iter().enumerate().map(chart).collect()
+}
+
+/// Colour and stroke of a walk.
+fn look(walk: u8) -> (usize, Stroke) {
+    match walk {
+        1 => (7, Stroke::Dashed),
+        2 => (0, Stroke::Solid),
+        _ => (1, Stroke::Solid),
+    }
+}
+
+/// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the orbit of the gait where it is known.
+pub(super) fn limit_cycles(session: &SessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
+    let mut charts = Vec::new();
+    for (place, joint) in JOINTS.iter().enumerate() {
+        for (walk, gait) in measured {
+            let Some(portrait) = walk.joints.iter().find(|portrait| portrait.joint == *joint) else { continue };
+            let name = walk_name(session, walk.walk);
+            let line = portrait.angle_rad.iter().zip(&portrait.velocity_rad_s);
+            let line = line.map(|(angle, velocity)| (angle.to_degrees(), velocity.to_degrees())).collect();
+            let title = format!("{}, {name}", JOINT_NAMES[place]);
+            let mut chart = Chart::new(&title, "angle, °", "velocity, °/s").with("measured", 7, Stroke::Solid, line);
+            if let Some(gait) = gait {
+                chart = chart.with("orbit of the gait", 1, Stroke::Solid, orbit(gait, place + 2));
+            }
+            charts.push(Figure::chart("limit-cycle", chart));
+        }
+    }
+    charts
+}

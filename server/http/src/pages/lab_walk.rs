@@ -1,0 +1,134 @@
+//! The pages in the lab: which walk is next, and which one was better. Nothing here can name a gait.
+
+use super::error::{Page, PageError, page};
+use super::format::walks_in_words;
+use crate::AppState;
+use crate::extract::Form;
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::Id;
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_service::access::Rate;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::lab::{self, InTheLab, NewAnswer, RecordedWalk};
+use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members};
+
+/// So many of the newest open sessions are listed.
+const LISTED: u32 = 100;
+
+#[derive(Template)]
+#[template(path = "lab.html")]
+struct LabPage {
+    /// The open sessions, when they were planned, and what is next: names of studies can say what is tuned.
+    sessions: Vec<(LabSessionId, Instant, String)>,
+    /// Whether whoever asks reaches any study.
+    assigned: bool,
+}
+
+#[derive(Template)]
+#[template(path = "lab_walk.html")]
+struct WalkPage {
+    name: String,
+    /// The answer that stands.
+    said: &'static str,
+    seen: InTheLab,
+    refused: Option<String>,
+    /// The note of a form that was refused.
+    typed: String,
+}
+
+/// `GET /lab`.
+pub(super) async fn list(may: May<Rate>, State(app): State<AppState>) -> Page {
+    let mut reader = app.read().await?;
+    let mut sessions = Vec::new();
+    for session in lab_sessions::open(&mut reader, may.caller.reach(), LISTED).await? {
+        let seen = lab::in_the_lab(&mut reader, session.id).await?;
+        let next = match (seen.walk, seen.asks) {
+            (Some(walk), _) => format!("walk {walk} is next"),
+            (None, Some(_)) => "all walks recorded: which one was better?".to_owned(),
+            (None, None) => "all walks recorded, and answered".to_owned(),
+        };
+        sessions.push((session.id, session.created_at, next));
+    }
+    let assigned = members::reaches_any(&mut reader, may.caller.reach()).await?;
+    page(&LabPage { sessions, assigned })
+}
+
+/// `GET /lab/{id}`.
+pub(super) async fn get(_: May<Rate>, State(app): State<AppState>, Id(id, _): Id<LabSessionId, Rate>) -> Page {
+    show(&app, id, None, String::new()).await
+}
+
+async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> Page {
+    let seen = lab::in_the_lab(&mut *app.read().await?, id).await?;
+    let said = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
+    page(&WalkPage { name: id.short(), said, seen, refused, typed })
+}
+
+/// `POST /lab/{id}`.
+pub(super) async fn record(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+    Form(walked): Form<RecordedWalk>,
+) -> Result<Response, PageError> {
+    let recorded = async {
+        let mut writer = app.write().await?;
+        if !lab::was_recorded(&mut writer, id, &walked).await? {
+            lab::record_walk(&mut writer, &may.caller.actor, id, &walked).await?;
+            commit(writer).await?;
+        }
+        Ok(())
+    };
+    read_back(&app, id, recorded.await, walked.note).await
+}
+
+/// `POST /lab/{id}/answer`.
+pub(super) async fn answer(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+    Form(new): Form<NewAnswer>,
+) -> Result<Response, PageError> {
+    let answered = async {
+        let mut writer = app.write().await?;
+        lab::answer(&mut writer, &may.caller, id, &new).await?;
+        commit(writer).await?;
+        app.scheduler.changed();
+        Ok(())
+    };
+    read_back(&app, id, answered.await, new.note).await
+}
+
+/// `POST /lab/{id}/take-back`.
+pub(super) async fn take_back(
+    may: May<Rate>,
+    State(app): State<AppState>,
+    Id(id, _): Id<LabSessionId, Rate>,
+) -> Result<Response, PageError> {
+    let taken_back = async {
+        let mut writer = app.write().await?;
+        lab::take_back(&mut writer, &may.caller, id).await?;
+        Ok(commit(writer).await?)
+    };
+    read_back(&app, id, taken_back.await, String::new()).await
+}
+
+/// What the record says now; what was refused, with the reason and the note that was typed.
+async fn read_back(
+    app: &AppState,
+    id: LabSessionId,
+    done: Result<(), Error>,
+    typed: String,
+) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/lab/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let shown = show(app, id, Some(error.to_string()), typed).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}

@@ -1,0 +1,163 @@
+//! Who reaches a study: a page with its members, and the forms that add and remove them.
+
+use super::error::{Page, PageError, page};
+use super::people::origin;
+use crate::AppState;
+use crate::client_address::Secure;
+use crate::extract::Form;
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::{Id, Named};
+use askama::Template;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};
+use gaitwright_store::members::{Member, MemberKind};
+use gaitwright_store::studies::Study;
+use gaitwright_store::{MemberId, StudyId, Writer, commit, studies};
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "study_members.html")]
+struct MembersPage {
+    study: Study,
+    access: StudyAccess,
+    /// Who can be added: what the form sends, and what people read.
+    candidates: Vec<(String, String)>,
+    may_run: bool,
+    may_administer: bool,
+    /// A link that was just made, shown this once: whose, and itself.
+    link: Option<(String, String)>,
+    refused: Option<String>,
+    /// The name of a refused invitation.
+    typed: String,
+}
+
+impl MembersPage {
+    fn role(member: &Member) -> &'static str {
+        member.role.map_or("token", gaitwright_service::access::Role::as_str)
+    }
+}
+
+/// `GET /studies/{id}/members`.
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<StudyId, Read>) -> Page {
+    show(&app, &may.caller, id, Shown::default()).await
+}
+
+/// What stands on the page besides the members.
+#[derive(Default)]
+struct Shown {
+    link: Option<(String, String)>,
+    refused: Option<String>,
+    typed: String,
+}
+
+async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: Shown) -> Page {
+    let mut reader = app.read().await?;
+    let study = studies::get(&mut reader, id).await?;
+    let access = membership::access(&mut reader, id).await?;
+    let may_run = caller.may(Run::NEEDED);
+    let candidates = if may_run { membership::candidates(&mut reader, &access.members).await? } else { Vec::new() };
+    let candidates = candidates.into_iter().map(|(kind, name, what)| {
+        let kind = if kind == MemberKind::User { "user" } else { "token" };
+        (format!("{kind} {name}"), format!("{name} ({what})"))
+    });
+    page(&MembersPage {
+        study,
+        access,
+        candidates: candidates.collect(),
+        may_run,
+        may_administer: caller.may(Administer::NEEDED),
+        link: shown.link,
+        refused: shown.refused,
+        typed: shown.typed,
+    })
+}
+
+/// What a form asks for.
+#[derive(Debug, Deserialize)]
+pub(super) struct Asked {
+    act: String,
+    /// `user R1` or `token rig`.
+    #[serde(default)]
+    who: String,
+    /// A membership.
+    #[serde(default)]
+    member: String,
+    /// A rater to invite.
+    #[serde(default)]
+    name: String,
+}
+
+/// `POST /studies/{id}/members`. A link is in the answer itself: it is not stored, and a reload does not make another one
+/// without asking.
+pub(super) async fn post(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<StudyId, Run>,
+    secure: Secure,
+    headers: HeaderMap,
+    Form(asked): Form<Asked>,
+) -> Result<Response, PageError> {
+    let mut writer = app.write().await?;
+    match act(&mut writer, &may.caller, id, &asked).await {
+        Ok(invited) => {
+            commit(writer).await?;
+            app.scheduler.changed();
+            let Some((name, secret)) = invited else {
+                // Whoever removed himself does not reach the study any more.
+                return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
+            };
+            let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
+            Ok(show(&app, &may.caller, id, Shown { link, ..Shown::default() }).await?.into_response())
+        }
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
+            drop(writer);
+            let shown = Shown { refused: Some(error.to_string()), typed: asked.name, link: None };
+            Ok((Problem::from(&error).status(), show(&app, &may.caller, id, shown).await?).into_response())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Does it; name and secret of a one-time link, if one was made.
+async fn act(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    asked: &Asked,
+) -> Result<Option<(String, String)>, Error> {
+    match asked.act.as_str() {
+        "add" => {
+            let unknown = || Error::invalid("who", asked.who.as_str(), "a user or token of the list");
+            let (kind, name) = asked.who.split_once(' ').ok_or_else(unknown)?;
+            let kind = match kind {
+                "user" => MemberKind::User,
+                "token" => MemberKind::Token,
+                _ => return Err(unknown()),
+            };
+            membership::add(writer, &caller.actor, study, &NewMember { kind, name: name.to_owned() }).await?;
+            Ok(None)
+        }
+        "remove" => {
+            let unknown = |_| Error::invalid("member", asked.member.as_str(), "a member of this page");
+            let member: Named<MemberId> = asked.member.parse().map_err(unknown)?;
+            let member = member.reached(writer, caller.reach()).await?;
+            membership::end(writer, &caller.actor, member).await?;
+            Ok(None)
+        }
+        "restrict" | "open" => {
+            membership::restrict(writer, caller, study, asked.act == "restrict").await?;
+            Ok(None)
+        }
+        "invite" if caller.may(Administer::NEEDED) => {
+            let (user, _, secret) = membership::invite(writer, &caller.actor, study, &asked.name).await?;
+            Ok(Some((user.name, secret)))
+        }
+        "invite" => Err(Error::Forbidden("administrators make sign-in links".to_owned())),
+        other => Err(Error::invalid("act", other, "add, remove, restrict, open, invite")),
+    }
+}

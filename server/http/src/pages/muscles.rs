@@ -1,0 +1,156 @@
+//! The muscles of a person: the form for measured values that override the published table.
+
+use super::error::{Page, PageError, page};
+use super::format;
+use crate::AppState;
+use crate::extract::Form;
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::Id;
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::muscle::{MuscleField, MuscleOverride, MuscleParameters};
+use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::studies::person;
+use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::{SubjectId, commit};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+/// What kinds of muscles are called.
+const KINDS: [(&str, &str); 7] = [
+    ("ham", "hamstrings"),
+    ("glu", "gluteus"),
+    ("hfl", "hip flexors"),
+    ("gas", "gastrocnemius"),
+    ("vas", "vasti"),
+    ("sol", "soleus"),
+    ("ta", "tibialis anterior"),
+];
+
+/// What was typed, by the name of the field.
+type Typed = BTreeMap<String, String>;
+
+#[derive(Template)]
+#[template(path = "muscles.html")]
+struct MusclesPage {
+    subject: Subject,
+    columns: [MuscleField; 7],
+    rows: Vec<Row>,
+    scaled_to_body: bool,
+    may_run: bool,
+    refused: Option<FieldError>,
+}
+
+struct Row {
+    name: &'static str,
+    cells: Vec<Cell>,
+}
+
+/// One number of a kind of muscle.
+struct Cell {
+    /// `sol_max_force_n`.
+    field: String,
+    label: String,
+    typed: String,
+    /// What holds where nothing is typed; none: the muscle does not span that joint.
+    otherwise: Option<String>,
+    refused: bool,
+}
+
+/// The page with what is in force, or with what was typed and refused.
+fn shown(
+    subject: Subject,
+    muscles: &MuscleParameters,
+    may_run: bool,
+    refusal: Option<(&Typed, FieldError)>,
+) -> MusclesPage {
+    let (typed, refused) = refusal.map_or((None, None), |(typed, refused)| (Some(typed), Some(refused)));
+    let scaled_to_body = typed.map_or(muscles.scaled_to_body, |typed| typed.contains_key("scaled_to_body"));
+    let unchanged = MuscleParameters { scaled_to_body, ..MuscleParameters::default() };
+    let body = subject.body();
+    let row = |&(kind, name): &(&str, &'static str)| {
+        let otherwise = unchanged.muscle_of_kind(&body, kind);
+        let given = muscles.overrides().into_iter().find(|(known, _)| *known == kind).map(|(_, given)| *given);
+        let cell = |column: &MuscleField| {
+            let field = format!("{kind}_{}", column.name);
+            let kept = given.as_ref().and_then(column.given).map(|value| value.to_string());
+            Cell {
+                label: format!("{name}: {}", column.meaning),
+                typed: typed.map_or(kept, |typed| typed.get(&field).cloned()).unwrap_or_default(),
+                otherwise: otherwise.as_ref().and_then(column.value).map(format::number),
+                refused: refused.as_ref().is_some_and(|refused| is_of(&refused.field, &field)),
+                field,
+            }
+        };
+        Row { name, cells: MuscleOverride::FIELDS.iter().map(cell).collect() }
+    };
+    let rows = KINDS.iter().map(row).collect();
+    MusclesPage { subject, columns: MuscleOverride::FIELDS, rows, scaled_to_body, may_run, refused }
+}
+
+/// `muscles.sol.max_force_n` is the field `sol_max_force_n`.
+fn is_of(refused: &str, field: &str) -> bool {
+    refused.trim_start_matches("muscles.").replacen('.', "_", 1) == field
+}
+
+/// `GET /subjects/{id}/muscles`.
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<SubjectId, Read>) -> Page {
+    let mut reader = app.read().await?;
+    let subject = subjects::get(&mut reader, id).await?;
+    let muscles = subjects::muscles(&mut reader, id).await?;
+    drop(reader);
+    page(&shown(subject, &muscles, may.caller.may(Run::NEEDED), None))
+}
+
+/// `POST /subjects/{id}/muscles`.
+pub(super) async fn post(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    Form(typed): Form<Typed>,
+) -> Result<Response, PageError> {
+    let mut writer = app.write().await?;
+    let subject = subjects::get(&mut writer, id).await?;
+    let before = subjects::muscles(&mut writer, id).await?;
+    let set = match read(&typed) {
+        Ok(muscles) => person::set_muscles(&mut writer, &may.caller.actor, id, &muscles).await,
+        Err(error) => Err(error),
+    };
+    match set {
+        Ok(()) => {
+            commit(writer).await?;
+            Ok(Redirect::to(&format!("/subjects/{id}/muscles")).into_response())
+        }
+        Err(Error::Invalid(refused)) => {
+            let status = Problem::from(&Error::Invalid(refused.clone())).status();
+            let form = page(&shown(subject, &before, true, Some((&typed, *refused))))?;
+            Ok((status, form).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}
+
+/// What is typed, as a document; an empty field is none.
+fn read(typed: &Typed) -> Result<MuscleParameters, Error> {
+    let mut document = Map::new();
+    for (field, text) in typed.iter().filter(|(_, text)| !text.trim().is_empty()) {
+        if field == "scaled_to_body" {
+            document.insert(field.clone(), json!(true));
+            continue;
+        }
+        let part = field.split_once('_').filter(|(kind, name)| {
+            KINDS.iter().any(|(known, _)| known == kind) && MuscleOverride::FIELDS.iter().any(|f| f.name == *name)
+        });
+        let (kind, name) = part.ok_or_else(|| Error::invalid(field, text.as_str(), "a field of this form"))?;
+        let value: f64 =
+            text.trim().parse().map_err(|_| Error::invalid(field, text.as_str(), "a number, or nothing"))?;
+        let of_kind = document.entry(kind).or_insert_with(|| json!({}));
+        if let Value::Object(of_kind) = of_kind {
+            of_kind.insert(name.to_owned(), json!(value));
+        }
+    }
+    serde_json::from_value(Value::Object(document)).map_err(|e| Error::Internal(e.to_string()))
+}

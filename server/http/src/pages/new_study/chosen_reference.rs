@@ -1,0 +1,82 @@
+//! The reference gait that is chosen in the form for a new study: whether another one is nearer to the subject, and what
+//! it looks like.
+
+use super::super::drawn::Drawn;
+use askama::Template;
+use gaitwright_charts::{Chart, Stroke};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::recording::{self, Match};
+use gaitwright_store::reference_gaits::ReferenceGait;
+use gaitwright_store::studies::StudyPlan;
+use gaitwright_store::{Connection, ReferenceGaitId};
+
+/// The angles of a reference gait, by column.
+const ANGLES: [&str; 5] = ["torso lean", "left hip", "left knee", "left ankle", "right hip"];
+
+#[derive(Template)]
+#[template(path = "chosen_reference.html")]
+struct ChosenReference {
+    nearest: String,
+    /// Of some reference gait the distance is known.
+    measured: bool,
+    chart: Drawn,
+}
+
+/// Every reference gait as seen from the subject of a study, and which one the study has.
+pub(super) struct Choice {
+    matches: Vec<Match>,
+    chosen: ReferenceGaitId,
+}
+
+impl Choice {
+    pub(super) async fn read(db: &mut Connection, plan: &StudyPlan) -> Result<Self, Error> {
+        let matches = match &plan.body {
+            Some(body) => recording::matches(db, body).await?,
+            None => Vec::new(),
+        };
+        Ok(Self { matches, chosen: plan.reference_gait_id })
+    }
+
+    /// As a part of the page.
+    pub(super) fn shown(&self) -> Result<String, Error> {
+        let chosen = self.matches.iter().find(|found| found.reference_gait.id == self.chosen);
+        let Some(chosen) = chosen else { return Ok(String::new()) };
+        let chart = Drawn::new(&chart(&chosen.reference_gait));
+        let measured = self.matches.iter().any(|found| found.distance.is_some());
+        let part = ChosenReference { nearest: nearest(&self.matches, chosen), measured, chart };
+        part.render().map_err(|e| Error::Internal(e.to_string()))
+    }
+}
+
+/// What the matcher says, nearest first.
+fn nearest(matches: &[Match], chosen: &Match) -> String {
+    let known = matches.iter().filter(|found| found.distance.is_some()).count();
+    let away = |found: &Match| found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"));
+    match matches.first() {
+        _ if known == 0 => {
+            let why = "Height and body mass are not both known of any reference gait, so none can be proposed as the nearest.";
+            format!("{why} Taken: {}.", chosen.reference_gait.name)
+        }
+        Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
+            let name = &first.reference_gait.name;
+            format!("{name}: the nearest to the subject in height and body mass{}.", away(first))
+        }
+        Some(first) => format!(
+            "Nearer to the subject in height and body mass: {}{}, and not this one{}.",
+            first.reference_gait.name,
+            away(first),
+            away(chosen)
+        ),
+        None => String::new(),
+    }
+}
+
+/// All angles over one stride.
+fn chart(reference: &ReferenceGait) -> Chart {
+    let chart = Chart::new("The reference gait", "gait cycle from right heel strike, %", "angle, °");
+    ANGLES.iter().enumerate().fold(chart, |chart, (column, name)| {
+        let rows = reference.definition.angles_rad.iter().enumerate();
+        let line = rows.map(|(row, angles)| (row as f64, angles[column].to_degrees())).collect();
+        chart.with(name, column, Stroke::APART[column % Stroke::APART.len()], line)
+    })
+}

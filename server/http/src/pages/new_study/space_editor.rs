@@ -1,0 +1,156 @@
+//! The editor of the search space: which bounds are tuned, over which values, and what the others are.
+
+use gait_learner::{Dimension, LearnerError, SearchSpace};
+use gait_optimizer::TunedBounds;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::search::TABLE_I;
+use std::collections::BTreeMap;
+
+/// One bound as typed.
+pub(super) struct BoundRow {
+    pub(super) name: &'static str,
+    pub(super) meaning: &'static str,
+    pub(super) allowed: String,
+    pub(super) tuned: bool,
+    pub(super) values: String,
+    pub(super) lengthscale: String,
+    pub(super) fixed: String,
+}
+
+/// The editor as typed.
+pub(super) struct SpaceEditor {
+    pub(super) rows: Vec<BoundRow>,
+}
+
+impl SpaceEditor {
+    /// What was typed; all of Table I where nothing was.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] for a field that the form does not have.
+    pub(super) fn typed(fields: &BTreeMap<String, String>) -> Result<Self, Error> {
+        let known = |field: &str| {
+            let parts = field.split_once('_');
+            parts.is_some_and(|(part, bound)| {
+                ["tuned", "values", "lengthscale", "fixed"].contains(&part) && TunedBounds::NAMES.contains(&bound)
+            })
+        };
+        if let Some(field) = fields.keys().find(|field| !known(field)) {
+            return Err(Error::Malformed(format!("unknown field {field}")));
+        }
+        let defaults = TunedBounds::default().to_array();
+        let row = |(bound, (name, values, lengthscale)): (usize, &(&'static str, &[f64], f64))| {
+            let (low, high) = TunedBounds::RANGES[bound];
+            let text = |part: &str, preset: String| fields.get(&format!("{part}_{name}")).cloned().unwrap_or(preset);
+            let preset: Vec<String> = values.iter().map(f64::to_string).collect();
+            BoundRow {
+                name,
+                meaning: TunedBounds::MEANINGS[bound],
+                allowed: format!("{low} to {high}"),
+                tuned: fields.is_empty() || fields.contains_key(&format!("tuned_{name}")),
+                values: text("values", preset.join(", ")),
+                lengthscale: text("lengthscale", lengthscale.to_string()),
+                fixed: text("fixed", defaults[bound].to_string()),
+            }
+        };
+        Ok(Self { rows: TABLE_I.iter().enumerate().map(row).collect() })
+    }
+
+    /// The search space, and the values of the bounds that are not tuned.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field.
+    pub(super) fn read(&self) -> Result<(SearchSpace, TunedBounds), Error> {
+        let mut fixed = TunedBounds::default();
+        let mut dimensions = Vec::new();
+        for row in &self.rows {
+            if !row.tuned {
+                let field = format!("fixed_{}", row.name);
+                let value = number(&field, &row.fixed, &row.allowed)?;
+                fixed.set(row.name, value).map_err(|_| Error::invalid(&field, value, &row.allowed))?;
+                continue;
+            }
+            let field = format!("values_{}", row.name);
+            let parts = row.values.split([',', ';', ' ']).filter(|part| !part.is_empty());
+            let values = parts.map(|part| number(&field, part, &row.allowed)).collect::<Result<Vec<f64>, _>>()?;
+            for &value in &values {
+                fixed.clone().set(row.name, value).map_err(|_| Error::invalid(&field, value, &row.allowed))?;
+            }
+            let lengthscale = number(&format!("lengthscale_{}", row.name), &row.lengthscale, "a number above 0")?;
+            dimensions.push(Dimension { name: row.name.to_owned(), values, lengthscale });
+        }
+        let space = SearchSpace::new(dimensions).map_err(|error| match error {
+            LearnerError::NoDimension => Error::invalid("tuned_a1", "no bound", "at least one bound that is tuned"),
+            LearnerError::InvalidDimension { dimension, reason } => Error::invalid(
+                &format!("values_{dimension}"),
+                self.values_of(&dimension),
+                &format!("increasing values; here {reason}"),
+            ),
+            LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
+                Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))
+            }
+            other => Error::Learner(other),
+        })?;
+        Ok((space, fixed))
+    }
+
+    fn values_of(&self, name: &str) -> String {
+        self.rows.iter().find(|row| row.name == name).map(|row| row.values.clone()).unwrap_or_default()
+    }
+}
+
+fn number(field: &str, text: &str, allowed: &str) -> Result<f64, Error> {
+    let value: Option<f64> = text.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    value.ok_or_else(|| Error::invalid(field, text, allowed))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::panic)]
+    use super::*;
+    use gaitwright_service::studies::search::table_i;
+
+    fn typed(fields: &[(&str, &str)]) -> BTreeMap<String, String> {
+        fields.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect()
+    }
+
+    fn refused(fields: &[(&str, &str)]) -> String {
+        match SpaceEditor::typed(&typed(fields)).and_then(|editor| editor.read()) {
+            Err(Error::Invalid(field)) => field.field,
+            other => format!("{:?}", other.map(|_| ())),
+        }
+    }
+
+    #[test]
+    fn nothing_typed_is_table_i() {
+        let (space, fixed) = SpaceEditor::typed(&BTreeMap::new()).unwrap().read().unwrap();
+        assert_eq!((space, fixed), (table_i().unwrap(), TunedBounds::default()));
+    }
+
+    #[test]
+    fn one_bound_is_tuned_and_another_one_fixed() {
+        let fields = typed(&[("tuned_a5", "on"), ("values_a5", "0; 0.02 0.04"), ("fixed_a6", "0.25")]);
+        let (space, fixed) = SpaceEditor::typed(&fields).unwrap().read().unwrap();
+        assert_eq!(space.dimensions().len(), 1);
+        assert_eq!(space.dimensions()[0].values, [0.0, 0.02, 0.04]);
+        assert_eq!(fixed, TunedBounds { a6: 0.25, ..TunedBounds::default() });
+    }
+
+    #[test]
+    fn a_range_is_told_without_the_noise_of_its_last_digits() {
+        let fields = typed(&[("tuned_a3", "on"), ("lengthscale_a3", "0")]);
+        let Err(Error::Invalid(field)) = SpaceEditor::typed(&fields).and_then(|editor| editor.read()) else { panic!() };
+        assert_eq!((field.field.as_str(), field.allowed.as_deref()), ("lengthscale_a3", Some("0.001 to 2000")));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, high")]), "values_a5");
+        assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, 7")]), "values_a5");
+        assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "")]), "values_a5");
+        assert_eq!(refused(&[("tuned_a5", "on"), ("lengthscale_a5", "wide")]), "lengthscale_a5");
+        assert_eq!(refused(&[("tuned_a1", "on"), ("lengthscale_a1", "-5")]), "lengthscale_a1");
+        assert_eq!(refused(&[("tuned_a5", "on"), ("fixed_a6", "NaN")]), "fixed_a6");
+        assert_eq!(refused(&[("fixed_a6", "0.1")]), "tuned_a1");
+        assert!(matches!(SpaceEditor::typed(&typed(&[("values_a9", "1")])), Err(Error::Malformed(_))));
+    }
+}

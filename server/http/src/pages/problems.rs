@@ -1,0 +1,26 @@
+//! What the kinds of problems mean: the addresses that problem documents name as their type.
+
+use super::error::{Page, page};
+use crate::problem_kinds::{Entry, Kind};
+use askama::Template;
+use axum::extract::Path;
+use gaitwright_service::error::Error;
+
+#[derive(Template)]
+#[template(path = "problems.html")]
+struct ProblemsPage {
+    entries: Vec<Entry>,
+    /// One kind alone, or all of them.
+    one: bool,
+}
+
+/// `GET /problems`.
+pub(super) async fn list() -> Page {
+    page(&ProblemsPage { entries: Kind::ALL.map(Kind::entry).to_vec(), one: false })
+}
+
+/// `GET /problems/{name}`.
+pub(super) async fn get(Path(name): Path<String>) -> Page {
+    let kind = Kind::named(&name).ok_or(Error::NotFound { what: "the kind of problem".to_owned(), id: name })?;
+    page(&ProblemsPage { entries: vec![kind.entry()], one: true })
+}

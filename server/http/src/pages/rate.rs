@@ -1,0 +1,275 @@
+//! The pages of a rater: what is open, and one blind pair. Nothing here can name a trial.
+
+use super::error::{Page, PageError, page};
+use super::format::words;
+use crate::AppState;
+use crate::blind_motion::{blind_stride, phase};
+use crate::extract::{Form, Params};
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::Id;
+use askama::Template;
+use axum::extract::{Path, State};
+use axum::response::{IntoResponse, Redirect, Response};
+use gait_optimizer::Gait;
+use gait_optimizer::walking::stick_figure::StickFigure;
+use gaitwright_charts::gait_tiles;
+use gaitwright_service::access::{Caller, Rate, sign_in};
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::blind::{self, RaterAnswer};
+use gaitwright_store::allocations::Sided;
+use gaitwright_store::presentations::{self, Judgement, Presentation};
+use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::{Connection, Packed, StudyId, commit, consents, gaits, members, studies};
+use serde::Deserialize;
+
+/// So many of the newest studies are searched for a rater's newest answer.
+const SEARCHED: u32 = 200;
+
+#[derive(Template)]
+#[template(path = "rate.html")]
+struct RatePage {
+    studies: Vec<(StudyId, String)>,
+    /// Whether whoever asks reaches any study.
+    assigned: bool,
+    nothing: bool,
+    /// What was just answered or, without that, the newest answer as long as it can be taken back.
+    saved: Option<Saved>,
+    /// Whether whoever asks may read, and so could know which gait is which.
+    not_blind: bool,
+    /// Whoever asks came by a link that works once, and has no other way in.
+    no_password: bool,
+}
+
+/// An answer as read back from the record.
+struct Saved {
+    token: String,
+    number: u32,
+    words: String,
+    at: String,
+    can_be_taken_back: bool,
+}
+
+impl Saved {
+    /// Whether it was taken back, or the program took it away.
+    fn is_withdrawn(&self) -> bool {
+        self.words == Judgement::Withdrawn.as_str()
+    }
+}
+
+#[derive(Template)]
+#[template(path = "rate_pair.html")]
+struct PairPage {
+    token: String,
+    number: u32,
+    /// Whether whoever asks may read, and so could know which gait is which.
+    not_blind: bool,
+    /// The answer, if it was given.
+    saved: Option<Saved>,
+    /// Why what was sent now was not taken.
+    refused: Option<String>,
+    /// Both strides, unless they cannot be drawn.
+    strides: Option<[Stride; 2]>,
+}
+
+impl PairPage {
+    /// How long the stride of a side takes, s; nothing where it cannot be told.
+    fn seconds(&self, side: usize) -> &str {
+        self.strides.as_ref().and_then(|strides| strides.get(side)).map_or("", |stride| stride.seconds.as_str())
+    }
+}
+
+/// One of the two gaits.
+struct Stride {
+    /// How long the stride takes, s: to the hundredth, as more would be a fingerprint.
+    seconds: String,
+    /// The stride as pictures, for those without scripts.
+    picture: String,
+}
+
+impl Stride {
+    fn of(figures: &[StickFigure]) -> Option<Self> {
+        let seconds = figures.last()?.time_s - figures.first()?.time_s;
+        Some(Self { seconds: format!("{seconds:.2}"), picture: gait_tiles(figures) })
+    }
+}
+
+/// What was done before this page.
+#[derive(Debug, Deserialize)]
+pub(super) struct Before {
+    #[serde(default)]
+    nothing: bool,
+    /// The pair that was just answered.
+    saved: Option<String>,
+}
+
+/// `GET /rate`: the studies that may ask for a comparison.
+pub(super) async fn list(may: May<Rate>, State(app): State<AppState>, Params(before): Params<Before>) -> Page {
+    let mut reader = app.read().await?;
+    let saved = match before.saved {
+        Some(token) => {
+            let shown = blind::own(&mut reader, &may.caller, &token).await?;
+            read_back(&mut reader, shown).await?
+        }
+        None => newest(&mut reader, &may.caller).await?,
+    };
+    let reach = may.caller.reach();
+    let studies = studies::asking_raters(&mut reader, reach)
+        .await?
+        .into_iter()
+        // Names can say what is tuned: a rater sees the end of the identifier.
+        .map(|study| (study.id, study.id.short()))
+        .collect();
+    let no_password = sign_in::has_no_password(&mut reader, &may.caller).await?;
+    let assigned = members::reaches_any(&mut reader, reach).await?;
+    let not_blind = blind::sees_gaits(&may.caller);
+    page(&RatePage { studies, assigned, nothing: before.nothing, saved, not_blind, no_password })
+}
+
+/// A rater's newest answer, if it can be taken back.
+async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<Saved>, Error> {
+    let mut newest: Option<Presentation> = None;
+    for study in studies::page(db, caller.reach(), None, SEARCHED).await? {
+        if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
+            continue;
+        }
+        let own = presentations::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);
+        newest = newest.into_iter().chain(own).max_by_key(|shown| shown.answered_at);
+    }
+    let Some(shown) = newest else { return Ok(None) };
+    let shown = match blind::own(db, caller, &shown.token).await {
+        // Its sides are not in this record.
+        Err(Error::NotFound { .. }) => return Ok(None),
+        shown => shown?,
+    };
+    Ok(read_back(db, shown).await?.filter(|saved| saved.can_be_taken_back))
+}
+
+async fn read_back(db: &mut Connection, shown: Sided) -> Result<Option<Saved>, Error> {
+    let can_be_taken_back = blind::can_be_taken_back(db, &shown.presentation).await?;
+    Ok(shown.answer().zip(shown.presentation.answered_at).map(|(said, at)| Saved {
+        words: words(said.as_str()),
+        at: at.minute(),
+        number: shown.presentation.number,
+        token: shown.presentation.token,
+        can_be_taken_back,
+    }))
+}
+
+/// `POST /rate/{id}`: takes the next pair.
+pub(super) async fn next(
+    may: May<Rate>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<StudyId, Rate>,
+) -> Result<Redirect, PageError> {
+    let (writer, shown) = blind::next(app.store_mut(), &may.caller, id).await?;
+    commit(writer).await?;
+    Ok(match shown {
+        Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.presentation.token)),
+        None => Redirect::to("/rate?nothing=true"),
+    })
+}
+
+/// `GET /rate/pair/{token}`.
+pub(super) async fn pair(may: May<Rate>, State(mut app): State<AppState>, Path(token): Path<String>) -> Page {
+    show(&mut app, &may.caller, &token, None).await
+}
+
+async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> Page {
+    let mut reader = app.read().await?;
+    let shown = blind::own(&mut reader, caller, token).await?;
+    let (token, number) = (shown.presentation.token.clone(), shown.presentation.number);
+    let not_blind = shown.presentation.unblinded
+        || blind::could_have_known(&mut reader, caller, shown.presentation.study_id).await?;
+    if shown.presentation.answer.is_some() {
+        let saved = read_back(&mut reader, shown).await?;
+        return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
+    }
+    let mut pair = Vec::new();
+    let (first, second) = shown.shown();
+    for trial in [first, second] {
+        // What is missing here is said by the animation, without a word that could tell which gait it was.
+        pair.extend(gaits::get(&mut reader, trial).await.ok());
+    }
+    drop(reader);
+    let phase = phase(&token);
+    let strides = app.compute(move |pool| {
+        let stride = |gait: &Packed<Gait>| {
+            let figures = blind_stride(&gait.unpack(pool).ok()?, phase).ok()?;
+            Stride::of(&figures)
+        };
+        match &pair[..] {
+            [first, second] => stride(first).zip(stride(second)).map(|(first, second)| [first, second]),
+            _ => None,
+        }
+    });
+    let strides = strides.await.map_err(Error::from)?;
+    page(&PairPage { token, number, not_blind, saved: None, refused, strides })
+}
+
+/// The form of a pair.
+#[derive(Debug, Deserialize)]
+pub(super) struct Submitted {
+    answer: Judgement,
+    #[serde(default)]
+    note: String,
+    #[serde(default)]
+    response_ms: String,
+}
+
+/// `POST /rate/pair/{token}`.
+pub(super) async fn answer(
+    may: May<Rate>,
+    State(mut app): State<AppState>,
+    Path(token): Path<String>,
+    Form(form): Form<Submitted>,
+) -> Result<Response, PageError> {
+    let given = RaterAnswer { answer: form.answer, response_ms: form.response_ms.trim().parse().ok(), note: form.note };
+    let answered = async {
+        let mut writer = app.write().await?;
+        // The same form sent twice, by a double click or after a lost answer, is one answer.
+        let before = blind::own(&mut writer, &may.caller, &token).await?.answer();
+        if before != Some(given.answer) {
+            blind::answer(&mut writer, &may.caller, &token, &given).await?;
+            commit(writer).await?;
+            app.scheduler.changed();
+        }
+        Ok(())
+    };
+    let answered = answered.await;
+    told(&mut app, &may.caller, &token, answered).await
+}
+
+/// `POST /rate/pair/{token}/take-back`.
+pub(super) async fn take_back(
+    may: May<Rate>,
+    State(mut app): State<AppState>,
+    Path(token): Path<String>,
+) -> Result<Response, PageError> {
+    let taken_back = async {
+        let mut writer = app.write().await?;
+        blind::take_back(&mut writer, &may.caller, &token).await?;
+        commit(writer).await?;
+        app.scheduler.changed();
+        Ok(())
+    };
+    let taken_back = taken_back.await;
+    told(&mut app, &may.caller, &token, taken_back).await
+}
+
+/// What was done; what was refused because of what was done before, on the page of the pair.
+async fn told(
+    app: &mut AppState,
+    caller: &Caller,
+    token: &str,
+    done: Result<(), Error>,
+) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/rate?saved={token}")).into_response()),
+        Err(error @ Error::Conflict(_)) => {
+            let shown = show(app, caller, token, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}

@@ -1,0 +1,164 @@
+//! Reference gaits: the list with the form that imports one, and each with its curves.
+
+use super::drawn::Drawn;
+use super::error::{Page, PageError, page};
+use super::figures;
+use crate::AppState;
+use crate::extract::{Form as Submitted, Params};
+use crate::may::May;
+use crate::reached::Id;
+use askama::Template;
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::studies::recording::{self, Form, Match, NewReferenceGait, Strikes, Unit};
+use gaitwright_store::reference_gaits::{self, ReferenceGait};
+use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::{Connection, ReferenceGaitId, SubjectId, commit};
+use serde::Deserialize;
+use std::str::FromStr;
+
+/// The fields as typed, so that a refused form comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Fields {
+    name: String,
+    form: Form,
+    recording: String,
+    unit: String,
+    force_column: String,
+    forces: String,
+    strikes: Strikes,
+    heel_strikes_s: String,
+    height_m: String,
+    body_mass_kg: String,
+}
+
+impl Fields {
+    fn read(&self) -> Result<NewReferenceGait, Error> {
+        let given = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
+        let size = |field, text: &str| given(text).map(|text| number(field, &text)).transpose();
+        Ok(NewReferenceGait {
+            name: self.name.clone(),
+            form: self.form,
+            recording: self.recording.clone(),
+            unit: match self.unit.as_str() {
+                "" => None,
+                "degrees" => Some(Unit::Degrees),
+                "radians" => Some(Unit::Radians),
+                other => return Err(Error::invalid("unit", other, "degrees, radians or nothing")),
+            },
+            force_column: given(&self.force_column),
+            forces: Some(self.forces.clone()).filter(|text| !text.trim().is_empty()),
+            strikes: self.strikes,
+            heel_strikes_s: match given(&self.heel_strikes_s) {
+                None => Vec::new(),
+                Some(text) => text.split(',').map(|part| number("heel_strikes_s", part)).collect::<Result<_, _>>()?,
+            },
+            height_m: size("height_m", &self.height_m)?,
+            body_mass_kg: size("body_mass_kg", &self.body_mass_kg)?,
+        })
+    }
+}
+
+fn number(field: &str, text: &str) -> Result<f64, Error> {
+    f64::from_str(text.trim()).map_err(|_| Error::invalid(field, text, "a number"))
+}
+
+#[derive(Template)]
+#[template(path = "reference_gaits.html")]
+struct ReferenceGaitsPage {
+    matches: Vec<Match>,
+    subjects: Vec<Subject>,
+    /// Whom the distances are measured from.
+    nearest_to: Option<Subject>,
+    may_run: bool,
+    fields: Fields,
+    refused: Option<FieldError>,
+}
+
+impl ReferenceGaitsPage {
+    async fn read(db: &mut Connection, subject: Option<SubjectId>, may_run: bool) -> Result<Self, Error> {
+        let nearest_to = match subject {
+            Some(id) => Some(subjects::get(db, id).await?),
+            None => None,
+        };
+        let matches = if let Some(subject) = &nearest_to {
+            recording::matches(db, &subject.body()).await?
+        } else {
+            let all = reference_gaits::all(db).await?.into_iter();
+            all.map(|reference_gait| Match { reference_gait, distance: None }).collect()
+        };
+        let subjects = subjects::all(db).await?;
+        Ok(Self { matches, subjects, nearest_to, may_run, fields: Fields::default(), refused: None })
+    }
+
+    fn refuses(&self, field: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.field == field)
+    }
+
+    fn is_nearest_to(&self, subject: &Subject) -> bool {
+        self.nearest_to.as_ref().is_some_and(|chosen| chosen.id == subject.id)
+    }
+}
+
+/// Whom to match.
+#[derive(Debug, Deserialize)]
+pub(super) struct To {
+    #[serde(default)]
+    subject: Option<SubjectId>,
+}
+
+/// `GET /references`.
+pub(super) async fn list(may: May<Read>, State(app): State<AppState>, Params(to): Params<To>) -> Page {
+    let may_run = may.caller.may(Run::NEEDED);
+    page(&ReferenceGaitsPage::read(&mut *app.read().await?, to.subject, may_run).await?)
+}
+
+/// `POST /references`.
+pub(super) async fn import(
+    may: May<Run>,
+    State(mut app): State<AppState>,
+    Submitted(fields): Submitted<Fields>,
+) -> Result<Response, PageError> {
+    let definition = match fields.read() {
+        Ok(new) => new.definition_aside(app.store_mut()).await,
+        Err(error) => Err(error),
+    };
+    let definition = match definition {
+        Ok(definition) => definition,
+        Err(Error::Invalid(refused)) => {
+            let empty = ReferenceGaitsPage::read(&mut *app.read().await?, None, true).await?;
+            let form = page(&ReferenceGaitsPage { fields, refused: Some(*refused), ..empty })?;
+            return Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response());
+        }
+        Err(other) => return Err(other.into()),
+    };
+    let mut writer = app.write().await?;
+    let added = recording::add(&mut writer, &may.caller.actor, &definition).await?;
+    commit(writer).await?;
+    Ok(Redirect::to(&format!("/references/{}", added.id)).into_response())
+}
+
+#[derive(Template)]
+#[template(path = "reference_gait.html")]
+struct ReferenceGaitPage {
+    reference: ReferenceGait,
+    steps: Vec<String>,
+    charts: Vec<Drawn>,
+}
+
+/// `GET /references/{id}`.
+pub(super) async fn get(_: May<Read>, State(app): State<AppState>, Id(id, _): Id<ReferenceGaitId, Read>) -> Page {
+    let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
+    page(&ReferenceGaitPage {
+        steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
+        charts: figures::of_reference(&reference.definition)
+            .iter()
+            .map(|figure| Drawn::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
+            .collect(),
+        reference,
+    })
+}

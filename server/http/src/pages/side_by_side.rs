@@ -1,0 +1,154 @@
+//! Two studies on one plot: with and without muscles, two subjects, two learners.
+
+use super::drawn::Drawn;
+use super::error::{Page, page};
+use super::format::{self, words};
+use super::study::{COURSE, Figures, course, figures};
+use crate::AppState;
+use crate::extract::Params;
+use crate::may::May;
+use crate::reached::{Named, reached};
+use askama::Template;
+use axum::extract::State;
+use gait_optimizer::TunedBounds;
+use gaitwright_charts::Figure;
+use gaitwright_compute::OnPool;
+use gaitwright_service::access::Read;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::choice::MANY;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::Study;
+use gaitwright_store::trials::TrialCounts;
+use gaitwright_store::{Connection, StudyId, consents, studies, subjects, trials};
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// So many of the newest studies are offered, and of the newest trials of a large one drawn.
+const OFFERED: u32 = 200;
+
+/// Which two.
+#[derive(Debug, Deserialize)]
+pub(super) struct Choice {
+    a: Option<Named<StudyId>>,
+    b: Option<Named<StudyId>>,
+}
+
+#[derive(Template)]
+#[template(path = "side_by_side.html")]
+struct SideBySide {
+    offered: Vec<Study>,
+    a: Option<StudyId>,
+    b: Option<StudyId>,
+    compared: Option<Compared>,
+}
+
+impl SideBySide {
+    fn is(chosen: Option<&StudyId>, study: &Study) -> bool {
+        chosen == Some(&study.id)
+    }
+}
+
+struct Compared {
+    a: Study,
+    b: Study,
+    chart: Option<Drawn>,
+    /// Those that have nothing to draw.
+    without_course: Vec<String>,
+    /// What, of the one, of the other, and whether these differ.
+    rows: Vec<(String, String, String, bool)>,
+}
+
+/// `GET /studies/compare`.
+pub(super) async fn get(may: May<Read>, State(mut app): State<AppState>, Params(choice): Params<Choice>) -> Page {
+    let reach = may.caller.reach();
+    let mut reader = app.read().await?;
+    let offered = studies::page(&mut reader, reach, None, OFFERED).await?;
+    let (a, b) = (reached(&mut reader, reach, choice.a).await?, reached(&mut reader, reach, choice.b).await?);
+    let compared = match (a, b) {
+        (Some(a), Some(b)) if a == b => {
+            return Err(Error::invalid("b", b.to_string(), "another study than a").into());
+        }
+        (Some(a), Some(b)) => {
+            let (a, b) = (Side::read(&mut reader, a).await?, Side::read(&mut reader, b).await?);
+            drop(reader);
+            let beliefs = Arc::clone(&app.beliefs);
+            Some(app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??)
+        }
+        _ => {
+            drop(reader);
+            None
+        }
+    };
+    page(&SideBySide { offered, a, b, compared })
+}
+
+/// A study as read.
+pub(super) struct Side {
+    pub(super) snapshot: StudySnapshot,
+    subject: String,
+    counts: TrialCounts,
+}
+
+impl Side {
+    pub(super) async fn read(db: &mut Connection, id: StudyId) -> Result<Self, Error> {
+        let study = studies::get(db, id).await?;
+        consents::may_be_shown(db, id).await?;
+        let subject = subjects::get(db, study.plan.subject_id).await?.pseudonym;
+        let counts = trials::counts(db, id).await?;
+        let snapshot = if counts.total as usize >= MANY {
+            StudySnapshot::newest(db, study, OFFERED).await?
+        } else {
+            StudySnapshot::read(db, study).await?
+        };
+        Ok(Self { snapshot, subject, counts })
+    }
+
+    pub(super) fn figures(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Figures, Error> {
+        figures(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+    }
+
+    /// What the study is, and what it found.
+    fn rows(&self, figures: &Figures) -> Vec<(String, String)> {
+        let plan = &self.snapshot.study.plan;
+        let best = figures.best.and_then(|id| self.snapshot.trial(id));
+        let seconds: f64 = self.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
+        let mut rows = vec![
+            ("State".to_owned(), words(self.snapshot.study.state.as_str())),
+            ("Subject".to_owned(), self.subject.clone()),
+            ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
+            ("Answers by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
+            ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
+            ("Seed".to_owned(), plan.seed.to_string()),
+            ("Trials with a result".to_owned(), format!("{} of {}", self.counts.results(), plan.trial_budget)),
+            ("Converged".to_owned(), self.counts.converged.to_string()),
+            ("Time of the solves, s".to_owned(), format!("{seconds:.0}")),
+            ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
+            ("Its Gait RMSE, rad".to_owned(), format::figure(best.and_then(|trial| trial.gait_rmse_rad))),
+            ("Its cost of transport".to_owned(), format::figure(best.and_then(|trial| trial.cost_of_transport))),
+        ];
+        let bounds = best.map(|trial| trial.action.to_array());
+        for (place, name) in TunedBounds::NAMES.iter().enumerate() {
+            let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
+            rows.push((format!("{name}: {}", TunedBounds::MEANINGS[place]), value));
+        }
+        rows
+    }
+}
+
+fn compare(pool: &OnPool, a: Side, b: Side, beliefs: &Beliefs) -> Result<Compared, Error> {
+    let (of_a, of_b) = (a.figures(pool, beliefs)?, b.figures(pool, beliefs)?);
+    let chart = course(&[(&a.snapshot, &of_a), (&b.snapshot, &of_b)]).map(|chart| {
+        let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
+        Drawn::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
+    });
+    let rows = a.rows(&of_a).into_iter().zip(b.rows(&of_b));
+    let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, figures)| figures.course().is_empty());
+    Ok(Compared {
+        rows: rows.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
+        without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
+        chart,
+        a: a.snapshot.study,
+        b: b.snapshot.study,
+    })
+}

@@ -1,0 +1,332 @@
+//! Signing in and out, and a person's own account.
+
+use super::error::{Page, PageError, page};
+use super::unsent::{SignInPage, Unsent, send_now};
+use crate::extract::Form;
+use crate::identify::{browser_cookie, browser_of, cookie, session_of};
+use crate::may::SignedIn;
+use crate::{AppState, ClientAddress};
+use askama::Template;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{AppendHeaders, IntoResponse, Redirect, Response};
+use gaitwright_service::access::back_off::{self, Attempt, Origin};
+use gaitwright_service::access::{Caller, Role, password, people, secret, sign_in};
+use gaitwright_service::error::Error;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::sessions::{From, Session};
+use gaitwright_store::users::User;
+use gaitwright_store::{Connection, Instant, LentWriter, UserId, Writer, commit, sessions, users};
+use serde::Deserialize;
+use std::time::Duration;
+
+#[derive(Template)]
+#[template(path = "sign_in_link.html")]
+struct LinkPage {
+    link: String,
+}
+
+#[derive(Template)]
+#[template(path = "no_account.html")]
+struct NoAccountPage;
+
+#[derive(Template)]
+#[template(path = "account.html")]
+struct AccountPage {
+    name: String,
+    role: Role,
+    shortest: usize,
+    /// Whether the present password is asked for.
+    must_say_password: bool,
+    /// Sessions of this person; whether it is the present one.
+    sessions: Vec<(Session, bool)>,
+    refused: Option<String>,
+    saved: bool,
+}
+
+/// `GET /sign-in`.
+pub(super) async fn get() -> Page {
+    page(&SignInPage { refused: None, name: String::new(), unsent: Unsent::default() })
+}
+
+/// Name and password, and what was sent before.
+#[derive(Deserialize)]
+pub(super) struct Credentials {
+    name: String,
+    password: String,
+    #[serde(flatten)]
+    unsent: Unsent,
+}
+
+/// Where a request comes from, for back-off and for the list of sessions.
+struct Visit {
+    address: ClientAddress,
+    /// What the browser says of itself.
+    browser: Option<String>,
+    /// The secret that stays in the browser.
+    kept: Option<String>,
+}
+
+impl Visit {
+    fn of(address: ClientAddress, headers: &HeaderMap) -> Self {
+        let browser = headers.get(header::USER_AGENT).and_then(|value| value.to_str().ok());
+        let browser = browser.map(|text| text.chars().filter(|c| !c.is_control()).take(200).collect());
+        Self { address, browser, kept: browser_of(headers).map(str::to_owned) }
+    }
+
+    /// The origin of an attempt to sign in as somebody.
+    async fn origin(&self, writer: &mut Writer, user: Option<&User>) -> Result<Origin, Error> {
+        let known = match (&self.kept, user) {
+            (Some(kept), Some(user)) => sessions::is_known_browser(writer, user.id, &secret::hash(kept)).await?,
+            _ => false,
+        };
+        Ok(Origin { network: self.address.network(), known: user.filter(|_| known).map(|user| user.id) })
+    }
+
+    /// The secret that stays in the browser, and what is noted of a session that begins in it.
+    fn begins(&self) -> Result<(String, From), Error> {
+        let kept = self.kept.clone().map_or_else(secret::fresh, Ok)?;
+        let browser_hash = Some(secret::hash(&kept));
+        let address = Some(self.address.to_string());
+        Ok((kept, From { address, browser: self.browser.clone(), browser_hash }))
+    }
+}
+
+/// Compares a password with that of a user, unless there were too many failed attempts. `Err` of the inner result: how long
+/// to wait. A wrong password and one that was not compared have been noted.
+async fn compare<'a>(
+    app: &'a AppState,
+    visit: &Visit,
+    name: &str,
+    user: Option<&User>,
+    password: String,
+) -> Result<Result<Option<(LentWriter<'a>, Attempt)>, Duration>, Error> {
+    let (mut writer, now) = app.write_access().await?;
+    let origin = visit.origin(&mut writer, user).await?;
+    let network = origin.network.clone();
+    let begun = back_off::begin(&mut writer, now, name, origin).await?;
+    commit(writer).await?;
+    let attempt = match begun {
+        Ok(attempt) => attempt,
+        Err(wait) => return Ok(Err(wait)),
+    };
+    let stored = user.and_then(|user| user.password.clone());
+    let compared = move || secret::is_password(&password, stored.as_deref());
+    let right = app.access.turns.aside(&network, compared).await?;
+    let (mut writer, now) = app.write_access().await?;
+    if right {
+        return Ok(Ok(Some((writer, attempt))));
+    }
+    attempt.failed(&mut writer, now).await?;
+    commit(writer).await?;
+    Ok(Ok(None))
+}
+
+fn too_many(wait: Duration) -> Error {
+    Error::TooManyAttempts(wait.as_secs().max(1))
+}
+
+/// `POST /sign-in`.
+pub(super) async fn post(
+    State(app): State<AppState>,
+    address: ClientAddress,
+    headers: HeaderMap,
+    Form(form): Form<Credentials>,
+) -> Result<Response, PageError> {
+    let name = form.name.trim().to_owned();
+    let visit = Visit::of(address, &headers);
+    let user = users::by_name(&mut *app.read().await?, &name).await?.filter(|user| user.disabled_at.is_none());
+    let right = compare(&app, &visit, &name, user.as_ref(), form.password).await?.map_err(too_many)?;
+    if let (Some((mut writer, attempt)), Some(user)) = (right, user) {
+        // Whoever was shut out meanwhile stays out.
+        let user = users::get(&mut writer, user.id).await?;
+        if user.disabled_at.is_none() {
+            attempt.succeeded(&mut writer).await?;
+            let (kept, from) = visit.begins()?;
+            let session = sign_in::with_password(&mut writer, &user, &from).await?;
+            commit(writer).await?;
+            let answer = if form.unsent.is_any() {
+                send_now(&form.unsent)?.into_response()
+            } else {
+                Redirect::to(first_page(user.role)).into_response()
+            };
+            return Ok((cookies(&app, &session, &kept)?, answer).into_response());
+        }
+    }
+    let refused = Some("name or password is not right".to_owned());
+    Ok((StatusCode::UNAUTHORIZED, page(&SignInPage { refused, name, unsent: form.unsent })?).into_response())
+}
+
+/// `GET /sign-in/{link}`: a button, so that whatever only looks at the link does not use it up.
+pub(super) async fn link(Path(link): Path<String>) -> Page {
+    page(&LinkPage { link })
+}
+
+/// `POST /sign-in/{link}`.
+pub(super) async fn use_link(
+    State(app): State<AppState>,
+    address: ClientAddress,
+    headers: HeaderMap,
+    Path(link): Path<String>,
+) -> Result<Response, PageError> {
+    let (kept, from) = Visit::of(address, &headers).begins()?;
+    let (mut writer, _) = app.write_access().await?;
+    let (user, session) = match sign_in::with_link_from(&mut writer, &link, &from).await {
+        Err(Error::NotSignedIn(reason)) => {
+            // That it is too old stays so.
+            commit(writer).await?;
+            let refused = SignInPage { refused: Some(reason), name: String::new(), unsent: Unsent::default() };
+            let refused = page(&refused)?;
+            return Ok((StatusCode::UNAUTHORIZED, refused).into_response());
+        }
+        found => found?,
+    };
+    commit(writer).await?;
+    Ok((cookies(&app, &session, &kept)?, Redirect::to(first_page(user.role))).into_response())
+}
+
+/// The cookies of a session that begins.
+fn cookies(app: &AppState, session: &str, kept: &str) -> Result<AppendHeaders<[(HeaderName, HeaderValue); 2]>, Error> {
+    let secure = app.access.secure;
+    let (session, browser) = (cookie(Some(session), secure)?, browser_cookie(kept, secure)?);
+    Ok(AppendHeaders([(header::SET_COOKIE, session), (header::SET_COOKIE, browser)]))
+}
+
+fn first_page(role: Role) -> &'static str {
+    if role == Role::Rater { "/rate" } else { "/" }
+}
+
+/// `POST /sign-out`.
+pub(super) async fn out(
+    State(app): State<AppState>,
+    SignedIn(caller): SignedIn,
+    headers: HeaderMap,
+) -> Result<Response, PageError> {
+    if let (Some(caller), Some(session)) = (caller, session_of(&headers)) {
+        let mut writer = app.write().await?;
+        sign_in::out(&mut writer, &caller.actor, session).await?;
+        commit(writer).await?;
+    }
+    Ok(([(header::SET_COOKIE, cookie(None, app.access.secure)?)], Redirect::to("/sign-in")).into_response())
+}
+
+/// `GET /account`.
+pub(super) async fn account(State(app): State<AppState>, SignedIn(caller): SignedIn, headers: HeaderMap) -> Page {
+    if app.access.open && caller.as_ref().is_some_and(|caller| caller.user.is_none()) {
+        return page(&NoAccountPage);
+    }
+    page(&account_of(&app, caller.as_ref(), &headers).await?.0)
+}
+
+async fn account_of(
+    app: &AppState,
+    caller: Option<&Caller>,
+    headers: &HeaderMap,
+) -> Result<(AccountPage, User, Actor), Error> {
+    let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    let id = caller.user.ok_or_else(|| Error::conflict("nobody is signed in here: there is no account"))?;
+    let mut reader = app.read().await?;
+    let user = users::get(&mut reader, id).await?;
+    let now = app.access.clock.now(&mut reader).await?;
+    let shown = AccountPage {
+        name: user.name.clone(),
+        role: user.role,
+        shortest: password::SHORTEST,
+        must_say_password: sign_in::must_say_password(&mut reader, &user, session_of(headers)).await?,
+        sessions: own_sessions(&mut reader, app, user.id, session_of(headers), now).await?,
+        refused: None,
+        saved: false,
+    };
+    Ok((shown, user, caller.actor.clone()))
+}
+
+/// A new password, and the present one where that is asked for.
+#[derive(Deserialize)]
+pub(super) struct NewPassword {
+    password: String,
+    #[serde(default)]
+    present: String,
+}
+
+/// `POST /account`: sets the password, and ends every other session of the person.
+pub(super) async fn set_password(
+    State(app): State<AppState>,
+    SignedIn(caller): SignedIn,
+    address: ClientAddress,
+    headers: HeaderMap,
+    Form(form): Form<NewPassword>,
+) -> Result<Response, PageError> {
+    let (mut shown, user, actor) = account_of(&app, caller.as_ref(), &headers).await?;
+    let visit = Visit::of(address, &headers);
+    if shown.must_say_password {
+        // Guesses wait as they do at the door.
+        let right = compare(&app, &visit, &user.name, Some(&user), form.present).await?.map_err(too_many)?;
+        let Some((mut writer, attempt)) = right else {
+            shown.refused = Some("the present password is not right".to_owned());
+            return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
+        };
+        attempt.succeeded(&mut writer).await?;
+        commit(writer).await?;
+    }
+    let name = user.name.clone();
+    let hashed = match secret::aside(move || secret::hash_password_of(&name, &form.password)).await? {
+        Err(Error::Invalid(field)) => {
+            shown.refused = Some(field.message);
+            return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
+        }
+        hashed => hashed?,
+    };
+    let (kept, from) = visit.begins()?;
+    let (mut writer, now) = app.write_access().await?;
+    let user = people::set_password(&mut writer, &actor, user.id, &hashed).await?;
+    let session = sign_in::renewed(&mut writer, &user, &from).await?;
+    shown.sessions = own_sessions(&mut writer, &app, user.id, Some(&session), now).await?;
+    commit(writer).await?;
+    (shown.saved, shown.must_say_password) = (true, true);
+    Ok((cookies(&app, &session, &kept)?, page(&shown)?).into_response())
+}
+
+/// Which session to end.
+#[derive(Deserialize)]
+pub(super) struct Ended {
+    id: String,
+}
+
+/// `POST /account/sessions`: ends one of one's own sessions.
+pub(super) async fn end_session(
+    State(app): State<AppState>,
+    SignedIn(caller): SignedIn,
+    Form(form): Form<Ended>,
+) -> Result<Response, PageError> {
+    let caller = caller.ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    let missing = || Error::NotFound { what: "session".to_owned(), id: form.id.clone() };
+    let id = form.id.parse().map_err(|_| missing())?;
+    let (mut writer, _) = app.write_access().await?;
+    let session = sessions::get(&mut writer, id).await?;
+    let own = session.filter(|session| Some(session.user_id) == caller.user).ok_or_else(missing)?;
+    sign_in::end(&mut writer, &caller.actor, &own).await?;
+    commit(writer).await?;
+    app.scheduler.changed();
+    Ok(Redirect::to("/account#sessions").into_response())
+}
+
+async fn own_sessions(
+    db: &mut Connection,
+    app: &AppState,
+    user: UserId,
+    present: Option<&str>,
+    now: Instant,
+) -> Result<Vec<(Session, bool)>, Error> {
+    let present = match present {
+        Some(secret) => sessions::find(db, &secret::hash(secret)).await?.map(|session| session.id),
+        None => None,
+    };
+    let live = sign_in::live(db, Some(user), app.access.limits, now).await?;
+    Ok(live
+        .into_iter()
+        .map(|session| {
+            let is_present = Some(session.id) == present;
+            (session, is_present)
+        })
+        .collect())
+}

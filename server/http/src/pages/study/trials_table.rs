@@ -1,0 +1,207 @@
+//! The table of trials: sorted, filtered and cut into pages by the query string, so that it needs no script and can be
+//! sent to somebody as an address.
+
+use super::super::format::{self, words};
+use gait_optimizer::TunedBounds;
+use gaitwright_service::error::Error;
+use gaitwright_store::listing::{self, Listed, Listing, SORTS};
+use gaitwright_store::trials::{TrialCounts, TrialState};
+use gaitwright_store::{Connection, StudyId, TrialId};
+use serde::{Deserialize, Serialize};
+
+/// So many trials make a page; the downloads have all of them.
+const PAGE: u32 = 200;
+const DESCENDING: &str = "descending";
+
+/// The query string of the table.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Choice {
+    pub(super) sort: String,
+    pub(super) order: String,
+    state: String,
+    pub(super) contains: String,
+    page: u32,
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Self {
+            sort: SORTS[0].to_owned(),
+            order: DESCENDING.to_owned(),
+            state: String::new(),
+            contains: String::new(),
+            page: 1,
+        }
+    }
+}
+
+impl Choice {
+    fn listing(&self) -> Result<Listing, Error> {
+        let sort = SORTS.into_iter().find(|sort| *sort == self.sort);
+        let state = match self.state.as_str() {
+            "" => None,
+            text => Some(text.parse().map_err(|_| {
+                let known = TrialState::ALL.map(TrialState::as_str).join(", ");
+                Error::invalid("state", text, &format!("nothing, {known}"))
+            })?),
+        };
+        if !["ascending", DESCENDING].contains(&self.order.as_str()) {
+            return Err(Error::invalid("order", self.order.as_str(), "ascending, descending"));
+        }
+        Ok(Listing {
+            sort: sort.ok_or_else(|| Error::invalid("sort", self.sort.as_str(), &SORTS.join(", ")))?,
+            descending: self.order == DESCENDING,
+            state,
+            contains: self.contains.trim().to_owned(),
+            limit: PAGE,
+            offset: self.page.saturating_sub(1).saturating_mul(PAGE),
+        })
+    }
+
+    fn link(&self) -> Result<String, Error> {
+        let query = serde_urlencoded::to_string(self).map_err(|e| Error::Internal(e.to_string()))?;
+        Ok(format!("?{query}#trials"))
+    }
+}
+
+/// A column that sorts the table.
+pub(super) struct Column {
+    pub(super) label: &'static str,
+    pub(super) meaning: &'static str,
+    pub(super) numeric: bool,
+    pub(super) link: String,
+    /// For assistive technology; empty: the table is sorted by another one.
+    pub(super) sorted: String,
+}
+
+/// A state to choose, with how many trials are in it.
+pub(super) struct StateChoice {
+    pub(super) value: &'static str,
+    pub(super) words: String,
+    pub(super) chosen: bool,
+}
+
+pub(super) struct TrialRow {
+    pub(super) id: TrialId,
+    pub(super) number: u32,
+    pub(super) state: &'static str,
+    pub(super) state_words: String,
+    pub(super) rmse: String,
+    pub(super) cost: String,
+    pub(super) iterations: String,
+    pub(super) seconds: String,
+    pub(super) from: Option<(TrialId, u32)>,
+    pub(super) action: Vec<String>,
+    pub(super) reason: String,
+    pub(super) message: String,
+}
+
+/// The table as shown.
+pub(super) struct TrialsTable {
+    pub(super) any: bool,
+    pub(super) choice: Choice,
+    pub(super) states: Vec<StateChoice>,
+    pub(super) figures: Vec<Column>,
+    pub(super) bounds: Vec<Column>,
+    pub(super) rows: Vec<TrialRow>,
+    /// Which of how many, when not all are on this page or a filter is set.
+    pub(super) extent: Option<String>,
+    pub(super) earlier: Option<String>,
+    pub(super) later: Option<String>,
+}
+
+impl TrialsTable {
+    pub(super) async fn read(
+        db: &mut Connection,
+        study: StudyId,
+        counts: TrialCounts,
+        choice: Choice,
+    ) -> Result<Self, Error> {
+        let listing = choice.listing()?;
+        let listed = listing::of_study(db, study, &listing).await?;
+        let matching = listed.first().map_or(0, |row| row.matching);
+        let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
+        let page = |page: u32| Choice { page, ..choice.clone() }.link();
+        let more = listing.offset + shown < matching;
+        Ok(Self {
+            any: counts.total > 0,
+            states: states(listing.state),
+            figures: columns(&choice, &listing, false)?,
+            bounds: columns(&choice, &listing, true)?,
+            extent: (matching < counts.total || shown < matching)
+                .then(|| extent(shown, listing.offset, matching, counts.total)),
+            earlier: (choice.page > 1).then(|| page(choice.page - 1)).transpose()?,
+            later: more.then(|| page(choice.page + 1)).transpose()?,
+            rows: listed.into_iter().map(trial_row).collect(),
+            choice,
+        })
+    }
+}
+
+fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
+    let choice = |state: TrialState| StateChoice {
+        value: state.as_str(),
+        words: words(state.as_str()),
+        chosen: chosen == Some(state),
+    };
+    TrialState::ALL.into_iter().map(choice).collect()
+}
+
+fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
+    let count = |value: u32| format::count(value.into());
+    if shown == 0 {
+        return format!("None of {} trials.", count(total));
+    }
+    let (first, last) = (count(offset + 1), count(offset + shown));
+    if matching < total {
+        format!("{first} to {last} of {} that fit, of {} trials.", count(matching), count(total))
+    } else {
+        format!("{first} to {last} of {} trials; all of them are in the downloads.", count(total))
+    }
+}
+
+fn columns(choice: &Choice, listing: &Listing, bounds: bool) -> Result<Vec<Column>, Error> {
+    SORTS
+        .into_iter()
+        .filter(|sort| TunedBounds::NAMES.contains(sort) == bounds)
+        .map(|sort| {
+            let current = sort == listing.sort;
+            let descending = current && !listing.descending;
+            let order = if descending { DESCENDING } else { "ascending" };
+            let link = Choice { sort: sort.to_owned(), order: order.to_owned(), page: 1, ..choice.clone() }.link()?;
+            let (label, meaning) = heading(sort);
+            let sorted = if current { choice.order.clone() } else { String::new() };
+            Ok(Column { label, meaning, numeric: sort != "state", link, sorted })
+        })
+        .collect()
+}
+
+fn heading(sort: &'static str) -> (&'static str, &'static str) {
+    match sort {
+        "number" => ("Trial", "In the order of proposal"),
+        "state" => ("State", ""),
+        "gait_rmse_rad" => ("RMSE, rad", "Gait RMSE against the reference gait"),
+        "cost_of_transport" => ("Cost", "Cost of transport, dimensionless"),
+        "iterations" => ("Iterations", "Interior-point iterations of the solve"),
+        "seconds_total" => ("Time, s", "Wall time of the solve"),
+        bound => (bound, format::meaning(bound)),
+    }
+}
+
+fn trial_row(listed: Listed) -> TrialRow {
+    TrialRow {
+        id: listed.id,
+        number: listed.number,
+        state: listed.state.as_str(),
+        state_words: words(listed.state.as_str()),
+        rmse: format::figure(listed.gait_rmse_rad),
+        cost: format::figure(listed.cost_of_transport),
+        iterations: listed.iterations.map_or_else(|| "–".to_owned(), |n| n.to_string()),
+        seconds: format::seconds(listed.seconds_total),
+        from: listed.from,
+        action: listed.action.to_array().iter().map(f64::to_string).collect(),
+        reason: listed.reason,
+        message: listed.message,
+    }
+}

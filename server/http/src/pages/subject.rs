@@ -1,0 +1,326 @@
+//! Subjects, and the forms for what they signed and that they withdraw.
+
+use super::error::{Page, PageError, page};
+use super::format::{variant, words};
+use crate::AppState;
+use crate::extract::{Form, Params};
+use crate::may::May;
+use crate::problem::Problem;
+use crate::reached::Id;
+use askama::Template;
+use axum::extract::State;
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_service::access::{Administer, Caller, Permission, Reach, Read, Run};
+use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
+use gaitwright_service::studies::lab::SessionView;
+use gaitwright_service::studies::person::{self, NewCorrection, NewSubject};
+use gaitwright_store::consents::{self, Consent, ConsentKind};
+use gaitwright_store::studies::Study;
+use gaitwright_store::subjects::{self, Correction, Subject};
+use gaitwright_store::trials::TrialCounts;
+use gaitwright_store::{Connection, SubjectId, commit, lab_sessions, studies, trials};
+use serde::Deserialize;
+
+/// How many subjects the list shows, and how many studies the page of one.
+const PAGE: u32 = 100;
+
+#[derive(Template)]
+#[template(path = "subjects.html")]
+struct SubjectsPage {
+    subjects: Vec<Row>,
+    /// The last subject of this page, when others follow.
+    next: Option<SubjectId>,
+    may_run: bool,
+    fields: Described,
+    refused: Option<FieldError>,
+}
+
+impl SubjectsPage {
+    fn refuses(&self, field: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.field == field)
+    }
+}
+
+/// A subject as typed, so that a refused form comes back as it was.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Described {
+    pseudonym: String,
+    height_m: String,
+    body_mass_kg: String,
+    notes: String,
+}
+
+impl Described {
+    fn read(&self) -> Result<NewSubject, Error> {
+        let (height_m, body_mass_kg) = body_of(&self.height_m, &self.body_mass_kg)?;
+        Ok(NewSubject { pseudonym: self.pseudonym.clone(), height_m, body_mass_kg, notes: self.notes.clone() })
+    }
+}
+
+/// Height and mass as typed.
+fn body_of(height: &str, mass: &str) -> Result<(f64, f64), Error> {
+    let number = |field, text: &str, allowed| text.trim().parse().map_err(|_| Error::invalid(field, text, allowed));
+    let height = number("height_m", height, "a number of metres with a decimal point, as in 1.75")?;
+    Ok((height, number("body_mass_kg", mass, "a number of kilograms with a decimal point, as in 65.7")?))
+}
+
+struct Row {
+    subject: Subject,
+    consent: &'static str,
+}
+
+#[derive(Template)]
+#[template(path = "subject.html")]
+struct SubjectPage {
+    subject: Subject,
+    consents: Vec<Consent>,
+    withdrawn: bool,
+    may_run: bool,
+    /// The newest ones.
+    studies: Vec<StudyRow>,
+    /// Of these studies; none of a subject who withdrew.
+    sessions: Vec<SessionRow>,
+    /// The newest row that the form knows of: sent twice, it is written once.
+    after: i64,
+    corrections: Vec<Correction>,
+    /// The newest correction that the form knows of: sent twice, it is made once.
+    corrected: i64,
+    may_administer: bool,
+    refused: Option<String>,
+}
+
+/// A study of the subject.
+struct StudyRow {
+    study: Study,
+    state: String,
+    variant: &'static str,
+    counts: TrialCounts,
+}
+
+/// A lab session of the subject.
+struct SessionRow {
+    session: SessionView,
+    study: String,
+    state: String,
+}
+
+/// Which subjects to show.
+#[derive(Debug, Deserialize)]
+pub(super) struct Before {
+    before: Option<SubjectId>,
+}
+
+/// `GET /subjects`.
+pub(super) async fn list(
+    may: May<Read>,
+    State(app): State<AppState>,
+    Params(Before { before }): Params<Before>,
+) -> Page {
+    show_list(&app, before, may.caller.may(Run::NEEDED), Described::default(), None).await
+}
+
+/// `POST /subjects`: adds one, before it has a study.
+pub(super) async fn add(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Form(fields): Form<Described>,
+) -> Result<Response, PageError> {
+    let added = async {
+        let new = fields.read()?;
+        let mut writer = app.write().await?;
+        let subject = person::add(&mut writer, &may.caller.actor, &new).await?;
+        commit(writer).await?;
+        Ok(subject.id)
+    };
+    let error = match added.await {
+        Ok(id) => return Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => error,
+        Err(other) => return Err(other.into()),
+    };
+    let status = Problem::from(&error).status();
+    let refused = match error {
+        Error::Invalid(refused) => *refused,
+        // The one conflict there is: somebody has this pseudonym.
+        other => {
+            FieldError { message: other.to_string(), ..FieldError::new("pseudonym", fields.pseudonym.clone(), "") }
+        }
+    };
+    Ok((status, show_list(&app, None, true, fields, Some(refused)).await?).into_response())
+}
+
+async fn show_list(
+    app: &AppState,
+    before: Option<SubjectId>,
+    may_run: bool,
+    fields: Described,
+    refused: Option<FieldError>,
+) -> Page {
+    let mut reader = app.read().await?;
+    let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;
+    let more = found.len() > PAGE as usize;
+    found.truncate(PAGE as usize);
+    let next = found.last().filter(|_| more).map(|subject| subject.id);
+    let mut rows = Vec::with_capacity(found.len());
+    for subject in found {
+        let said = consents::of_subject(&mut reader, subject.id).await?;
+        rows.push(Row { subject, consent: said.last().map_or("nothing written down", |last| last.kind.as_str()) });
+    }
+    page(&SubjectsPage { subjects: rows, next, may_run, fields, refused })
+}
+
+/// `GET /subjects/{id}`.
+pub(super) async fn get(may: May<Read>, State(app): State<AppState>, Id(id, _): Id<SubjectId, Read>) -> Page {
+    show(&app, id, &may.caller, None).await
+}
+
+async fn show(app: &AppState, id: SubjectId, caller: &Caller, refused: Option<String>) -> Page {
+    let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
+    let mut reader = app.read().await?;
+    let subject = subjects::get(&mut reader, id).await?;
+    let consents = consents::of_subject(&mut reader, id).await?;
+    let corrections = subjects::corrections(&mut reader, id).await?;
+    let studies = studies_of(&mut reader, caller.reach(), id).await?;
+    let mut sessions = Vec::new();
+    let last = consents.last();
+    let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
+    for row in studies.iter().filter(|_| !withdrawn) {
+        sessions.extend(sessions_of(&mut reader, &row.study).await?);
+    }
+    drop(reader);
+    let after = last.map_or(0, |last| last.seq);
+    let corrected = corrections.last().map_or(0, |last| last.seq);
+    page(&SubjectPage {
+        subject,
+        consents,
+        withdrawn,
+        may_run,
+        studies,
+        sessions,
+        after,
+        corrections,
+        corrected,
+        may_administer,
+        refused,
+    })
+}
+
+/// The studies of a subject that a caller reaches, the newest first.
+async fn studies_of(db: &mut Connection, reach: Reach, id: SubjectId) -> Result<Vec<StudyRow>, Error> {
+    let mut rows = Vec::new();
+    for study in studies::of_subject(db, reach, id, PAGE).await? {
+        let counts = trials::counts(db, study.id).await?;
+        rows.push(StudyRow { state: words(study.state.as_str()), variant: variant(study.plan.muscles), counts, study });
+    }
+    Ok(rows)
+}
+
+/// The lab sessions of a study, the newest first.
+async fn sessions_of(db: &mut Connection, study: &Study) -> Result<Vec<SessionRow>, Error> {
+    let sessions = lab_sessions::of_study(db, study.id).await?;
+    let row = |session| {
+        let session = SessionView::from(session);
+        SessionRow { state: words(session.state.as_str()), session, study: study.plan.name.clone() }
+    };
+    Ok(sessions.iter().rev().map(row).collect())
+}
+
+/// What was signed.
+#[derive(Debug, Deserialize)]
+pub(super) struct Signed {
+    form: String,
+    after: i64,
+}
+
+/// `POST /subjects/{id}/consent`.
+pub(super) async fn consent(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    Form(form): Form<Signed>,
+) -> Result<Response, PageError> {
+    let done = give(&app, &may, id, form).await;
+    answer(&app, id, &may.caller, done).await
+}
+
+async fn give(app: &AppState, may: &May<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
+    let mut writer = app.write().await?;
+    let newest = consents::of_subject(&mut writer, id).await?.last().map_or(0, |last| last.seq);
+    if newest != form.after {
+        return Err(Error::conflict("something was written down since this form was shown; look at it first"));
+    }
+    consent::give(&mut writer, &may.caller.actor, id, &NewConsent { form: form.form }).await?;
+    Ok(commit(writer).await?)
+}
+
+/// `POST /subjects/{id}/withdraw`.
+pub(super) async fn withdraw(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    Form(why): Form<Withdrawal>,
+) -> Result<Response, PageError> {
+    let done = end(&app, &may, id, &why).await;
+    answer(&app, id, &may.caller, done).await
+}
+
+async fn end(app: &AppState, may: &May<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
+    let mut writer = app.write().await?;
+    let (_, cancelled) = consent::withdraw(&mut writer, &may.caller.actor, id, why).await?;
+    commit(writer).await?;
+    for trial in cancelled {
+        app.scheduler.cancel_solve(trial).await;
+    }
+    app.scheduler.changed();
+    Ok(())
+}
+
+/// Corrected height and mass, as typed.
+#[derive(Debug, Deserialize)]
+pub(super) struct Corrected {
+    height_m: String,
+    body_mass_kg: String,
+    reason: String,
+    before: i64,
+}
+
+/// `POST /subjects/{id}/correct`.
+pub(super) async fn correct(
+    may: May<Run>,
+    State(app): State<AppState>,
+    Id(id, _): Id<SubjectId, Run>,
+    Form(form): Form<Corrected>,
+) -> Result<Response, PageError> {
+    let done = set_right(&app, &may, id, form).await;
+    answer(&app, id, &may.caller, done).await
+}
+
+async fn set_right(app: &AppState, may: &May<Run>, id: SubjectId, form: Corrected) -> Result<(), Error> {
+    let (height_m, body_mass_kg) = body_of(&form.height_m, &form.body_mass_kg)?;
+    let new = NewCorrection { height_m, body_mass_kg, reason: form.reason };
+    let mut writer = app.write().await?;
+    let newest = subjects::corrections(&mut writer, id).await?.last().map_or(0, |last| last.seq);
+    if newest != form.before {
+        return Err(Error::conflict("height and mass were corrected since this form was shown; look at them first"));
+    }
+    person::correct(&mut writer, &may.caller.actor, id, &new).await?;
+    Ok(commit(writer).await?)
+}
+
+/// Shows the subject anew; what was refused, with the reason.
+async fn answer(
+    app: &AppState,
+    id: SubjectId,
+    caller: &Caller,
+    done: Result<(), Error>,
+) -> Result<Response, PageError> {
+    match done {
+        Ok(()) => Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let shown = show(app, id, caller, Some(error.to_string())).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
+}

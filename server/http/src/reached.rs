@@ -1,0 +1,147 @@
+//! Identifiers that a request names.
+//!
+//! A handler gets one only when its caller has the right that the handler asks for, and reaches the study that the
+//! identifier belongs to. Whatever is not reached is answered as if it did not exist.
+
+use super::AppState;
+use super::may::{Refused, permitted};
+use axum::extract::{FromRequestParts, RawPathParams};
+use axum::http::request::Parts;
+use gaitwright_service::access::{Permission, Reach};
+use gaitwright_service::error::Error;
+use gaitwright_store::{
+    Connection, DeviceId, FeedbackId, LabRecordingId, LabSessionId, MemberId, ReferenceGaitId, RemarkId, SessionId,
+    StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, feedback, lab_recordings, lab_sessions,
+    members, remarks, trials,
+};
+use serde::Deserialize;
+use std::fmt::Display;
+use std::marker::PhantomData;
+use std::str::FromStr;
+
+/// What an identifier can be of.
+pub(crate) trait Located: Copy + Display + FromStr<Err: Display> + Send + Sync {
+    /// What it is called where it does not exist.
+    const WHAT: &'static str;
+
+    /// The study that it belongs to; none: the whole service shares it.
+    fn study(self, db: &mut Connection) -> impl Future<Output = StoreResult<Option<StudyId>>> + Send;
+}
+
+macro_rules! of_study {
+    ($id:ty, $what:literal, $study:expr) => {
+        impl Located for $id {
+            const WHAT: &'static str = $what;
+
+            async fn study(self, db: &mut Connection) -> StoreResult<Option<StudyId>> {
+                let study: StudyId = $study(db, self).await?;
+                Ok(Some(study))
+            }
+        }
+    };
+}
+
+of_study!(StudyId, "study", async |_: &mut Connection, id: StudyId| StoreResult::Ok(id));
+of_study!(TrialId, "trial", async |db: &mut Connection, id| StoreResult::Ok(trials::get(db, id).await?.study_id));
+of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult::Ok(
+    feedback::get(db, id).await?.study_id
+));
+of_study!(RemarkId, "remark", async |db: &mut Connection, id| StoreResult::Ok(remarks::get(db, id).await?.study_id));
+of_study!(MemberId, "member", async |db: &mut Connection, id| StoreResult::Ok(members::get(db, id).await?.study_id));
+of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
+    StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
+});
+of_study!(LabRecordingId, "recording", async |db: &mut Connection, id| {
+    let session = lab_recordings::get(db, id).await?.session_id;
+    StoreResult::Ok(lab_sessions::get(db, session).await?.study_id)
+});
+
+macro_rules! shared {
+    ($id:ty, $what:literal) => {
+        impl Located for $id {
+            const WHAT: &'static str = $what;
+
+            async fn study(self, _: &mut Connection) -> StoreResult<Option<StudyId>> {
+                Ok(None)
+            }
+        }
+    };
+}
+
+shared!(SubjectId, "subject");
+shared!(DeviceId, "device");
+shared!(ReferenceGaitId, "reference gait");
+shared!(UserId, "user");
+shared!(TokenId, "token");
+shared!(SessionId, "session");
+
+/// The study of something that a caller reaches.
+async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result<Option<StudyId>, Error> {
+    let study = id.study(db).await?;
+    if let Some(study) = study
+        && !members::reaches(db, reach, study).await?
+    {
+        return Err(StoreError::Missing { what: T::WHAT, id: id.to_string() }.into());
+    }
+    Ok(study)
+}
+
+/// The identifier in the path, `{id}`, of something with which the caller may do `P`.
+#[derive(Debug)]
+pub(crate) struct Id<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
+
+impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
+    type Rejection = Refused;
+
+    async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Refused> {
+        let found = in_path::<T, P>(parts, app).await;
+        found.map(|(id, _)| Self(id, PhantomData)).map_err(|error| Refused::of(parts, error))
+    }
+}
+
+/// The identifier in the path and its study.
+pub(super) async fn in_path<T: Located, P: Permission>(
+    parts: &mut Parts,
+    app: &AppState,
+) -> Result<(T, Option<StudyId>), Error> {
+    // The right comes first: the refusal is the same whether the thing exists or not.
+    let reach = permitted::<P>(&parts.extensions)?.reach();
+    let named = RawPathParams::from_request_parts(parts, app).await.map_err(|e| Error::Malformed(e.body_text()))?;
+    let text = named.iter().find(|(name, _)| *name == "id").map_or("", |(_, text)| text);
+    let unknown = || Error::NotFound { what: "an identifier like".to_owned(), id: text.to_owned() };
+    let id: T = text.parse().map_err(|_| unknown())?;
+    let study = located(&mut *app.read().await?, reach, id).await?;
+    Ok((id, study))
+}
+
+/// An identifier in the query or in a form. It is of no use before [`Named::reached`].
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(transparent)]
+pub(crate) struct Named<T>(T);
+
+impl<T: Located> Named<T> {
+    /// The identifier, where the caller reaches what it names.
+    pub(crate) async fn reached(self, db: &mut Connection, reach: Reach) -> Result<T, Error> {
+        located(db, reach, self.0).await?;
+        Ok(self.0)
+    }
+}
+
+/// The identifier, if there is one, where the caller reaches what it names.
+pub(crate) async fn reached<T: Located>(
+    db: &mut Connection,
+    reach: Reach,
+    named: Option<Named<T>>,
+) -> Result<Option<T>, Error> {
+    match named {
+        Some(named) => Ok(Some(named.reached(db, reach).await?)),
+        None => Ok(None),
+    }
+}
+
+impl<T: FromStr> FromStr for Named<T> {
+    type Err = T::Err;
+    fn from_str(text: &str) -> Result<Self, T::Err> {
+        text.parse().map(Self)
+    }
+}

@@ -1,0 +1,36 @@
+//! Rights as types: what a handler asks for in its arguments.
+
+use gaitwright_store::rights::Right;
+
+/// A right as a type: what a handler asks for in its arguments.
+pub trait Permission: Send + Sync + 'static {
+    /// The right; none: it is enough to have signed in.
+    const NEEDED: Option<Right>;
+}
+
+macro_rules! permission {
+    ($name:ident) => {
+        #[doc = concat!("Asks for [`Right::", stringify!($name), "`].")]
+        #[derive(Debug, Clone, Copy)]
+        pub struct $name;
+
+        impl Permission for $name {
+            const NEEDED: Option<Right> = Some(Right::$name);
+        }
+    };
+}
+
+/// Asks for no right: whoever has signed in, and every token.
+#[derive(Debug, Clone, Copy)]
+pub struct Anything;
+
+impl Permission for Anything {
+    const NEEDED: Option<Right> = None;
+}
+
+permission!(Read);
+permission!(Run);
+permission!(Answer);
+permission!(Rate);
+permission!(Device);
+permission!(Administer);

@@ -1,0 +1,235 @@
+//! Signing in and out, and recognising who was signed in.
+
+use super::caller::Caller;
+use super::{clock, secret};
+use crate::error::Error;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::sessions::{From, Session};
+use gaitwright_store::users::{self, User};
+use gaitwright_store::{Connection, Instant, SessionId, UserId, Writer, sessions, tokens};
+use serde::Serialize;
+use serde_json::json;
+
+/// An instant at which the person did something is written at most this often.
+const SEEN_EVERY_SECONDS: f64 = 60.0;
+
+/// For so long after coming in by a one-time link a password can be set without the present one, which may be forgotten.
+const LINK_IS_FRESH_SECONDS: f64 = 3600.0;
+
+/// When sessions end by themselves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// A session without a sign of life for so long has ended.
+    pub idle_seconds: f64,
+    /// A session has ended so long after it was begun, used or not.
+    pub lifetime_seconds: f64,
+}
+
+impl Limits {
+    fn has_ended(&self, session: &Session, now: Instant) -> bool {
+        now.seconds_since(session.seen_at) > self.idle_seconds
+            || now.seconds_since(session.created_at) > self.lifetime_seconds
+    }
+}
+
+/// Signs in with a one-time link: the user and the secret of the session.
+///
+/// # Errors
+/// [`Error::NotSignedIn`] when the link is unknown, used, too old, or of a user who was shut out.
+pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String), Error> {
+    with_link_from(writer, link, &From::default()).await
+}
+
+/// [`with_link`], noting where it was.
+///
+/// # Errors
+/// As [`with_link`]; that it was too old is to be committed.
+pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Result<(User, String), Error> {
+    let refused = || Error::NotSignedIn("this link was used or is too old; ask for another one".to_owned());
+    let hash = secret::hash(link);
+    let (id, expires_at) = sessions::link(writer, &hash).await?.ok_or_else(refused)?;
+    let now = clock::recorded(writer).await?;
+    let user = users::get(writer, id).await?;
+    if expires_at <= now {
+        sessions::use_link(writer, &hash, now).await?;
+        return Err(refused());
+    }
+    if user.disabled_at.is_some() {
+        return Err(refused());
+    }
+    sessions::use_link(writer, &hash, now).await?;
+    let secret = begin(writer, &user, By::Link, from).await?;
+    Ok((user, secret))
+}
+
+/// Begins a session of a user whose password was found right.
+///
+/// # Errors
+/// What the database reports.
+pub async fn with_password(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
+    begin(writer, user, By::Password, from).await
+}
+
+/// What somebody came in by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum By {
+    Link,
+    Password,
+}
+
+async fn begin(writer: &mut Writer, user: &User, by: By, from: &From) -> Result<String, Error> {
+    let secret = renew(writer, user, by == By::Link, from).await?;
+    let actor = Caller::person(user.id, &user.name, user.role).actor;
+    let detail = json!({ "by": by, "address": from.address });
+    audit::append(writer, &actor, "session.begin", &format!("user {}", user.id), &detail).await?;
+    Ok(secret)
+}
+
+/// A session in place of those that ended when the user set a password; part of that act in the audit trail.
+///
+/// # Errors
+/// What the database reports.
+pub async fn renewed(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
+    renew(writer, user, false, from).await
+}
+
+async fn renew(writer: &mut Writer, user: &User, by_link: bool, from: &From) -> Result<String, Error> {
+    let secret = secret::fresh()?;
+    let now = clock::recorded(writer).await?;
+    sessions::begin(writer, &secret::hash(&secret), user.id, by_link, from, now).await?;
+    Ok(secret)
+}
+
+/// Whether a user must say the present password to set another one: unless there is none, or a one-time link has just let
+/// the user in.
+///
+/// # Errors
+/// What the database reports.
+pub async fn must_say_password(db: &mut Connection, user: &User, session: Option<&str>) -> Result<bool, Error> {
+    if !user.has_password {
+        return Ok(false);
+    }
+    let Some(session) = session else { return Ok(true) };
+    let found = sessions::find(db, &secret::hash(session)).await?;
+    let now = clock::recorded(db).await?;
+    let by_fresh_link = found.filter(|session| {
+        session.by_link && session.user_id == user.id && now.seconds_since(session.created_at) <= LINK_IS_FRESH_SECONDS
+    });
+    Ok(by_fresh_link.is_none())
+}
+
+/// Whether somebody who is signed in has no way in but a one-time link.
+///
+/// # Errors
+/// What the database reports.
+pub async fn has_no_password(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
+    let Some(id) = caller.user else { return Ok(false) };
+    Ok(!users::get(db, id).await?.has_password)
+}
+
+/// Signs out: ends the session with this secret.
+///
+/// # Errors
+/// What the database reports.
+pub async fn out(writer: &mut Writer, actor: &Actor, session: &str) -> Result<(), Error> {
+    if let Some(session) = sessions::find(writer, &secret::hash(session)).await? {
+        end(writer, actor, &session).await?;
+    }
+    Ok(())
+}
+
+/// Ends a session: one's own, or, by an administrator, another's.
+///
+/// # Errors
+/// What the database reports.
+pub async fn end(writer: &mut Writer, actor: &Actor, session: &Session) -> Result<(), Error> {
+    let now = clock::recorded(writer).await?;
+    if sessions::end(writer, session.id, now).await? {
+        let detail = json!({ "session": session.id });
+        audit::append(writer, actor, "session.end", &format!("user {}", session.user_id), &detail).await?;
+    }
+    Ok(())
+}
+
+/// The sessions that have not ended: of a user, or all. The newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn live(
+    db: &mut Connection,
+    user: Option<UserId>,
+    limits: Limits,
+    now: Instant,
+) -> Result<Vec<Session>, Error> {
+    let mut found = sessions::live(db, user).await?;
+    found.retain(|session| !limits.has_ended(session, now));
+    Ok(found)
+}
+
+/// Who is found by a secret.
+#[derive(Debug)]
+pub enum Recognised {
+    /// Nobody: it is unknown, or was ended.
+    Nobody,
+    /// Nobody: its time is over, which the record does not say yet. To be noted with [`note_ended`].
+    Ended(Option<SessionId>),
+    /// Somebody.
+    Known {
+        /// Who.
+        caller: Caller,
+        /// The session, when it is time to note that the person did something.
+        seen: Option<SessionId>,
+    },
+}
+
+/// Whose session it is.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_session(db: &mut Connection, session: &str, limits: Limits, now: Instant) -> Result<Recognised, Error> {
+    let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(Recognised::Nobody) };
+    if limits.has_ended(&found, now) {
+        return Ok(Recognised::Ended(Some(found.id)));
+    }
+    let user = users::get(db, found.user_id).await?;
+    if user.disabled_at.is_some() {
+        return Ok(Recognised::Nobody);
+    }
+    let due = now.seconds_since(found.seen_at) > SEEN_EVERY_SECONDS.min(limits.idle_seconds / 4.0);
+    Ok(Recognised::Known { caller: Caller::person(user.id, &user.name, user.role), seen: due.then_some(found.id) })
+}
+
+/// Whose token it is.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<Recognised, Error> {
+    let Some(found) = tokens::by_hash(db, &secret::hash(token)).await? else { return Ok(Recognised::Nobody) };
+    if let Some(expires_at) = found.expires_at.filter(|expires_at| *expires_at <= now) {
+        let noted = gaitwright_store::clock::latest(db).await?.is_some_and(|latest| latest >= expires_at);
+        return Ok(if noted { Recognised::Nobody } else { Recognised::Ended(None) });
+    }
+    Ok(Recognised::Known { caller: Caller::token(found.id, &found.name, &found.scopes), seen: None })
+}
+
+/// Notes that the person did something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn seen(writer: &mut Writer, session: SessionId, now: Instant) -> Result<(), Error> {
+    gaitwright_store::clock::reach(writer, now).await?;
+    Ok(sessions::seen(writer, session, now).await?)
+}
+
+/// Notes that the time of a session or token is over: it stays so when the machine's clock is set back.
+///
+/// # Errors
+/// What the database reports.
+pub async fn note_ended(writer: &mut Writer, session: Option<SessionId>, now: Instant) -> Result<(), Error> {
+    gaitwright_store::clock::reach(writer, now).await?;
+    if let Some(session) = session {
+        sessions::end(writer, session, now).await?;
+    }
+    Ok(())
+}

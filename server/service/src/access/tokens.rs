@@ -1,0 +1,80 @@
+//! Tokens of scripts: made, shown once, ended.
+
+use super::clock;
+use super::secret;
+use crate::error::Error;
+use crate::printable;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::rights::Right;
+use gaitwright_store::tokens::{self, NAME_UNIQUE, Token};
+use gaitwright_store::{OnConstraint, TokenId, UserId, Writer};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Longest life of a token, days.
+const LONGEST_DAYS: u32 = 3660;
+
+/// A token to make.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewToken {
+    /// What it is for: 1 to 80 characters.
+    #[schema(min_length = 1, max_length = 80)]
+    pub name: String,
+    /// What it allows: at least one of `read`, `run`, `answer`, `rate`, `device`.
+    #[schema(min_items = 1)]
+    pub scopes: Vec<Right>,
+    /// It ends by itself after so many days; never, if absent.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 3660)]
+    pub days: Option<u32>,
+}
+
+/// Makes a token: the row and its secret, which is not stored.
+///
+/// # Errors
+/// [`Error::Invalid`], [`Error::Conflict`] when the name is taken.
+pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<(Token, String), Error> {
+    let name = printable::name("name", &new.name, 80)?;
+    if new.scopes.is_empty() || new.scopes.contains(&Right::Administer) {
+        let allowed = "some of read, run, answer, rate, device: people administer, programs do not";
+        return Err(Error::invalid("scopes", json!(new.scopes), allowed));
+    }
+    if new.days.is_some_and(|days| !(1..=LONGEST_DAYS).contains(&days)) {
+        return Err(Error::invalid("days", json!(new.days), &format!("1 to {LONGEST_DAYS}, or absent")));
+    }
+    let secret = format!("gait_{}", secret::fresh()?);
+    let now = clock::recorded(writer).await?;
+    let ends = new.days.map(|days| now.plus_seconds(i64::from(days) * 86_400));
+    let token = tokens::insert(writer, name, &secret::hash(&secret), &new.scopes, actor, ends)
+        .await
+        .on_constraint(NAME_UNIQUE, || Error::conflict(format!("there is a token {name:?} already")))?;
+    let detail = json!({ "name": name, "scopes": new.scopes });
+    audit::append(writer, actor, "token.make", &format!("token {}", token.id), &detail).await?;
+    Ok((token, secret))
+}
+
+/// Ends a token.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when it had ended.
+pub async fn revoke(writer: &mut Writer, actor: &Actor, id: TokenId) -> Result<Token, Error> {
+    let token = tokens::get(writer, id).await?;
+    if !tokens::revoke(writer, id).await? {
+        return Err(Error::conflict("this token was revoked already"));
+    }
+    audit::append(writer, actor, "token.revoke", &format!("token {id}"), &json!({ "name": token.name })).await?;
+    Ok(tokens::get(writer, id).await?)
+}
+
+/// Ends every token that a user made: whoever may not administer any more keeps no way in by a program.
+///
+/// # Errors
+/// What the database reports.
+pub(super) async fn revoke_all_of(writer: &mut Writer, actor: &Actor, user: UserId) -> Result<(), Error> {
+    for token in tokens::made_by(writer, user).await? {
+        revoke(writer, actor, token.id).await?;
+    }
+    Ok(())
+}

@@ -1,0 +1,310 @@
+//! JSON documents from outside.
+//!
+//! Derived readers also take an array for an object, field by field in the order of the program text. A document that
+//! says `["S9", 1.7, 65]` where it should name its fields is more likely a mistake, so here it is one.
+
+use crate::error::{Error, FieldError};
+use serde::de::value::{MapDeserializer, SeqDeserializer};
+use serde::de::{
+    DeserializeOwned, DeserializeSeed, Deserializer, Error as _, IgnoredAny, IntoDeserializer, MapAccess, SeqAccess,
+    Unexpected, Visitor,
+};
+use serde_json::Value;
+use serde_path_to_error::{Path, Segment};
+use std::fmt;
+
+/// What a structure is read from.
+const OBJECT: &str = "an object with named fields";
+
+/// So many characters of a value are repeated to whoever sent it.
+const SHOWN_VALUE: usize = 80;
+
+/// Reads a document, naming the field that cannot be read.
+///
+/// # Errors
+/// [`Error::Unreadable`] with the field, [`Error::Malformed`] where there is none.
+pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
+    let mut reader = serde_json::Deserializer::from_slice(bytes);
+    let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|e| unreadable(e, bytes))?;
+    reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
+    let parsed: Value = serde_json::from_slice(bytes).map_err(|e| Error::Malformed(e.to_string()))?;
+    serde_path_to_error::deserialize::<_, T>(Named(&parsed)).map_err(|e| unreadable(e, bytes))?;
+    Ok(value)
+}
+
+fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]) -> Error {
+    let path = error.path().clone();
+    let written = path.to_string();
+    let inner = error.into_inner();
+    let message = inner.to_string();
+    let message = message.split(" at line ").next().unwrap_or(&message);
+    let place = place(&inner, &path, bytes);
+    if !inner.is_data() {
+        let known = written != "." && path.iter().all(|segment| !matches!(segment, Segment::Unknown));
+        let within = if known { format!("field {written}: ") } else { String::new() };
+        return Error::Malformed(format!("{within}not JSON: {message}{place}"));
+    }
+    let missing = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
+    let twice = message.strip_prefix("duplicate field `").and_then(|rest| rest.split('`').next());
+    let field = match (written.as_str(), missing.or(twice)) {
+        (".", None) => {
+            return Error::Malformed(format!("the whole document is not {}{place}", expected(message)));
+        }
+        (".", Some(name)) => name.to_owned(),
+        (_, Some(name)) => format!("{written}.{name}"),
+        _ => written,
+    };
+    let value = if missing.is_some() { Value::Null } else { value_at(bytes, &path) };
+    let allowed = match (missing, twice) {
+        (Some(_), _) => "it must be there".to_owned(),
+        (_, Some(_)) => "it may be there once".to_owned(),
+        _ => expected(message),
+    };
+    let said = match (missing, twice) {
+        (Some(_), _) => format!("field {field} is missing{place}"),
+        (_, Some(_)) => format!("field {field} is there twice{place}"),
+        _ if message.starts_with("unknown field") => format!("field {field} is not known{place}; known: {allowed}"),
+        _ => format!("field {field}: {} is not accepted{place}; allowed: {allowed}", shortened(&value)),
+    };
+    Error::Unreadable(Box::new(FieldError { message: said, field, value: Some(value), allowed: Some(allowed) }))
+}
+
+/// Line and column in words. An error of the second reading, which reads values, has none: that of the field is looked for.
+fn place(error: &serde_json::Error, path: &Path, bytes: &[u8]) -> String {
+    let segments: Vec<&Segment> = path.iter().collect();
+    let found = Place(&segments).deserialize(&mut serde_json::Deserializer::from_slice(bytes)).err();
+    let (line, column) = match found {
+        _ if error.line() > 0 => (error.line(), error.column()),
+        Some(found) if found.line() > 0 => (found.line(), found.column()),
+        _ => return String::new(),
+    };
+    format!(" (line {line}, column {column})")
+}
+
+/// Ends with an error where the value at a path begins.
+struct Place<'a>(&'a [&'a Segment]);
+
+impl<'de> DeserializeSeed<'de> for Place<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
+        if self.0.is_empty() { Err(D::Error::custom("here")) } else { reader.deserialize_any(self) }
+    }
+}
+
+impl<'de> Visitor<'de> for Place<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object or a list")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<(), A::Error> {
+        while let Some(name) = fields.next_key::<String>()? {
+            match self.0.first() {
+                Some(Segment::Map { key }) if *key == name => fields.next_value_seed(Place(&self.0[1..]))?,
+                _ => drop(fields.next_value::<IgnoredAny>()?),
+            }
+        }
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<(), A::Error> {
+        let Some(Segment::Seq { index }) = self.0.first() else { return Ok(()) };
+        for _ in 0..*index {
+            values.next_element::<IgnoredAny>()?;
+        }
+        values.next_element_seed(Place(&self.0[1..])).map(drop)
+    }
+}
+
+/// A value as it may be repeated in a sentence.
+fn shortened(value: &Value) -> String {
+    let whole = value.to_string();
+    match whole.char_indices().nth(SHOWN_VALUE) {
+        Some((end, _)) => format!("{}...", &whole[..end]),
+        None => whole,
+    }
+}
+
+fn value_at(bytes: &[u8], path: &Path) -> Value {
+    let whole: Value = serde_json::from_slice(bytes).unwrap_or_default();
+    let inside = path.iter().try_fold(&whole, |value, segment| match segment {
+        Segment::Seq { index } => value.get(index),
+        Segment::Map { key } => value.get(key),
+        Segment::Enum { .. } | Segment::Unknown => Some(value),
+    });
+    inside.cloned().unwrap_or_default()
+}
+
+/// What would have been read, in words that are not those of the program text.
+fn expected(message: &str) -> String {
+    let Some((_, expected)) = message.split_once("expected ") else { return message.to_owned() };
+    match expected {
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more".to_owned(),
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
+        "f32" | "f64" => "a number".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a string" => "a text".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        other if other.starts_with("struct ") => OBJECT.to_owned(),
+        other => other.replace('`', ""),
+    }
+}
+
+/// A value whose structures are objects with named fields.
+#[derive(Clone, Copy)]
+struct Named<'de>(&'de Value);
+
+impl<'de> IntoDeserializer<'de, serde_json::Error> for Named<'de> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'de> Deserializer<'de> for Named<'de> {
+    type Error = serde_json::Error;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        match self.0 {
+            Value::Array(values) => visitor.visit_seq(SeqDeserializer::new(values.iter().map(Named))),
+            Value::Object(fields) => visitor
+                .visit_map(MapDeserializer::new(fields.iter().map(|(name, value)| (name.as_str(), Named(value))))),
+            scalar => scalar.deserialize_any(visitor),
+        }
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Self::Error> {
+        match self.0 {
+            Value::Array(_) => Err(serde_json::Error::invalid_type(Unexpected::Seq, &OBJECT)),
+            _ => self.deserialize_any(visitor),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        if self.0.is_null() { visitor.visit_none() } else { visitor.visit_some(self) }
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Self::Error> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Self::Error> {
+        self.0.deserialize_enum(name, variants, visitor)
+    }
+
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Self::Error> {
+        visitor.visit_unit()
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
+        tuple_struct map identifier
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gait_optimizer::GaitSettings;
+    use serde_json::json;
+
+    fn refusal<T: DeserializeOwned>(text: &str) -> String {
+        match read::<T>(text.as_bytes()) {
+            Ok(_) => panic!("{text} was taken"),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn fields_have_names() {
+        for (text, place) in [
+            ("[]", "the whole document is not an object with named fields"),
+            (
+                r#"{"mesh": [3, 3, 4, 4]}"#,
+                "field mesh: [3,3,4,4] is not accepted (line 1, column 9); allowed: an object with named fields",
+            ),
+            (
+                "{\n\"limits\": {\"friction\": 0.5, \"duration_min_s\": [0.1, 0.1, 0.1, 0.1]}}",
+                "field limits.duration_min_s: [0.1,0.1,0.1,0.1] is not accepted (line 2, column 46); allowed: an object with \
+                 named fields",
+            ),
+        ] {
+            assert_eq!(refusal::<GaitSettings>(text), place);
+        }
+    }
+
+    #[test]
+    fn a_field_that_cannot_be_read_is_named_with_its_value_and_what_would_be() {
+        for (text, field, value, allowed) in [
+            (r#"{"mesh": {"ds2": "x"}}"#, "mesh.ds2", json!("x"), "a whole number, 0 or more"),
+            (r#"{"limits": {"friction": [1]}}"#, "limits.friction", json!([1]), "a number"),
+            (r#"{"limits": 3}"#, "limits", json!(3), "an object with named fields"),
+        ] {
+            match read::<GaitSettings>(text.as_bytes()) {
+                Err(Error::Unreadable(found)) => {
+                    assert_eq!(
+                        (found.field.as_str(), &found.value, found.allowed.as_deref()),
+                        (field, &Some(value), Some(allowed))
+                    );
+                }
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_document_says_is_read() {
+        let settings: GaitSettings =
+            read(br#"{"mesh": {"ds2": 3, "ds3": 3, "ss2": 4, "ss1": 4}, "limits": {"friction": 0.5}}"#).unwrap();
+        assert_eq!((settings.mesh.ds2, settings.limits.friction), (3, 0.5));
+        let written = serde_json::to_vec(&settings).unwrap();
+        assert_eq!(read::<GaitSettings>(&written).unwrap(), settings);
+        let list: Vec<Option<f64>> = read(b"[1, null, 2.5]").unwrap();
+        assert_eq!(list, [Some(1.0), None, Some(2.5)]);
+    }
+
+    #[test]
+    fn faults_are_told_with_value_place_and_what_is_allowed() {
+        for (text, told) in [
+            (
+                r#"{"mesh": {"ds2": "x"}}"#,
+                "field mesh.ds2: \"x\" is not accepted (line 1, column 20); allowed: a whole number, 0 or more",
+            ),
+            (r#"{"limits": {"friction": NaN}}"#, "field limits.friction: not JSON: expected value (line 1, column 25)"),
+            (
+                r#"{"limits": {"friction": 1e999}}"#,
+                "field limits.friction: not JSON: number out of range (line 1, column 29)",
+            ),
+            ("{} {}", "something follows the JSON document: trailing characters at line 1 column 4"),
+            ("{", "not JSON: EOF while parsing an object (line 1, column 1)"),
+            (r#"{"mesh": {"ds2": 3, "ds2": 4}}"#, "field mesh.ds2 is there twice (line 1, column 25)"),
+            (
+                r#"{"limits": {"duration_min_s": {"ds2": 0.03}}}"#,
+                "field limits.duration_min_s.ds3 is missing (line 1, column 43)",
+            ),
+        ] {
+            assert_eq!(refusal::<GaitSettings>(text), told);
+        }
+        let unknown = refusal::<GaitSettings>(r#"{"mash": 1}"#);
+        assert!(unknown.starts_with("field mash is not known (line 1, column 7); known: one of mesh, "), "{unknown}");
+        let long = refusal::<GaitSettings>(&format!(r#"{{"limits": {{"friction": "{}"}}}}"#, "ä".repeat(1000)));
+        assert!(long.chars().count() < 200, "{long}");
+    }
+}

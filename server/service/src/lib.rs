@@ -1,0 +1,15 @@
+//! Gaitwright without HTTP: who may do what ([`access`]), the rules of studies and the tuning loop ([`studies`]), and the
+//! engines that solve ([`workers`]).
+//!
+//! Arrows point down: [`access`], [`studies`] -> [`workers`] -> the record.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod access;
+pub mod document;
+pub mod error;
+pub mod printable;
+pub mod studies;
+pub mod supervise;
+pub mod workers;

@@ -1,0 +1,86 @@
+//! What people write: names of users, tokens, authors, studies; notes and reasons.
+
+use crate::error::Error;
+
+/// Characters that turn the text around them: a name with them reads as another one.
+const TURNING: [char; 12] = [
+    '\u{061c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
+    '\u{2067}', '\u{2068}', '\u{2069}',
+];
+
+/// The name without spaces around it.
+///
+/// # Errors
+/// [`Error::Invalid`] for nothing, for more than `longest` characters, and for characters that do not print.
+pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, Error> {
+    let trimmed = text.trim();
+    let prints = |c: char| !c.is_control() && !TURNING.contains(&c);
+    if trimmed.is_empty() || trimmed.chars().count() > longest || !trimmed.chars().all(prints) {
+        return Err(Error::invalid(field, text, &format!("1 to {longest} printable characters")));
+    }
+    Ok(trimmed)
+}
+
+/// A note: of more than one line, or nothing.
+///
+/// # Errors
+/// [`Error::Invalid`] for more than `longest` characters, and for characters that neither print nor part lines.
+pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error> {
+    let length = text.chars().count();
+    if length > longest {
+        return Err(Error::invalid(field, length, &format!("at most {longest} characters")));
+    }
+    let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
+    match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {
+        Some(c) => Err(Error::invalid(field, c.escape_unicode().to_string(), "characters that print, and line breaks")),
+        None => Ok(()),
+    }
+}
+
+/// Why something is done: a note that is not empty, without the space around it. `what` follows the allowed range.
+///
+/// # Errors
+/// As [`note`].
+pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a str, Error> {
+    const LONGEST: usize = 2000;
+    let text = text.trim();
+    if text.is_empty() {
+        return Err(Error::invalid(field, text, &format!("1 to {LONGEST} characters{what}")));
+    }
+    note(field, text, LONGEST)?;
+    Ok(text)
+}
+
+/// Whether two names are of one person: upper and lower case and spaces do not tell people apart.
+pub(crate) fn is_same_name(one: &str, other: &str) -> bool {
+    let letters = |name: &str| name.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
+    letters(one) == letters(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{name, note, reason};
+
+    #[test]
+    fn notes_have_lines_but_no_other_control_characters() {
+        for good in ["", "the left foot scuffed\r\n\ttwice", "Ünal-Řehoř"] {
+            note("note", good, 40).unwrap();
+        }
+        for (bad, why) in [("a\0b", "u{0}"), ("a\u{202e}b", "u{202e}"), ("a\u{1b}[1m", "u{1b}"), ("12345678901", "11")]
+        {
+            let refusal = note("note", bad, 10).unwrap_err().to_string();
+            assert!(refusal.contains(why), "{refusal}");
+        }
+        assert_eq!(reason("reason", " scuffed ", "").unwrap(), "scuffed");
+        assert!(reason("reason", " \n", ": why").unwrap_err().to_string().contains("1 to 2000 characters: why"));
+    }
+
+    #[test]
+    fn what_prints_is_a_name() {
+        assert_eq!(name("name", " Dr. Ünal-Řehoř ", 80).unwrap(), "Dr. Ünal-Řehoř");
+        for bad in ["", "  ", "a\0b", "a\nb", "a\u{202e}b", &"x".repeat(81)] {
+            let refusal = name("name", bad, 80).unwrap_err().to_string();
+            assert!(refusal.contains("1 to 80 printable characters"), "{refusal}");
+        }
+    }
+}

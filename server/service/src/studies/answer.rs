@@ -1,0 +1,160 @@
+//! A person's or a script's answer to a comparison: one way in for the form and the REST interface.
+
+use crate::access::Caller;
+use crate::error::Error;
+use crate::printable;
+use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::walkable;
+use gaitwright_store::audit;
+use gaitwright_store::feedback::{Attribution, FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::presentations::Judgement;
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Which of two gaits is better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PairAnswer {
+    /// The first.
+    A,
+    /// The second.
+    B,
+    /// Neither.
+    NoDifference,
+}
+
+/// An answer.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Answer {
+    /// The first gait.
+    pub trial_a: TrialId,
+    /// The second gait.
+    pub trial_b: TrialId,
+    /// Which is better.
+    pub answer: PairAnswer,
+    /// Who says so: `subject`, `clinician` or `script`.
+    /// By default what the caller is.
+    #[serde(default)]
+    pub source: Option<Source>,
+    /// Name or pseudonym of who says so; by default the name of the caller.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 80)]
+    pub author: Option<String>,
+    /// Free text.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub note: String,
+}
+
+/// Writes an answer.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
+pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: &Answer) -> Result<FeedbackId, Error> {
+    let study = studies::get(writer, study).await?;
+    let attribution = attribution(caller, answer.source, answer.author.as_deref(), &answer.note)?;
+    let (a, b) = (answer.trial_a, answer.trial_b);
+    let said = match answer.answer {
+        PairAnswer::A => Judgement::First,
+        PairAnswer::B => Judgement::Second,
+        PairAnswer::NoDifference => Judgement::NoDifference,
+    };
+    let fields = ("trial_a", "trial_b");
+    let statement = GivenJudgement { study: study.id, pair: (a, b), fields, said, attribution, again: Again::Refused };
+    let heard = preference::hear(writer, statement).await?;
+    let id = heard.ok_or_else(|| Error::Internal("a preference was not heard".to_owned()))?;
+    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
+    let detail =
+        json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": attribution.author });
+    audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
+    Ok(id)
+}
+
+/// Who says something: the caller, or whom the caller names.
+///
+/// # Errors
+/// [`Error::Invalid`] for `source`, `author` or `note`.
+pub fn attribution<'a>(
+    caller: &'a Caller,
+    source: Option<Source>,
+    author: Option<&'a str>,
+    note: &'a str,
+) -> Result<Attribution<'a>, Error> {
+    let source = source.unwrap_or_else(|| caller.source());
+    if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
+        return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
+    }
+    let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
+    // Who signed in speaks as a clinician under no other name.
+    if caller.user.is_some() && source == Source::Clinician && author != caller.name {
+        return Err(Error::invalid("author", author, &format!("{}, who is signed in, or absent", caller.name)));
+    }
+    printable::note("note", note, 2000)?;
+    Ok(Attribution { source, author, note })
+}
+
+/// A comparison lists so many answers of others.
+const BESIDE: u32 = 20;
+
+/// The newest answers of other people to the same comparison. All of them count.
+///
+/// # Errors
+/// What the database reports.
+pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
+    let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.said else {
+        return Ok(Vec::new());
+    };
+    Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)
+}
+
+/// Takes an answer back.
+///
+/// # Errors
+/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already,
+/// is not a comparison or is of a subject who withdrew.
+pub async fn retract(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: Option<StudyId>,
+    id: FeedbackId,
+    author: Option<&str>,
+    reason: &str,
+) -> Result<FeedbackRow, Error> {
+    if let Some(study) = study {
+        studies::get(writer, study).await?;
+    }
+    let row = feedback::get(writer, id).await?;
+    if study.is_some_and(|study| study != row.study_id) {
+        return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
+    }
+    consents::may_be_shown(writer, row.study_id).await?;
+    if matches!(row.said, FeedbackContent::Label { .. }) {
+        return Err(Error::conflict("only an answer can be taken back: a label says what the solver did"));
+    }
+    let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
+    let reason = printable::reason("reason", reason, ": why it is taken back")?;
+    if !feedback::retract(writer, &row, author, reason).await? {
+        return Err(Error::conflict("this answer was taken back already"));
+    }
+    events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": id })).await?;
+    let detail = json!({ "study": row.study_id, "author": author, "reason": reason });
+    audit::append(writer, &caller.actor, "preference.retract", &format!("preference {id}"), &detail).await?;
+    Ok(feedback::get(writer, id).await?)
+}
+
+/// A trial of the study whose gait converged; `field` named it.
+///
+/// # Errors
+/// [`Error::Invalid`] for a trial that is none of the study and for one without a gait.
+pub async fn comparable(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
+    let trial = walkable::trial_of_study(db, study, field, id).await?;
+    if trial.state != TrialState::Converged {
+        let allowed = format!("a converged trial; trial {} is {}", trial.number, trial.state.as_str());
+        return Err(Error::invalid(field, id.to_string(), &allowed));
+    }
+    Ok(trial)
+}

@@ -1,0 +1,369 @@
+//! What an archive must keep to be believed: every value by the rules of its noun, as if it came in by its own way, and
+//! every figure that follows from another one computed anew.
+
+use super::file::refuse;
+use crate::access::Reach;
+use crate::error::Error;
+use crate::printable;
+use crate::studies::comparison::by_gait_rmse;
+use crate::studies::lab::EmgResult;
+use crate::studies::{device, lab, person, plan, recording, search, trial_state};
+use gait_optimizer::metrics::gait_rmse;
+use gait_optimizer::solve::CONVERGED_VIOLATION;
+use gait_optimizer::{Gait, ReferenceGait, WarmStart};
+use gaitwright_compute::{OnPool, Pool};
+use gaitwright_store::archive::Definition;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::quarantine::Quarantine;
+use gaitwright_store::row::{Cell, Row};
+use gaitwright_store::studies::{FeedbackMode, Study, StudyPlan};
+use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::{
+    Connection, Instant, StoreError, StudyId, TrialId, archive, devices, feedback, gaits, lab_recordings, lab_sessions,
+    now, presentations, reference_gaits, remarks, results, safety_reviews, studies, subjects, trials,
+};
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+use uuid::Uuid;
+
+/// Texts that a noun reads by itself: their characters are its business.
+const READ_BY_NOUN: [&str; 12] = [
+    "definition",
+    "gait_settings",
+    "solve_options",
+    "base_bounds",
+    "search_space",
+    "learner",
+    "action",
+    "report",
+    "violations",
+    "reading",
+    "document",
+    "status",
+];
+/// Longest other text, characters: longer than any note.
+const LONGEST_TEXT: usize = 20_000;
+/// Clocks of two machines differ by less, s.
+const CLOCKS_DIFFER_S: i64 = 86_400;
+/// Two computations of a Gait RMSE agree to this share: sums are the same, machines round alike.
+const SAME_RMSE: f64 = 1e-9;
+
+/// Checks what can be said of a row alone: that texts print, instants have passed, identifiers are some.
+pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
+    for (column, cell) in row.cells() {
+        let Cell::Text(text) = cell else { continue };
+        let field = format!("{table}.{column}");
+        if READ_BY_NOUN.contains(&column) {
+            continue;
+        }
+        printable::note(&field, text, LONGEST_TEXT).map_err(refuse)?;
+        if column == "id" || column.ends_with("_id") {
+            let is_written_so = Uuid::parse_str(text).is_ok_and(|id| id.hyphenated().to_string() == *text);
+            if !is_written_so {
+                return Err(refuse(format!("{field}: {text:?} is no identifier")));
+            }
+        } else if column.ends_with("_at") || column.ends_with("_until") {
+            let at: Instant = text.parse().map_err(|_| refuse(format!("{field}: {text:?} is no instant")))?;
+            if at > now().plus_seconds(CLOCKS_DIFFER_S) && column != "lease_until" {
+                return Err(refuse(format!("{field}: {text} has not come yet")));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What checking found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Checked {
+    /// The study.
+    pub(super) study: StudyId,
+    /// Trials whose Gait RMSE could not be computed anew.
+    pub(super) unchecked_rmse: u32,
+}
+
+/// What a trial must agree with.
+struct Context {
+    study: Study,
+    device: gait_optimizer::Device,
+    reference: ReferenceGait,
+}
+
+/// Names what is wrong where an error says only what.
+fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E>) -> Result<T, Error> {
+    result.map_err(|error| refuse(format!("{what}: {error}")))
+}
+
+/// Checks everything in quarantine.
+pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Checked, Error> {
+    if let Some(parent) = quarantine.forked_from() {
+        at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is no identifier")))?;
+    }
+    let db = quarantine.db();
+    let found = at("studies", studies::page(db, Reach::Every, None, 2).await)?;
+    let [study] = &found[..] else { return Err(refuse(format!("it holds {} studies, expected one", found.len()))) };
+    let study = study.clone();
+    at(format!("study {}", study.id), plan::check_plan(&study.plan))?;
+
+    let subject = at("subject", subjects::get(db, study.plan.subject_id).await)?;
+    if at("subjects", subjects::all(db).await)?.len() != 1 {
+        return Err(refuse("it holds subjects that are not of its study"));
+    }
+    at(
+        format!("subject {}", subject.id),
+        person::check(&subject.pseudonym, subject.height_m, subject.body_mass_kg, &subject.notes),
+    )?;
+    let device = at("device", devices::get(db, study.plan.device_id).await)?.definition;
+    at("device", device::check(&device))?;
+    of_definition("devices", &device.name, &at("devices", archive::definition(db, "devices").await)?)?;
+    let reference = at("reference gait", reference_gaits::get(db, study.plan.reference_gait_id).await)?.definition;
+    at("reference gait", recording::check(&reference))?;
+    let written = at("reference_gaits", archive::definition(db, "reference_gaits").await)?;
+    of_definition("reference_gaits", &reference.name, &written)?;
+
+    let id = study.id;
+    let context = Arc::new(Context { study, device, reference });
+    let trials = at("trials", trials::of_study(db, id).await)?;
+    let mut unchecked_rmse = 0;
+    let mut earlier = HashSet::new();
+    for (place, trial) in trials.iter().enumerate() {
+        let what = format!("trial {} ({})", trial.number, trial.id);
+        if trial.number as usize != place + 1 {
+            return Err(refuse(format!("{what}: expected number {}", place + 1)));
+        }
+        for (column, other) in [("best_before", trial.best_before), ("warm_started_from", trial.warm_started_from)] {
+            if other.is_some_and(|other| !earlier.contains(&other)) {
+                return Err(refuse(format!("{what}: {column} is no earlier trial")));
+            }
+        }
+        earlier.insert(trial.id);
+        at(&what, figures(trial, &context.study.plan))?;
+        let has_gait = at(&what, gait(db, pool, trial, &context).await)?;
+        unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
+        at(&what, brought(db, trial).await)?;
+    }
+    if let Some(number) = at("jobs", archive::trial_unlike_its_job(db).await)? {
+        return Err(refuse(format!("trial {number}: its job says otherwise than its state")));
+    }
+    answers(db, &context.study, &trials).await?;
+    lab(db, pool, id).await?;
+    Ok(Checked { study: id, unchecked_rmse })
+}
+
+/// Checks a definition against the name and the hash beside it.
+fn of_definition(table: &str, name: &str, written: &Definition) -> Result<(), Error> {
+    if written.name != name || written.sha256 != gaitwright_store::sha256(written.text.as_bytes()) {
+        return Err(refuse(format!("{table}: name, definition and hash do not agree")));
+    }
+    Ok(())
+}
+
+/// Checks an action, and the figures of a trial against its state and its report.
+fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
+    if trial.action_index.0 >= plan.search_space.len() {
+        return Err(format!("action_index {} is not in the search space", trial.action_index.0));
+    }
+    let action = search::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
+    if action.map_err(|e| e.to_string())? != trial.action {
+        return Err("the action is not that of its index".to_owned());
+    }
+    let figures = [trial.gait_rmse_rad, trial.cost_of_transport, trial.max_violation, trial.seconds_total];
+    if figures.iter().flatten().any(|figure| !figure.is_finite() || *figure < 0.0) {
+        return Err("a figure is negative or not finite".to_owned());
+    }
+    if trial.asked_by.is_some() || !trial.state.is_result() {
+        let none = trial.report.is_none() && trial.status.is_none();
+        return if none { Ok(()) } else { Err("a trial without a solve has the report of one".to_owned()) };
+    }
+    let state = trial.status.and_then(trial_state::result_of);
+    if state != Some(trial.state) {
+        return Err(format!("status {:?} does not make it {}", trial.status, trial.state.as_str()));
+    }
+    let Some(report) = &trial.report else {
+        return if trial.state == TrialState::Converged { Err("it has no report".to_owned()) } else { Ok(()) };
+    };
+    let converged = trial.state == TrialState::Converged;
+    let of_gait = |figure: f64| converged.then_some(figure);
+    let same = Some(report.status) == trial.status
+        && trial.gait_rmse_rad == of_gait(report.gait_rmse_rad)
+        && trial.cost_of_transport == of_gait(report.cost_of_transport)
+        && trial.objective == Some(report.objective)
+        && trial.max_violation == Some(report.max_violation)
+        && trial.iterations.is_some_and(|count| count as usize == report.iterations)
+        && trial.seconds_total == Some(report.seconds_total);
+    if !same {
+        return Err("its figures are not those of its report".to_owned());
+    }
+    if converged && report.max_violation > CONVERGED_VIOLATION {
+        return Err(format!("it converged with a violation of {}", report.max_violation));
+    }
+    Ok(())
+}
+
+/// Checks the gait of a trial and computes its Gait RMSE anew. Whether it has one.
+async fn gait(db: &mut Connection, pool: &Pool, trial: &Trial, context: &Arc<Context>) -> Result<bool, String> {
+    let text = |error: StoreError| error.to_string();
+    if !gaits::is_here(db, trial.id).await.map_err(text)? {
+        return Ok(false);
+    }
+    if trial.asked_by.is_some() || !trial.state.is_result() {
+        return Err("it has a gait without a solve".to_owned());
+    }
+    let gait = gaits::get(db, trial.id).await.map_err(text)?;
+    let warm_start = gaits::warm_start(db, trial.id).await.map_err(text)?;
+    let iterations = gaits::iterations(db, trial.id).await.map_err(text)?;
+    let (trial, context) = (trial.clone(), Arc::clone(context));
+    let id = trial.id;
+    let checked = move |pool: &OnPool| {
+        let gait = gait.unpack(pool).map_err(text)?;
+        let warm_start = warm_start.unpack(pool).map_err(text)?;
+        iterations.unpack(pool).map_err(text)?;
+        solved(&trial, &context, &gait, &warm_start)?;
+        Ok::<_, String>(gait)
+    };
+    let gait = pool.run(checked).await.map_err(|e| e.to_string())??;
+    if !gaits::is_described(db, id, &gait).await.map_err(text)? {
+        return Err("its gait is not as its row describes it".to_owned());
+    }
+    Ok(true)
+}
+
+/// Checks what a solve left against its trial.
+fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart) -> Result<(), String> {
+    gait.validate().map_err(|e| e.to_string())?;
+    let plan = &context.study.plan;
+    if gait.device != context.device
+        || gait.muscles != plan.muscles
+        || gait.settings != *plan.gait_settings
+        || gait.bounds != trial.action
+    {
+        return Err("its gait is of another device, problem or action".to_owned());
+    }
+    if warm_start.muscles != plan.muscles || warm_start.mesh != plan.gait_settings.mesh {
+        return Err("its warm start is of another problem".to_owned());
+    }
+    same_rmse(trial, gait, &context.reference)
+}
+
+fn same_rmse(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
+    let Some(report) = &trial.report else { return Ok(()) };
+    let anew = gait_rmse(gait, reference);
+    let agree = |told: f64, anew: f64| (told - anew).abs() <= SAME_RMSE * (1.0 + anew.abs());
+    let parts = report.gait_rmse_parts_rad.iter().zip(anew.parts).all(|(told, anew)| agree(*told, anew));
+    if agree(report.gait_rmse_rad, anew.total) && parts {
+        return Ok(());
+    }
+    Err(format!("its Gait RMSE is stated as {} rad, but its gait has {} rad", report.gait_rmse_rad, anew.total))
+}
+
+/// Checks what workers brought for a trial.
+async fn brought(db: &mut Connection, trial: &Trial) -> Result<(), String> {
+    let results = results::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
+    let mut taken = results.iter().filter(|result| result.taken);
+    let Some(result) = taken.next() else { return Ok(()) };
+    if taken.next().is_some() {
+        return Err("two results were taken".to_owned());
+    }
+    if Some(result.status) != trial.status || result.report != trial.report {
+        return Err("its result is not the one that was taken".to_owned());
+    }
+    Ok(())
+}
+
+/// Checks what the learner hears, and what people said beside it.
+async fn answers(db: &mut Connection, study: &Study, trials: &[Trial]) -> Result<(), Error> {
+    let id = study.id;
+    let by_id: HashMap<TrialId, &Trial> = trials.iter().map(|trial| (trial.id, trial)).collect();
+    let rows = at("feedback", feedback::of_study(db, id, 0).await)?;
+    let mut labelled = 0;
+    for row in &rows {
+        at(format!("feedback {} ({})", row.seq, row.id), heard(row, study, &by_id))?;
+        labelled += usize::from(matches!(row.said, FeedbackContent::Label { .. }));
+    }
+    let results = trials.iter().filter(|trial| trial.state.is_result()).count();
+    if labelled != results {
+        return Err(refuse(format!("{results} trials have a result and {labelled} a label")));
+    }
+    let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.said)?))).collect();
+    for remark in at("remarks", remarks::of_study(db, id).await)? {
+        let wanted = sorted(remark.first, remark.second);
+        if remark.feedback_id.is_some_and(|heard| pairs.get(&heard) != Some(&wanted)) {
+            return Err(refuse(format!("remark {}: what the learner heard of it is of other trials", remark.id)));
+        }
+    }
+    at("presentations", presentations::of_study(db, id).await)?;
+    at("safety_reviews", safety_reviews::of_study(db, id).await)?;
+    Ok(())
+}
+
+fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
+    if a < b { (a, b) } else { (b, a) }
+}
+
+fn pair(said: &FeedbackContent) -> Option<(TrialId, TrialId)> {
+    match *said {
+        FeedbackContent::Preference { winner, loser } => Some(sorted(winner, loser)),
+        FeedbackContent::Tie { a, b } => Some(sorted(a, b)),
+        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
+    }
+}
+
+/// Checks one row that the learner hears against the trials that it is of.
+fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
+    let trial = |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} is not of this study"));
+    match row.said {
+        FeedbackContent::Label { trial: id, category } => {
+            let state = trial(id)?.state;
+            let converged = state == TrialState::Converged;
+            if !state.is_result() || category != u32::from(converged) {
+                return Err(format!("category {category} is not that of a trial that is {}", state.as_str()));
+            }
+            if !matches!(row.source, Source::Convergence | Source::Script) {
+                return Err(format!("a label by {}", row.source.as_str()));
+            }
+        }
+        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
+            let (a, b) = (trial(a)?, trial(b)?);
+            if a.state != TrialState::Converged || b.state != TrialState::Converged {
+                return Err("it compares a trial that did not converge".to_owned());
+            }
+            match row.source {
+                Source::Convergence => return Err("convergence compares nothing".to_owned()),
+                Source::GaitRmse => {
+                    if study.plan.feedback_mode == FeedbackMode::Human {
+                        return Err("Gait RMSE answers in a study of people".to_owned());
+                    }
+                    let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {
+                        return Err("Gait RMSE compares a trial that has none".to_owned());
+                    };
+                    let expected = by_gait_rmse((a.id, one), (b.id, other));
+                    if pair(&expected) != pair(&row.said)
+                        || std::mem::discriminant(&expected) != std::mem::discriminant(&row.said)
+                        || matches!((expected, row.said), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
+                    {
+                        return Err("Gait RMSE says otherwise".to_owned());
+                    }
+                }
+                Source::Subject | Source::Clinician | Source::Script => {}
+            }
+        }
+        FeedbackContent::Suggestion { suggested, over } => {
+            trial(over)?;
+            if suggested.0 >= study.plan.search_space.len() {
+                return Err(format!("action {} is not in the search space", suggested.0));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks what was measured in the lab.
+async fn lab(db: &mut Connection, pool: &Pool, study: StudyId) -> Result<(), Error> {
+    for session in at("lab_sessions", lab_sessions::of_study(db, study).await)? {
+        for found in at("lab_recordings", lab_recordings::of_session(db, session.id).await)? {
+            at(format!("recording {}", found.id), lab::check_kept(db, pool, &found).await)?;
+        }
+        let results = lab_recordings::results::<EmgResult>(db, session.id).await;
+        at(format!("EMG results of lab session {}", session.id), results)?;
+    }
+    Ok(())
+}

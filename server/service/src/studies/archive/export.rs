@@ -1,0 +1,74 @@
+//! Writing an archive.
+
+use super::file::Packer;
+use super::signature::SigningKey;
+use crate::error::Error;
+use gaitwright_store::archive::{self, Read};
+use gaitwright_store::archived_allocations::masked;
+use gaitwright_store::{StoreError, StudyId, backup};
+use std::io::Write;
+use std::path::Path;
+use tokio::sync::mpsc;
+
+/// Rows that were read and not yet written: few, because a row may be large.
+const ROWS_AHEAD: usize = 2;
+
+/// Writes the study of a record into an archive. Reads on a connection of its own, as of one instant; rows are hashed and
+/// compressed on another thread as they come.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when the subject withdrew or a row is not as the program wrote it, or what the
+/// database or the writer reports; what was written until then has no end, and is refused by every import.
+pub async fn export<W: Write + Send + 'static>(
+    database: &Path,
+    study: StudyId,
+    out: W,
+    key: Option<SigningKey>,
+) -> Result<W, Error> {
+    let pool = backup::open_read_only(database).await?;
+    let (sender, mut rows) = mpsc::channel::<Option<Read>>(ROWS_AHEAD);
+    #[allow(clippy::disallowed_methods, reason = "works while rows come in, which no pool of finished data can")]
+    let packing = tokio::task::spawn_blocking(move || {
+        let mut packer = Packer::new(out).map_err(Error::Output)?;
+        while let Some(next) = rows.blocking_recv() {
+            let Some(Read { table, row, sealed, seal }) = next else {
+                return packer.finish(key.as_ref()).map(Some).map_err(Error::Output);
+            };
+            if sealed && seal.as_ref() != Some(&row.sha256()) {
+                let reason = format!("a row of {table} was changed outside the program: see `gaitwright audit verify`");
+                return Err(Error::conflict(format!("the study cannot be exported: {reason}")));
+            }
+            packer.add(table, &masked(table, row)).map_err(Error::Output)?;
+        }
+        Ok(None)
+    });
+    let read = async {
+        let mut reader = pool.acquire().await.map_err(StoreError::from)?;
+        let (forward, read) = mpsc::channel(1);
+        let reading = async {
+            let done = archive::read(&mut reader, study, &forward).await;
+            drop(forward);
+            done
+        };
+        let handing = async {
+            // Moved in here, so that reading ends when nobody writes any more.
+            let mut read = read;
+            while let Some(row) = read.recv().await {
+                if sender.send(Some(row)).await.is_err() {
+                    return;
+                }
+            }
+        };
+        let (done, ()) = tokio::join!(reading, handing);
+        done?;
+        // Only a study that was read to its end has an end.
+        let _ = sender.send(None).await;
+        Ok::<_, StoreError>(())
+    }
+    .await;
+    drop(sender);
+    pool.close().await;
+    let packed = packing.await.map_err(|e| Error::Internal(e.to_string()))?;
+    read?;
+    packed?.ok_or_else(|| Error::Internal("the archive has no end".to_owned()))
+}

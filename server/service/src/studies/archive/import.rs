@@ -1,0 +1,169 @@
+//! Reading an archive into a record.
+
+use super::check;
+use super::file::{Next, Unpacker, Whole, refuse};
+use super::signature::PublicKey;
+use crate::error::Error;
+use gaitwright_compute::Pool;
+use gaitwright_store::archive::{self, Known, Unpacking};
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::imports::{self, NewImport};
+use gaitwright_store::quarantine::Quarantine;
+use gaitwright_store::row::{Cell, Row};
+use gaitwright_store::{Store, StoreError, StudyId, Writer, commit, events, studies};
+use serde_json::json;
+use std::io::Read;
+use tokio::sync::mpsc;
+
+/// Rows that were read and not yet written: few, because a row may be large.
+const ROWS_AHEAD: usize = 2;
+
+/// An archive that was unpacked and checked, not yet written anywhere.
+#[derive(Debug)]
+pub struct Archive {
+    quarantine: Quarantine,
+    study: StudyId,
+    origin: NewImport,
+}
+
+/// Unpacks and checks an archive. Where keys are given, it must be signed by one of them.
+///
+/// # Errors
+/// [`Error::Malformed`] naming the row and what is wrong with it.
+pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> Result<Archive, Error> {
+    let (sender, mut rows) = mpsc::channel::<(&'static str, Row)>(ROWS_AHEAD);
+    #[allow(clippy::disallowed_methods, reason = "works while rows come in, which no pool of finished data can")]
+    let reading = tokio::task::spawn_blocking(move || -> Result<Option<Whole>, Error> {
+        let mut unpacker = Unpacker::new(from)?;
+        loop {
+            match unpacker.next()? {
+                Next::End(whole) => return Ok(Some(whole)),
+                Next::Row(table, row) => {
+                    check::cells(table, &row)?;
+                    if sender.blocking_send((table, row)).is_err() {
+                        return Ok(None);
+                    }
+                }
+            }
+        }
+    });
+    let mut quarantine = Quarantine::new().await?;
+    let mut number = 0_u64;
+    let mut refused = None;
+    while let Some((table, row)) = rows.recv().await {
+        number += 1;
+        let id = row.text("id").or_else(|| row.text("trial_id")).unwrap_or_default();
+        let named = format!("row {number}, of table {table} {id:.36}");
+        if let Err(error) = quarantine.add(table, row).await {
+            refused = Some(refuse(format!("{named}: {error}")));
+            break;
+        }
+    }
+    drop(rows);
+    let whole = reading.await.map_err(|e| Error::Internal(e.to_string()))?;
+    if let Some(refused) = refused {
+        return Err(refused);
+    }
+    let whole = whole?.ok_or_else(|| refuse("it has no end"))?;
+    let trusted_key = whole.signed_by.as_ref().is_some_and(|key| trusted.contains(key));
+    if !trusted.is_empty() && !trusted_key {
+        let by = whole.signed_by.as_ref().map_or("nobody", PublicKey::as_str);
+        return Err(refuse(format!("it is signed by {by}, which is none of the keys to trust")));
+    }
+    quarantine.settle().await.map_err(refuse)?;
+    let checked = check::study(&mut quarantine, &Pool::default()).await?;
+    let origin = NewImport {
+        file_sha256: whole.file_sha256,
+        signed_by: whole.signed_by.map(|key| key.to_string()),
+        trusted: trusted_key,
+        unchecked_rmse: checked.unchecked_rmse,
+    };
+    Ok(Archive { quarantine, study: checked.study, origin })
+}
+
+/// Writes the study of an archive into a record, and where it came from.
+///
+/// # Errors
+/// [`Error::Conflict`] when the study is there or does not fit; nothing is changed then.
+pub async fn import(store: &Store, actor: &Actor, archive: Archive) -> Result<StudyId, Error> {
+    let Archive { mut quarantine, study, origin } = archive;
+    let mut writer = store.write().await?;
+    match studies::get(&mut writer, study).await {
+        Ok(_) => return Err(Error::conflict(format!("study {study} is in this record already"))),
+        Err(StoreError::Missing { .. }) => {}
+        Err(other) => return Err(other.into()),
+    }
+    copy(&mut quarantine, study, &mut writer).await?;
+    let present = studies::get(&mut writer, study).await?;
+    imports::insert(&mut writer, study, actor, &origin).await?;
+    let payload = json!({ "state": present.state, "reason": "imported" });
+    events::append(&mut writer, study, "study_changed", &payload).await?;
+    let detail = json!({
+        "name": present.plan.name,
+        "file_sha256": origin.file_sha256,
+        "signed_by": origin.signed_by,
+        "trusted": origin.trusted,
+        "unchecked_rmse": origin.unchecked_rmse,
+    });
+    audit::append(&mut writer, actor, "study.import", &format!("study {study}"), &detail).await?;
+    commit(writer).await?;
+    Ok(study)
+}
+
+/// Copies every row into a transaction.
+async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer) -> Result<(), Error> {
+    let forked_from = quarantine.forked_from().map(str::to_owned);
+    let (sender, mut rows) = mpsc::channel::<archive::Read>(ROWS_AHEAD);
+    let reading = async {
+        let done = archive::read(quarantine.db(), study, &sender).await;
+        drop(sender);
+        done
+    };
+    let writing = async move {
+        let mut unpacking = Unpacking::default();
+        while let Some(archive::Read { table, mut row, .. }) = rows.recv().await {
+            if table == "studies" {
+                row.set("forked_from", forked_from.clone().map_or(Cell::Null, Cell::Text));
+            }
+            if matches!(table, "subjects" | "devices" | "reference_gaits")
+                && !is_new(writer, table, &row, &mut unpacking).await?
+            {
+                continue;
+            }
+            unpacking.adapt_and_write(writer, table, row).await.map_err(does_not_fit)?;
+        }
+        Ok::<_, Error>(())
+    };
+    let (read, written) = tokio::join!(reading, writing);
+    written?;
+    Ok(read?)
+}
+
+fn does_not_fit(reason: impl std::fmt::Display) -> Error {
+    Error::conflict(format!("the archive does not fit this record, nothing was changed: {reason}"))
+}
+
+/// Whether a subject, device or reference gait is to be written. The very same row may be here already; another one under
+/// its identifier or name is a contradiction that a person must settle.
+async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unpacking) -> Result<bool, Error> {
+    let id = row.text("id").unwrap_or_default().to_owned();
+    let what = match table {
+        "subjects" => "subject",
+        "devices" => "device",
+        _ => "reference gait",
+    };
+    match archive::known(writer, table, row).await? {
+        Known::New => Ok(true),
+        Known::Same(here) => {
+            unpacking.same.insert(id, here);
+            Ok(false)
+        }
+        Known::Differs(columns) => {
+            let differing: Vec<String> = columns.iter().map(|column| format!("{column} differs")).collect();
+            Err(does_not_fit(format!("{what} {id} is known here with other content ({})", differing.join(", "))))
+        }
+        Known::NameTaken(name) => {
+            Err(does_not_fit(format!("another {what} here is named {name:?}: rename one of them where they come from")))
+        }
+    }
+}

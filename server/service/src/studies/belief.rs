@@ -1,0 +1,163 @@
+//! What the learner believes about a study's search space, in the forms people ask for, kept until it hears more.
+
+use super::seed::{Purpose, derive};
+use super::snapshot::StudySnapshot;
+use gait_learner::{ActionIndex, Agreement, BestProbability, Learner, LearnerError, Marginal, Posterior};
+use gaitwright_compute::OnPool;
+use gaitwright_store::StudyId;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Joint draws behind the probabilities of being best: their standard error is below 1.6 %.
+const DRAWS: usize = 1000;
+/// From so many answers on the belief takes longer than a page may: its time grows with their third power.
+pub const MOST_ANSWERS: usize = 1500;
+/// So many studies are kept.
+const KEPT: usize = 16;
+/// Of so many studies the learner's state is kept, from which the next posterior is an update.
+const KEPT_LEARNERS: usize = 4;
+/// The state of a study with more trials is not kept: its memory grows with their second power, here to about 100 MB.
+const MOST_KEPT_TRIALS: usize = 2000;
+
+/// What the learner believes after a log.
+#[derive(Debug)]
+pub struct Belief {
+    /// The belief itself, for what else is asked.
+    pub posterior: Arc<Posterior>,
+    /// For each dimension the utility of its levels, averaged over all others.
+    pub marginals: Vec<Vec<Marginal>>,
+    /// The actions tried, the one that is most likely the best first.
+    pub best: Vec<BestProbability>,
+    /// How many answers it agrees with.
+    pub agreement: Agreement,
+    /// Every comparison that stands, the one that surprises it most first.
+    pub comparisons: Vec<Comparison>,
+}
+
+/// A comparison that was answered, and what is believed of it now.
+#[derive(Debug)]
+pub struct Comparison {
+    /// The answer.
+    pub given: FeedbackRow,
+    /// The probability that the same answer would be given to the same question.
+    pub probability: f64,
+}
+
+impl Belief {
+    /// What follows from the posterior of a study: CPU work.
+    fn of(snapshot: &StudySnapshot, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
+        let plan = &snapshot.study.plan;
+        let dimensions = 0..plan.search_space.dimensions().len();
+        let marginals = dimensions.map(|d| posterior.marginal(d)).collect::<Result<_, _>>()?;
+        let mut comparisons = Vec::new();
+        for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
+            let Some((winner, loser)) = preferred(snapshot, row) else { continue };
+            let probability = posterior.preference_probability(winner, loser)?;
+            comparisons.push(Comparison { given: row.clone(), probability });
+        }
+        comparisons.sort_by(|a, b| a.probability.total_cmp(&b.probability));
+        Ok(Self {
+            marginals,
+            best: posterior.best_of_visited(DRAWS, derive(plan.seed, Purpose::Belief, 0))?,
+            agreement: posterior.agreement(),
+            posterior,
+            comparisons,
+        })
+    }
+}
+
+/// Winner and loser as actions, of a preference between two trials that tried different ones.
+fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex, ActionIndex)> {
+    let action = |id| snapshot.trial(id).map(|trial| trial.action_index);
+    match row.said {
+        FeedbackContent::Preference { winner, loser } => {
+            Some((action(winner)?, action(loser)?)).filter(|(winner, loser)| winner != loser)
+        }
+        _ => None,
+    }
+}
+
+/// The beliefs that were computed last, and the learners that computed them.
+#[derive(Debug, Default)]
+pub struct Beliefs {
+    learners: Mutex<VecDeque<(StudyId, Arc<Mutex<Learner>>)>>,
+    posteriors: Kept<Posterior>,
+    shown: Kept<Belief>,
+}
+
+impl Beliefs {
+    /// The posterior of a study, computed where the log has changed since: CPU work.
+    ///
+    /// # Errors
+    /// When the learner refuses the log.
+    pub fn posterior(&self, _: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Posterior>, LearnerError> {
+        let plan = &snapshot.study.plan;
+        let learner = self.learner(snapshot.study.id);
+        // Whoever asks for the same study meanwhile waits for this result instead of computing it again.
+        let mut learner = learner.lock().unwrap_or_else(|poisoned| {
+            let mut learner = poisoned.into_inner();
+            *learner = Learner::default();
+            learner
+        });
+        let posterior =
+            self.posteriors.get_or(snapshot, || learner.posterior(&plan.search_space, &snapshot.log(), &plan.learner));
+        if snapshot.trials.len() > MOST_KEPT_TRIALS {
+            *learner = Learner::default();
+        }
+        posterior
+    }
+
+    /// The learner of a study, new where none is kept.
+    fn learner(&self, study: StudyId) -> Arc<Mutex<Learner>> {
+        let mut learners = self.learners.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = learners.iter().position(|(id, _)| *id == study).and_then(|at| learners.remove(at));
+        let (study, learner) = kept.unwrap_or_else(|| (study, Arc::default()));
+        learners.push_back((study, Arc::clone(&learner)));
+        if learners.len() > KEPT_LEARNERS {
+            learners.pop_front();
+        }
+        learner
+    }
+
+    /// The belief of a study, computed where the log has changed since: CPU work.
+    ///
+    /// # Errors
+    /// When the learner refuses the log.
+    pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
+        self.shown.get_or(snapshot, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
+    }
+}
+
+/// What follows from the log of a study, of those that were asked for last.
+#[derive(Debug)]
+struct Kept<T>(Mutex<VecDeque<(StudyId, LogVersion, Arc<T>)>>);
+
+impl<T> Default for Kept<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Kept<T> {
+    fn get_or(
+        &self,
+        snapshot: &StudySnapshot,
+        compute: impl FnOnce() -> Result<T, LearnerError>,
+    ) -> Result<Arc<T>, LearnerError> {
+        let (study, version) = (snapshot.study.id, snapshot.version);
+        // The list is whole between any two statements that hold the lock.
+        let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, found)) = kept().iter().find(|(id, at, _)| (*id, *at) == (study, version)) {
+            return Ok(Arc::clone(found));
+        }
+        let computed = Arc::new(compute()?);
+        let mut kept = kept();
+        kept.retain(|(id, ..)| *id != study);
+        kept.push_back((study, version, Arc::clone(&computed)));
+        if kept.len() > KEPT {
+            kept.pop_front();
+        }
+        Ok(computed)
+    }
+}

@@ -1,0 +1,143 @@
+//! The draw: which pair a rater is shown next. A pure function of what the study asks, what the rater was shown before and
+//! a lot of the operating system. On which side a gait is shown is drawn apart, in `store::allocations`.
+
+use gaitwright_store::presentations::{Judgement, Kind, Presentation};
+use gaitwright_store::{PresentationId, TrialId};
+
+/// One in so many presentations repeats an earlier pair.
+const REPEAT_ONE_IN: u64 = 10;
+
+/// What is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drawn {
+    /// Why.
+    pub kind: Kind,
+    /// The two gaits, the newer one first.
+    pub pair: (TrialId, TrialId),
+    /// The presentation that it repeats.
+    pub repeats: Option<PresentationId>,
+    /// The presentation whose answer was taken back: it comes again, with the same sides.
+    pub again: Option<PresentationId>,
+}
+
+/// Draws what a rater is shown next. `question`: the newer and the older trial of the pair that the study asks for;
+/// `before`: what this rater was shown, in order; `closed`: trials that nobody may be shown.
+pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
+    let taken_back = before.last().filter(|last| last.answer == Some(Judgement::Withdrawn) && last.kind != Kind::Null);
+    if let Some(last) = taken_back.filter(|last| !last.has_one_of(closed)) {
+        // Whoever mistook one side for the other must not find them exchanged.
+        let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
+        let is_question = is_same_pair(last.pair(), question);
+        if last.kind == Kind::Repeat || is_question {
+            return again;
+        }
+    }
+    let new = Drawn { kind: Kind::New, pair: question, repeats: None, again: None };
+    if !lot.is_multiple_of(REPEAT_ONE_IN) {
+        return new;
+    }
+    let repeat = |earlier: &Presentation| Drawn {
+        kind: Kind::Repeat,
+        pair: earlier.pair(),
+        repeats: Some(earlier.id),
+        again: None,
+    };
+    repeatable(before, closed, lot / REPEAT_ONE_IN).map_or(new, repeat)
+}
+
+/// An earlier pair with a plain answer that was not repeated yet.
+fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> Option<&'a Presentation> {
+    let plain = |shown: &&Presentation| {
+        shown.kind == Kind::New
+            && shown.answer.is_some_and(is_plain)
+            && !shown.has_one_of(closed)
+            && !before.iter().any(|other| other.repeats == Some(shown.id))
+    };
+    let candidates: Vec<&Presentation> = before.iter().filter(plain).collect();
+    let index = lot.checked_rem(candidates.len() as u64)?;
+    candidates.get(usize::try_from(index).ok()?).copied()
+}
+
+/// Whether an answer compares the two gaits.
+pub(super) fn is_plain(said: Judgement) -> bool {
+    matches!(said, Judgement::First | Judgement::Second | Judgement::NoDifference)
+}
+
+/// Whether two pairs are of the same gaits.
+pub(super) fn is_same_pair((a, b): (TrialId, TrialId), other: (TrialId, TrialId)) -> bool {
+    other == (a, b) || other == (b, a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gaitwright_store::{StudyId, now};
+
+    fn shown(number: u32, drawn: Drawn) -> Presentation {
+        Presentation {
+            id: PresentationId::fresh(),
+            token: String::new(),
+            study_id: StudyId::fresh(),
+            rater: "R".to_owned(),
+            number,
+            kind: drawn.kind,
+            one: drawn.pair.0,
+            other: drawn.pair.1,
+            repeats: drawn.repeats,
+            unblinded: false,
+            created_at: now(),
+            answer: Some(Judgement::First),
+            answered_at: Some(now()),
+        }
+    }
+
+    fn question() -> (TrialId, TrialId) {
+        (TrialId::fresh(), TrialId::fresh())
+    }
+
+    #[test]
+    fn one_presentation_in_ten_repeats_an_earlier_pair_and_each_pair_once() {
+        let mut before: Vec<Presentation> = Vec::new();
+        for number in 1..=400 {
+            let drawn = draw(u64::from(number) * 7, question(), &before, &[]);
+            if let Some(repeats) = drawn.repeats {
+                let earlier = before.iter().find(|shown| shown.id == repeats).unwrap();
+                assert_eq!((drawn.kind, drawn.pair), (Kind::Repeat, earlier.pair()));
+                assert!(!before.iter().any(|shown| shown.repeats == Some(repeats)));
+            }
+            before.push(shown(number, drawn));
+        }
+        let repeats = before.iter().filter(|shown| shown.kind == Kind::Repeat).count();
+        assert_eq!(repeats, 40);
+        assert!(before.iter().all(|shown| shown.kind != Kind::Null));
+    }
+
+    #[test]
+    fn a_pair_whose_answer_was_taken_back_comes_again_with_its_sides() {
+        for lot in [1, 10] {
+            let asked = question();
+            let earlier = shown(1, draw(1, question(), &[], &[]));
+            let drawn = draw(lot, asked, std::slice::from_ref(&earlier), &[]);
+            let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(2, drawn) };
+            let id = taken_back.id;
+            let again = draw(3, asked, &[earlier, taken_back], &[]);
+            assert_eq!(again, Drawn { again: Some(id), ..drawn });
+        }
+    }
+
+    #[test]
+    fn a_question_that_the_study_asks_no_more_does_not_come_again() {
+        let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(1, draw(1, question(), &[], &[])) };
+        let asked = question();
+        assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);
+    }
+
+    #[test]
+    fn unsafe_gaits_are_not_repeated() {
+        let drawn = draw(1, question(), &[], &[]);
+        let before: Vec<Presentation> = (1..=50).map(|number| shown(number, drawn)).collect();
+        for lot in 0..50 {
+            assert_eq!(draw(10 * lot, question(), &before, &[drawn.pair.1]).kind, Kind::New);
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Who could have known which gait is which.
+
+use crate::access::{Caller, Right};
+use crate::error::Error;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::{Connection, StudyId, allocations, presentations};
+
+/// Whether a caller is never blind: whoever may read can open the trials; and who holds a token is not known, nor what they
+/// may read.
+pub fn sees_gaits(caller: &Caller) -> bool {
+    Actor::is_token(caller.actor.as_str()) || caller.may(Right::Read)
+}
+
+/// Whether a caller could know which gait is which in a study: besides who [never is blind](sees_gaits), a rater may have
+/// been unblinded, and a controller file of a lab walk shows a gait.
+///
+/// # Errors
+/// What the database reports.
+pub async fn could_have_known(db: &mut Connection, caller: &Caller, study: StudyId) -> Result<bool, Error> {
+    Ok(sees_gaits(caller)
+        || presentations::is_unblinded(db, study, &caller.name).await?
+        || allocations::has_file(db, study, &caller.actor).await?)
+}

@@ -1,0 +1,341 @@
+//! What a rater does: takes the next pair, answers it. And the act that unblinds a rater.
+
+use super::could_have_known;
+use super::draw::draw;
+use crate::access::{Caller, secret};
+use crate::error::Error;
+use crate::printable;
+use crate::studies::answer as answering;
+use crate::studies::comparison::open_question;
+use crate::studies::preference::{self, Again, GivenJudgement};
+use crate::studies::safety_reports::SafetyReports;
+use crate::studies::snapshot::StudySnapshot;
+use crate::studies::walkable;
+use gaitwright_store::allocations::{self, Lot, Sided};
+use gaitwright_store::audit;
+use gaitwright_store::feedback::{self, Attribution, Source};
+use gaitwright_store::presentations::{self, Judgement, Kind, NewAnswer, NewPresentation, Presentation};
+use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::{
+    Connection, Instant, LentWriter, PresentationId, Store, StudyId, TrialId, Writer, consents, events, members,
+    studies,
+};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// What a rater answers.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RaterAnswer {
+    /// What the rater says; `withdrawn` is the program's own word.
+    pub answer: Judgement,
+    /// How long the rater took, ms.
+    #[serde(default)]
+    #[schema(minimum = 0)]
+    pub response_ms: Option<i64>,
+    /// Free text, at most 2000 characters.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub note: String,
+}
+
+/// An answer as read back to the rater: nothing in it says which gaits they were. The answer itself is left out, because the
+/// copy that is kept for a repeated request would tell the sides to whoever knows what the study heard.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Answered {
+    /// Number of the pair for this rater.
+    pub number: u32,
+}
+
+/// What a study asks, computed outside any transaction: the newer and the older gait.
+async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
+    let mut db = store.read().await?;
+    let study = studies::get(&mut db, study).await?;
+    consents::may_be_shown(&mut db, study.id).await?;
+    let study_id = study.id;
+    if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
+        return Ok(None);
+    }
+    let snapshot = StudySnapshot::read(&mut db, study).await?;
+    drop(db);
+    let found = store.compute(move |pool| open_question(pool, &snapshot)).await?;
+    // What the learner says names bounds: it is logged, and the rater hears that the program failed.
+    let found = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
+    Ok(found.trials())
+}
+
+/// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
+///
+/// # Errors
+/// [`Error::NotFound`], or what the database and the learner report.
+pub async fn next<'a>(
+    store: &'a mut Store,
+    caller: &Caller,
+    study: StudyId,
+) -> Result<(LentWriter<'a>, Option<Sided>), Error> {
+    let question = question(store, study).await?;
+    let mut writer = store.write().await?;
+    let safety_reports = SafetyReports::read(&mut writer, study).await?;
+    let closed: Vec<TrialId> = safety_reports.closed.iter().map(|closed| closed.trial).collect();
+    let mut own = presentations::of_study(&mut writer, study).await?;
+    own.retain(|shown| shown.rater == caller.name);
+    if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
+        // A study that came here from elsewhere has no sides of the pairs that were blind there.
+        if walkable::are_walkable(&mut writer, open.pair()).await?
+            && allocations::is_included(&mut writer, open.id).await?
+        {
+            note(&mut writer, caller, open, "presentation.show").await?;
+            let open = own_pair(&mut writer, caller, &open.token).await?;
+            return Ok((writer, Some(open)));
+        }
+        withdraw(&mut writer, open).await?;
+    }
+    let is_closed = |pair: &(TrialId, TrialId)| {
+        closed.contains(&pair.0) || closed.contains(&pair.1) || safety_reports.is_skipped(*pair)
+    };
+    let Some(pair) = question.filter(|pair| !is_closed(pair)) else { return Ok((writer, None)) };
+    let lot = Lot::draw()?;
+    let drawn = draw(lot.number(), pair, &own, &closed);
+    let token = secret::fresh()?;
+    let new = NewPresentation {
+        token: token.clone(),
+        study_id: study,
+        rater: caller.name.clone(),
+        number: u32::try_from(own.len()).unwrap_or(u32::MAX).saturating_add(1),
+        kind: drawn.kind,
+        pair: drawn.pair,
+        repeats: drawn.repeats,
+        unblinded: could_have_known(&mut writer, caller, study).await?,
+    };
+    let id = presentations::insert(&mut writer, &new).await?;
+    allocations::of_pair(&mut writer, id, drawn.again, Lot::draw()?).await?;
+    let shown = own_pair(&mut writer, caller, &token).await?;
+    note(&mut writer, caller, &shown.presentation, "presentation.draw").await?;
+    Ok((writer, Some(shown)))
+}
+
+async fn withdraw(writer: &mut Writer, open: &Presentation) -> Result<(), Error> {
+    let withdrawn = NewAnswer {
+        said: Judgement::Withdrawn,
+        response_ms: None,
+        note: "",
+        feedback: None,
+        could_have_known: open.unblinded,
+    };
+    presentations::answer(writer, open.id, withdrawn).await?;
+    Ok(())
+}
+
+async fn note(writer: &mut Writer, caller: &Caller, shown: &Presentation, action: &str) -> Result<(), Error> {
+    let detail = json!({ "study": shown.study_id, "rater": shown.rater, "number": shown.number });
+    Ok(audit::append(writer, &caller.actor, action, &format!("presentation {}", shown.id), &detail).await?)
+}
+
+/// Records what a rater says.
+///
+/// # Errors
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it was answered, [`Error::Invalid`].
+pub async fn answer(
+    writer: &mut Writer,
+    caller: &Caller,
+    token: &str,
+    given: &RaterAnswer,
+) -> Result<(StudyId, Answered), Error> {
+    let sided = own(writer, caller, token).await?;
+    let shown = &sided.presentation;
+    if given.answer == Judgement::Withdrawn {
+        return Err(Error::invalid("answer", "withdrawn", "what a rater can say"));
+    }
+    printable::note("note", &given.note, 2000)?;
+    if given.response_ms.is_some_and(|ms| ms < 0) {
+        return Err(Error::invalid("response_ms", json!(given.response_ms), "0 or more"));
+    }
+    let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
+    let attribution = Attribution { source, author: &caller.name, note: &given.note };
+    // From here on it is about the pair and not about its sides.
+    let said = sided.turned(given.answer);
+    // An earlier version showed the same gait twice, of which there is nothing to hear.
+    let heard = if shown.kind == Kind::Null {
+        None
+    } else {
+        let fields = ("first", "second");
+        let (study, pair) = (shown.study_id, shown.pair());
+        // The server drew the pair; that this rater is asked again is meant.
+        let statement = GivenJudgement { study, pair, fields, said, attribution, again: Again::Meant };
+        preference::hear(writer, statement).await.map_err(without_gaits)?
+    };
+    let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
+    let row = NewAnswer { said, response_ms: given.response_ms, note: &given.note, feedback: heard, could_have_known };
+    if !presentations::answer(writer, shown.id, row).await? {
+        return Err(Error::conflict(answered_already(sided.answer())));
+    }
+    let payload = json!({ "feedback_id": heard, "presentation_id": shown.id });
+    events::append(writer, shown.study_id, "feedback_given", &payload).await?;
+    // What the rater said of the sides stays out of the trail: it would tell the order.
+    let detail = json!({ "study": shown.study_id, "number": shown.number, "could_have_known": could_have_known });
+    audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
+    Ok((shown.study_id, Answered { number: shown.number }))
+}
+
+/// A refusal that names no gait.
+fn without_gaits(error: Error) -> Error {
+    match error {
+        Error::Invalid(_) => Error::conflict("this pair is not asked about any more: go on to the next one"),
+        other => other,
+    }
+}
+
+/// Why a second answer is not taken, and what counts.
+fn answered_already(before: Option<Judgement>) -> String {
+    match before {
+        Some(Judgement::Withdrawn) => "this pair was answered already, and that answer counts no more".to_owned(),
+        Some(said) => {
+            let said = said.as_str().replace('_', " ");
+            format!(
+                "this pair was answered already: your answer \u{201c}{said}\u{201d} counts, and this one was not taken"
+            )
+        }
+        None => "this pair was answered already".to_owned(),
+    }
+}
+
+/// Takes a rater's last answer back: what was said stays in the record, and counts no more.
+///
+/// # Errors
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it cannot be taken back.
+pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
+    let shown = own(writer, caller, token).await?.presentation;
+    if !can_be_taken_back(writer, &shown).await? {
+        let why = "only the last answer can be taken back, once; and a gait that was called unsafe stays closed: tell \
+                   whoever runs the study";
+        return Err(Error::conflict(why));
+    }
+    if let Some(heard) = presentations::heard_of(writer, shown.id).await?
+        // Somebody else may have.
+        && feedback::get(writer, heard).await?.retraction.is_none()
+    {
+        answering::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back").await?;
+    }
+    presentations::take_back(writer, shown.id).await?;
+    note(writer, caller, &shown, "presentation.take_back").await?;
+    Ok(Answered { number: shown.number })
+}
+
+/// Whether an answer stands that may go: the rater's last one, and not about safety.
+///
+/// # Errors
+/// What the record reports.
+pub async fn can_be_taken_back(db: &mut Connection, shown: &Presentation) -> Result<bool, Error> {
+    let all = presentations::of_study(db, shown.study_id).await?;
+    let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
+    let stands = matches!(
+        shown.answer,
+        Some(Judgement::First | Judgement::Second | Judgement::NoDifference | Judgement::CannotTell)
+    );
+    Ok(last && stands)
+}
+
+/// The pair of a token with its sides, if it is this rater's and the rater reaches its study.
+///
+/// # Errors
+/// What the record reports, and [`Error::NotFound`] for a token that is not of this rater.
+pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+    let shown = own_pair(db, caller, token).await?;
+    if !members::reaches(db, caller.reach(), shown.presentation.study_id).await? {
+        return Err(unknown_pair());
+    }
+    consents::may_be_shown(db, shown.presentation.study_id).await?;
+    Ok(shown)
+}
+
+async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<Sided, Error> {
+    allocations::own_pair(db, token, &caller.name).await?.ok_or_else(unknown_pair)
+}
+
+fn unknown_pair() -> Error {
+    Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() }
+}
+
+/// A pair of a rater who was unblinded, with its sides.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = Presentation)]
+pub struct UnblindedPair {
+    /// Identifier.
+    pub id: PresentationId,
+    /// The study.
+    pub study_id: StudyId,
+    /// Who was shown it.
+    pub rater: String,
+    /// 1, 2, ... of this rater in this study.
+    pub number: u32,
+    /// Why it was shown.
+    pub kind: Kind,
+    /// The trial shown first.
+    pub shown_first: TrialId,
+    /// The trial shown second.
+    pub shown_second: TrialId,
+    /// The presentation that it repeats.
+    pub repeats: Option<PresentationId>,
+    /// Whether the rater could have known which gait is which, when it was drawn or when it was answered.
+    pub unblinded: bool,
+    /// When it was drawn.
+    pub created_at: Instant,
+    /// What the rater said of what was shown; none: nothing yet.
+    pub answer: Option<Judgement>,
+    /// When.
+    pub answered_at: Option<Instant>,
+}
+
+impl From<&Sided> for UnblindedPair {
+    fn from(sided: &Sided) -> Self {
+        let row = &sided.presentation;
+        let (shown_first, shown_second) = sided.shown();
+        Self {
+            id: row.id,
+            study_id: row.study_id,
+            rater: row.rater.clone(),
+            number: row.number,
+            kind: row.kind,
+            shown_first,
+            shown_second,
+            repeats: row.repeats,
+            unblinded: row.unblinded,
+            created_at: row.created_at,
+            answer: sided.answer(),
+            answered_at: row.answered_at,
+        }
+    }
+}
+
+/// Unblinds a rater: says which gaits the rater was shown on which side. From now on the rater's pairs are marked.
+///
+/// # Errors
+/// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`], [`Error::Conflict`] when the sides are
+/// not in this record.
+pub async fn unblind(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    rater: &str,
+    reason: &str,
+) -> Result<Vec<UnblindedPair>, Error> {
+    studies::get(writer, study).await?;
+    consents::may_be_shown(writer, study).await?;
+    let reason = printable::reason("reason", reason, ": why the rater is unblinded")?;
+    if !presentations::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
+        return Err(Error::invalid("rater", rater, "somebody who was shown a pair of this study"));
+    }
+    presentations::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
+    let mut pairs = allocations::of_unblinded_raters(writer, study).await?;
+    pairs.retain(|sided| sided.presentation.rater == rater);
+    if pairs.is_empty() {
+        return Err(Error::conflict(
+            "the archive that this study came from left the sides of this rater's pairs out: unblind the rater where the \
+             study was made",
+        ));
+    }
+    let detail = json!({ "rater": rater, "reason": reason });
+    audit::append(writer, &caller.actor, "study.unblind", &format!("study {study}"), &detail).await?;
+    Ok(pairs.iter().map(UnblindedPair::from).collect())
+}

@@ -1,0 +1,61 @@
+//! What is there before anybody adds anything: the paper's subjects, the built-in device and reference.
+
+use crate::error::Error;
+use gait_optimizer as optimizer;
+use gaitwright_store::devices::Device;
+use gaitwright_store::reference_gaits::ReferenceGait;
+use gaitwright_store::subjects::Subject;
+use gaitwright_store::{Connection, devices, reference_gaits, subjects};
+
+/// Pseudonyms of the paper's subjects.
+const PAPER: [(u32, &str, &str); 2] = [
+    (1, "paper-1", "First subject of the paper: female, 1.727 m, 65.7 kg."),
+    (2, "paper-2", "Second subject of the paper: male, 1.803 m, 75 kg."),
+];
+
+/// The built-in device of the record.
+///
+/// # Errors
+/// What the database reports.
+pub async fn device(db: &mut Connection) -> Result<Device, Error> {
+    Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?.0)
+}
+
+/// The built-in reference gait of the record.
+///
+/// # Errors
+/// What the database reports.
+pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGait, Error> {
+    Ok(reference_gaits::ensure(db, &optimizer::ReferenceGait::builtin()?).await?.0)
+}
+
+/// Adds what is missing of the built-in things.
+///
+/// # Errors
+/// What the database reports.
+pub async fn ensure(db: &mut Connection) -> Result<(), Error> {
+    device(db).await?;
+    reference_gait(db).await?;
+    for (number, pseudonym, notes) in PAPER {
+        if subjects::by_pseudonym(db, pseudonym).await?.is_none() {
+            subjects::insert(db, pseudonym, optimizer::Subject::builtin(number)?, notes).await?;
+        }
+    }
+    Ok(())
+}
+
+/// The subject of the record with this body: one of the paper's, or one named by height and mass.
+///
+/// # Errors
+/// What the database reports.
+pub async fn subject_with(db: &mut Connection, body: optimizer::Subject) -> Result<Subject, Error> {
+    let paper = PAPER.iter().find(|(number, ..)| optimizer::Subject::builtin(*number).is_ok_and(|known| known == body));
+    let pseudonym = match paper {
+        Some((_, name, _)) => (*name).to_owned(),
+        None => format!("{} m {} kg", body.height_m, body.body_mass_kg),
+    };
+    match subjects::by_pseudonym(db, &pseudonym).await? {
+        Some(found) => Ok(found),
+        None => Ok(subjects::insert(db, &pseudonym, body, "").await?),
+    }
+}

@@ -1,0 +1,147 @@
+//! Changing a study: its limits, more trials, a fork. One way in for form and REST.
+
+use super::lifecycle::{self, Act};
+use super::plan;
+use crate::error::Error;
+use crate::printable;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::studies::{FeedbackMode, Limits, Study, StudyState};
+use gaitwright_store::{StudyId, Writer, events, members, studies};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// What can be changed of a study in place; what is absent stays.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Name shown to people.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 120)]
+    pub name: Option<String>,
+    /// Higher runs first.
+    #[serde(default)]
+    #[schema(minimum = -10, maximum = 10)]
+    pub priority: Option<i32>,
+    /// How many trials at the same time.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 64)]
+    pub parallel_trials: Option<u32>,
+}
+
+/// Changes a study in place.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
+pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Change) -> Result<Study, Error> {
+    let study = studies::get(writer, id).await?;
+    let name = match change.name.as_deref().map(str::trim) {
+        None => study.plan.name.clone(),
+        Some(name) => printable::name("name", name, 120)?.to_owned(),
+    };
+    let limits = Limits {
+        name,
+        priority: change.priority.unwrap_or(study.plan.priority),
+        parallel_trials: change.parallel_trials.unwrap_or(study.plan.parallel_trials),
+        trial_budget: study.plan.trial_budget,
+    };
+    plan::check_range("priority", i64::from(limits.priority), -10, 10)?;
+    plan::check_range("parallel_trials", i64::from(limits.parallel_trials), 1, 64)?;
+    studies::set_limits(writer, id, &limits).await?;
+    let detail = json!({
+        "name": limits.name, "priority": limits.priority, "parallel_trials": limits.parallel_trials,
+        "before": { "name": study.plan.name, "priority": study.plan.priority, "parallel_trials": study.plan.parallel_trials },
+    });
+    changed(writer, actor, "study.change", &study, study.state, &detail).await
+}
+
+/// More trials.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Extend {
+    /// How many trials in all: more than now.
+    #[schema(minimum = 2, maximum = 10000)]
+    pub trial_budget: u32,
+}
+
+/// Gives a study more trials; an ended one goes on.
+///
+/// # Errors
+/// [`Error::Invalid`] when it would not be more, [`Error::NotFound`].
+pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Extend) -> Result<Study, Error> {
+    let study = studies::get(writer, id).await?;
+    let least = i64::from(study.plan.trial_budget) + 1;
+    plan::check_range("trial_budget", i64::from(more.trial_budget), least, 10_000)?;
+    let state = match study.state {
+        ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, Act::Extend)?,
+        other => other,
+    };
+    let limits = Limits {
+        name: study.plan.name.clone(),
+        priority: study.plan.priority,
+        parallel_trials: study.plan.parallel_trials,
+        trial_budget: more.trial_budget,
+    };
+    studies::set_limits(writer, id, &limits).await?;
+    if state != study.state && !studies::set_state(writer, &study, state, "extended").await? {
+        return Err(Error::conflict("the study changed at the same moment; try again"));
+    }
+    let detail = json!({ "from": study.plan.trial_budget, "to": more.trial_budget, "state": state });
+    changed(writer, actor, "study.extend", &study, state, &detail).await
+}
+
+/// A study like another one; what is absent is as there.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fork {
+    /// Name shown to people.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Every random draw derives from it.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// How many trials.
+    #[serde(default)]
+    pub trial_budget: Option<u32>,
+    /// With muscles or without.
+    #[serde(default)]
+    pub muscles: Option<bool>,
+    /// Who answers the comparisons.
+    #[serde(default)]
+    pub feedback_mode: Option<FeedbackMode>,
+    /// Whether to start at once.
+    #[serde(default)]
+    pub start: bool,
+}
+
+/// Makes a study with the set-up of another one, and none of its trials.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
+pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) -> Result<Study, Error> {
+    let from = studies::get(writer, id).await?;
+    let mut new = plan::NewStudy::like(&from.plan);
+    new.name = Some(fork.name.clone().unwrap_or_else(|| format!("{} (fork)", from.plan.name)));
+    new.seed = fork.seed.unwrap_or(new.seed);
+    new.trial_budget = fork.trial_budget.unwrap_or(new.trial_budget);
+    new.muscles = fork.muscles.unwrap_or(new.muscles);
+    new.feedback_mode = fork.feedback_mode.unwrap_or(new.feedback_mode);
+    new.start = fork.start;
+    let made = plan::create_from(writer, actor, new, Some(id)).await?;
+    // Only members see what a restricted study is made of, in a copy too.
+    members::inherit(writer, id, made.id, actor.as_str()).await?;
+    Ok(made)
+}
+
+async fn changed(
+    writer: &mut Writer,
+    actor: &Actor,
+    action: &str,
+    before: &Study,
+    state: StudyState,
+    detail: &serde_json::Value,
+) -> Result<Study, Error> {
+    events::append(writer, before.id, "study_changed", &json!({ "state": state, "reason": action })).await?;
+    audit::append(writer, actor, action, &format!("study {}", before.id), detail).await?;
+    Ok(studies::get(writer, before.id).await?)
+}

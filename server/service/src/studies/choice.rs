@@ -1,0 +1,127 @@
+//! What to try next, as a pure function of where the study stands.
+
+use super::belief::Beliefs;
+use super::search;
+use super::seed::{Purpose, derive};
+use super::snapshot::StudySnapshot;
+use gait_learner::{LearnerError, Posterior, ProposalReason, propose};
+use gait_optimizer::ModelError;
+use gaitwright_compute::OnPool;
+use gaitwright_store::TrialId;
+use gaitwright_store::trials::{NewTrial, Trial, TrialState};
+use thiserror::Error;
+
+/// Why no trial could be chosen.
+#[derive(Debug, Error)]
+pub enum ChoiceError {
+    /// The learner refused.
+    #[error(transparent)]
+    Learner(#[from] LearnerError),
+    /// The action makes no valid bounds.
+    #[error(transparent)]
+    Bounds(#[from] ModelError),
+}
+
+impl ChoiceError {
+    /// Whether every action of the search space was tried: the end of a study, not a fault.
+    pub fn is_exhausted(&self) -> bool {
+        matches!(self, Self::Learner(LearnerError::Exhausted { .. }))
+    }
+}
+
+/// The next trial of a study, after what the learner believes now. Depends on the snapshot alone: the same log gives the same
+/// trial, bit for bit.
+///
+/// # Errors
+/// [`ChoiceError`], among them that every action was tried.
+pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
+    let plan = &snapshot.study.plan;
+    let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
+    let log = snapshot.log();
+    let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
+    let proposal = propose(&plan.search_space, &log, &snapshot.taken_without_result(), &plan.learner, seed)?;
+    Ok(NewTrial {
+        number,
+        action_index: proposal.action,
+        action: search::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
+        reason: reason_in_words(proposal.reason),
+        best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
+        warm_started_from: best_converged(snapshot, belief)?,
+    })
+}
+
+/// The converged trial with the highest posterior mean, the earliest of equals: the gait to start from.
+///
+/// # Errors
+/// When a trial's action is not in the search space.
+pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(by_mean(snapshot, belief, |_| true)?.first().copied())
+}
+
+/// The recommended trial: of those with a gait, that with the highest posterior mean; a gait that somebody called unsafe is
+/// never recommended.
+///
+/// # Errors
+/// As [`best_converged`].
+pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(ranking(snapshot, belief)?.first().copied())
+}
+
+/// The gaits of a study that nobody called unsafe, the recommended one first, by posterior mean.
+///
+/// # Errors
+/// As [`best_converged`].
+pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
+    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial.id))
+}
+
+/// Converged trials by posterior mean, the earliest of equals first.
+fn by_mean(
+    snapshot: &StudySnapshot,
+    belief: &Posterior,
+    counts: impl Fn(&Trial) -> bool,
+) -> Result<Vec<TrialId>, LearnerError> {
+    let mut ranked = Vec::new();
+    for trial in snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
+        ranked.push((belief.mean(trial.action_index)?, trial.id));
+    }
+    ranked.sort_by(|(mean_a, _), (mean_b, _)| mean_b.total_cmp(mean_a));
+    Ok(ranked.into_iter().map(|(_, id)| id).collect())
+}
+
+/// From so many trials on, what the learner last believed is shown instead of asking it anew.
+pub const MANY: usize = 400;
+
+/// The ranking for showing: of a large study only the trial that was the best when the newest one was proposed.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn ranking_to_show(
+    pool: &OnPool,
+    snapshot: &StudySnapshot,
+    beliefs: &Beliefs,
+) -> Result<Vec<TrialId>, LearnerError> {
+    if snapshot.trials.len() >= MANY {
+        return Ok(last_believed(snapshot).into_iter().collect());
+    }
+    ranking(snapshot, &*beliefs.posterior(pool, snapshot)?)
+}
+
+/// What the learner last believed to be best, if that has a gait that nobody called unsafe; it does not take every trial to
+/// tell.
+pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
+    let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
+    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best.id)).then_some(best.id)
+}
+
+fn reason_in_words(reason: ProposalReason) -> String {
+    match reason {
+        ProposalReason::FirstAction => "first one: drawn at random",
+        ProposalReason::RandomAction => "drawn at random",
+        ProposalReason::ThompsonOnLine => "on a line through the best",
+        ProposalReason::ExpectedBestUtility => "highest expected utility beside the best",
+        ProposalReason::LinesExhausted => "lines exhausted: drawn at random",
+        _ => "chosen by the learner",
+    }
+    .to_owned()
+}

@@ -1,0 +1,83 @@
+//! What a person does to a study or a trial: start, pause, resume, stop; cancel, retry. Each in one transaction.
+
+use super::lifecycle::{self, Act};
+use super::record;
+use crate::error::Error;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::studies::Study;
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{StudyId, TrialId, Writer, events, studies, trials};
+use serde_json::json;
+
+/// A study after an act, and the trials whose solves must be told to stop once the act is durable.
+#[derive(Debug)]
+pub struct Done {
+    /// The study.
+    pub study: Study,
+    /// Trials that were cancelled with it.
+    pub cancelled: Vec<TrialId>,
+}
+
+/// Does it, if it is possible where the study stands.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long, or [`Error::Conflict`] with what is possible
+/// instead.
+pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
+    if reason.chars().count() > 2000 {
+        return Err(Error::invalid("reason", reason.chars().count(), "at most 2000 characters"));
+    }
+    let study = studies::get(writer, id).await?;
+    let cancelled = if act == Act::Stop {
+        stop(writer, &study, reason).await?
+    } else {
+        move_on(writer, &study, act, reason).await?;
+        Vec::new()
+    };
+    let changed = studies::get(writer, id).await?;
+    let detail = json!({ "from": study.state, "to": changed.state, "reason": reason });
+    audit::append(writer, actor, &format!("study.{}", act.as_str()), &format!("study {id}"), &detail).await?;
+    Ok(Done { study: changed, cancelled })
+}
+
+/// Ends a study with its open trials, which it gives; whoever does so says it in the audit trail.
+///
+/// # Errors
+/// [`Error::Conflict`] when it has ended.
+pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Result<Vec<TrialId>, Error> {
+    let mut cancelled = Vec::new();
+    for trial in trials::of_study(writer, study.id).await?.into_iter().filter(|trial| trial.state.is_open()) {
+        record::cancelled(writer, trial.id, "the study was stopped").await?;
+        cancelled.push(trial.id);
+    }
+    move_on(writer, study, Act::Stop, reason).await?;
+    Ok(cancelled)
+}
+
+async fn move_on(writer: &mut Writer, study: &Study, act: Act, reason: &str) -> Result<(), Error> {
+    let state = lifecycle::after(study.state, act)?;
+    if !studies::set_state(writer, study, state, reason).await? {
+        return Err(Error::conflict("the study changed at the same moment; try again"));
+    }
+    Ok(events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": reason })).await?)
+}
+
+/// Ends an open trial.
+///
+/// # Errors
+/// [`Error::NotFound`], or [`Error::Conflict`] when it has ended.
+pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &str) -> Result<Trial, Error> {
+    record::cancelled(writer, id, reason).await?;
+    audit::append(writer, actor, "trial.cancel", &format!("trial {id}"), &json!({ "reason": reason })).await?;
+    Ok(trials::get(writer, id).await?)
+}
+
+/// Lets a trial that gave no result run once more.
+///
+/// # Errors
+/// [`Error::NotFound`], or [`Error::Conflict`] when it has a result or is open.
+pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<Trial, Error> {
+    record::retried(writer, id).await?;
+    audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?;
+    Ok(trials::get(writer, id).await?)
+}

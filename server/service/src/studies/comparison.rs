@@ -1,0 +1,106 @@
+//! Whom to compare a new trial with, and what Gait RMSE answers.
+
+use super::snapshot::StudySnapshot;
+use super::walkable::{NotWalkable, WalkablePair, is_same_gait};
+use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};
+use gaitwright_compute::OnPool;
+use gaitwright_store::TrialId;
+use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::trials::Trial;
+use std::collections::HashSet;
+
+/// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
+/// as the learner's settings say. `snapshot` is read before the new trial's result is in it.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
+    let Some(new) = snapshot.trial(new) else { return Ok(Vec::new()) };
+    let plan = &snapshot.study.plan;
+    let comparable = snapshot.comparable();
+    let log = snapshot.log();
+    let questions = comparisons_to_ask_among(&plan.search_space, &log, new.action_index, &plan.learner, |a| {
+        comparable.contains(&a)
+    })?;
+    Ok(questions.into_iter().filter_map(|q| snapshot.trial_of(q.against)).map(|trial| trial.id).collect())
+}
+
+/// What Gait RMSE says about two gaits: the smaller one is better, equal ones tie.
+pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
+    if new.1 < old.1 {
+        FeedbackContent::Preference { winner: new.0, loser: old.0 }
+    } else if old.1 < new.1 {
+        FeedbackContent::Preference { winner: old.0, loser: new.0 }
+    } else {
+        FeedbackContent::Tie { a: new.0, b: old.0 }
+    }
+}
+
+/// What a study asks people now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Question {
+    /// Nothing.
+    None,
+    /// This pair: the newest gait first.
+    Pair(WalkablePair),
+    /// The gait of this trial is to be certified first.
+    AfterCertificate(TrialId),
+}
+
+impl Question {
+    /// The trials of the pair, if there is one to be asked about now: the newest gait first.
+    pub fn trials(&self) -> Option<(TrialId, TrialId)> {
+        match self {
+            Self::Pair(pair) => Some(pair.trials()),
+            Self::None | Self::AfterCertificate(_) => None,
+        }
+    }
+}
+
+/// The pair of gaits that a person should compare now, if there is one: the newest converged gait with a partner that
+/// nobody has compared it with, and that is another gait. Which pair it is does not depend on when certificates come.
+///
+/// # Errors
+/// When the learner refuses the log.
+pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
+    let plan = &snapshot.study.plan;
+    let log = snapshot.log();
+    let may_be_asked = |trial: &&Trial| snapshot.grounds.may_become_walkable(trial);
+    let mut candidates: HashSet<ActionIndex> =
+        snapshot.trials.iter().filter(may_be_asked).map(|trial| trial.action_index).collect();
+    let Some(&newest) = log.visited.iter().rev().find(|action| candidates.contains(action)) else {
+        return Ok(Question::None);
+    };
+    let Some(own) = snapshot.trial_of(newest) else { return Ok(Question::None) };
+    candidates.retain(|action| {
+        *action == newest || !snapshot.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
+    });
+    // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
+    // best one, and with it the question.
+    let mut before = log.clone();
+    before.feedback.retain(|feedback| match feedback.actions() {
+        (a, Some(b)) => a != newest && b != newest,
+        (_, None) => true,
+    });
+    let questions =
+        comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
+    let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
+    let mut pairs = open.filter_map(|q| Some((snapshot.trial_of(q.action)?, snapshot.trial_of(q.against)?)));
+    let Some((first, second)) = pairs.find(|(a, b)| !snapshot.grounds.safety_reports.is_skipped((a.id, b.id))) else {
+        return Ok(Question::None);
+    };
+    Ok(match (snapshot.walkable(first), snapshot.walkable(second)) {
+        (Ok(a), Ok(b)) => WalkablePair::of((a, first), (b, second)).map_or(Question::None, Question::Pair),
+        (Err(NotWalkable::NotCertified { id, .. }), _) | (_, Err(NotWalkable::NotCertified { id, .. })) => {
+            Question::AfterCertificate(id)
+        }
+        _ => Question::None,
+    })
+}
+
+fn is_answered(log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {
+    log.feedback.iter().any(|feedback| {
+        let (first, second) = feedback.actions();
+        second.is_some_and(|second| (first, second) == (a, b) || (second, first) == (a, b))
+    })
+}

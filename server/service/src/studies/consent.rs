@@ -1,0 +1,69 @@
+//! Consent of a subject: written down, and withdrawn, which ends every study of the subject.
+
+use super::command;
+use crate::error::Error;
+use crate::printable;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::consents::{self, Consent, ConsentKind};
+use gaitwright_store::{SubjectId, TrialId, Writer, studies, subjects};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// What a subject signed.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewConsent {
+    /// Which version of which form.
+    #[schema(min_length = 1, max_length = 2000)]
+    pub form: String,
+}
+
+/// That a subject does not take part any more.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Withdrawal {
+    /// Reason, if the subject gives one.
+    #[schema(min_length = 1, max_length = 2000)]
+    pub reason: String,
+}
+
+/// Writes down what a subject signed.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Invalid`] naming the field.
+pub async fn give(writer: &mut Writer, actor: &Actor, id: SubjectId, new: &NewConsent) -> Result<Consent, Error> {
+    let form = printable::reason("form", &new.form, "")?;
+    subjects::get(writer, id).await?;
+    let row = consents::append(writer, id, ConsentKind::Given, form, actor).await?;
+    audit::append(writer, actor, "subject.consent", &format!("subject {id}"), &json!({ "form": form })).await?;
+    Ok(row)
+}
+
+/// Writes down that a subject withdrew, and stops the subject's studies. Also gives the trials that were cancelled
+/// with them: their solves are to be told to stop once this is durable.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] when the subject withdrew before.
+pub async fn withdraw(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: SubjectId,
+    why: &Withdrawal,
+) -> Result<(Consent, Vec<TrialId>), Error> {
+    let reason = printable::reason("reason", &why.reason, "")?;
+    subjects::get(writer, id).await?;
+    let before = consents::of_subject(writer, id).await?;
+    if before.last().is_some_and(|last| last.kind == ConsentKind::Withdrawn) {
+        return Err(Error::conflict("this subject withdrew before"));
+    }
+    let (mut stopped, mut cancelled) = (Vec::new(), Vec::new());
+    for study in studies::open_of(writer, id).await? {
+        cancelled.extend(command::stop(writer, &study, "the subject withdrew").await?);
+        stopped.push(study.id);
+    }
+    let row = consents::append(writer, id, ConsentKind::Withdrawn, reason, actor).await?;
+    let detail = json!({ "reason": reason, "stopped": stopped });
+    audit::append(writer, actor, "subject.withdraw", &format!("subject {id}"), &detail).await?;
+    Ok((row, cancelled))
+}

@@ -1,0 +1,166 @@
+//! What the service explains: trials without a gait for which somebody asked, then those of studies that have ended and whose
+//! best gaits were certified.
+//!
+//! Which trial comes next follows from the record, so a process that is killed goes on where it was. One is explained at a
+//! time, behind every solve.
+
+use super::explanation::{self, Effort};
+use crate::error::Error;
+use crate::workers::Explain;
+use gait_optimizer::CancelToken;
+use gaitwright_compute::priority::behind_solves;
+use gaitwright_store::{Store, StoreResult, StudyId, TrialId, commit, consents, events, explanations, trials};
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::{Notify, watch};
+
+/// Explains trials one after the other, beside the solves.
+pub(super) struct Explainer {
+    store: Store,
+    explain: Arc<dyn Explain>,
+    state: Mutex<State>,
+    told: Notify,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// Studies whose best gaits were certified.
+    ended: BTreeSet<StudyId>,
+    /// What is being explained.
+    running: Option<TrialId>,
+    /// What cannot be explained, and why.
+    refused: BTreeMap<TrialId, String>,
+}
+
+/// Cancels when nobody waits any more.
+struct CancelOnDrop(CancelToken);
+
+impl Drop for CancelOnDrop {
+    fn drop(&mut self) {
+        self.0.cancel();
+    }
+}
+
+impl Explainer {
+    /// Over a record; [`Self::run`] sets it to work.
+    pub(super) fn new(store: Store, explain: Arc<dyn Explain>) -> Self {
+        Self { store, explain, state: Mutex::default(), told: Notify::new() }
+    }
+
+    /// Takes up a study whose best gaits were certified.
+    pub(super) fn take_up(&self, study: StudyId) {
+        self.state().ended.insert(study);
+        self.told.notify_one();
+    }
+
+    /// What is done about a trial.
+    pub(super) fn effort(&self, trial: TrialId) -> Effort {
+        let state = self.state();
+        match state.refused.get(&trial) {
+            Some(reason) => Effort::Refused(reason.clone()),
+            None if state.running == Some(trial) => Effort::Running,
+            None => Effort::Ready,
+        }
+    }
+
+    /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was.
+    pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn()) {
+        loop {
+            pulse.mark_unchanged();
+            match self.explain_next(&mut pulse).await {
+                Ok(true) => {
+                    changed();
+                    continue;
+                }
+                Ok(false) => {}
+                Err(error) => tracing::error!(%error, "cannot explain the next trial"),
+            }
+            tokio::select! {
+                _ = pulse.changed() => {}
+                () = self.told.notified() => {}
+            }
+        }
+    }
+
+    /// Explains the next trial. `false`: there is none.
+    async fn explain_next(&self, pulse: &mut watch::Receiver<u64>) -> Result<bool, Error> {
+        let Some(trial) = self.next().await? else { return Ok(false) };
+        self.state().running = Some(trial);
+        let explained = self.explain(trial, pulse).await;
+        self.state().running = None;
+        match explained {
+            Ok(()) => {}
+            Err(error) if error.is_of_machine() => return Err(error),
+            Err(error) => self.refuse(trial, &error).await?,
+        }
+        Ok(true)
+    }
+
+    /// What was asked for first; then the newest study: it is the one that somebody is about to look at.
+    async fn next(&self) -> StoreResult<Option<TrialId>> {
+        let refused: BTreeSet<TrialId> = self.state().refused.keys().copied().collect();
+        let mut reader = self.store.read().await?;
+        if let Some(trial) = explanations::next_requested(&mut reader, &refused).await? {
+            return Ok(Some(trial));
+        }
+        loop {
+            let Some(study) = self.state().ended.last().copied() else { return Ok(None) };
+            if let Some(trial) = explanations::next_of_ended(&mut reader, study, &refused).await? {
+                return Ok(Some(trial));
+            }
+            self.state().ended.remove(&study);
+        }
+    }
+
+    /// Explains a trial and keeps the explanation, unless its subject withdraws meanwhile. The solves stop when this is
+    /// dropped.
+    async fn explain(&self, trial: TrialId, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
+        let mut store = self.store.clone();
+        let mut reader = store.read().await?;
+        let study = trials::get(&mut reader, trial).await?.study_id;
+        let packed = explanation::unexplained(&mut reader, trial).await?;
+        drop(reader);
+        let (solve, problem) = store.compute(move |pool| packed.unpack(pool)).await??;
+        let (explain, cancel) = (Arc::clone(&self.explain), CancelToken::new());
+        let _cancels = CancelOnDrop(cancel.clone());
+        let mut told = behind_solves("explainer", move || explain.explain(&solve, &cancel))
+            .map_err(|e| Error::Internal(format!("no thread for an explanation: {e}")))?;
+        let found = loop {
+            tokio::select! {
+                found = &mut told => break found.map_err(|_| Error::Internal("the explanation panicked".to_owned()))?,
+                Ok(()) = pulse.changed() => {
+                    if consents::is_withdrawn(&mut *self.store.read().await?, study).await? {
+                        return Ok(());
+                    }
+                }
+            }
+        };
+        let nothing = || Error::Internal("the explanation ended without a word".to_owned());
+        explanation::record(&self.store, trial, &problem, &found?.ok_or_else(nothing)?).await
+    }
+
+    /// Remembers what cannot be explained, and says so.
+    async fn refuse(&self, trial: TrialId, error: &Error) -> Result<(), Error> {
+        tracing::warn!(%trial, %error, "a trial cannot be explained");
+        let reason = error.to_string();
+        self.state().refused.insert(trial, reason.clone());
+        let mut writer = self.store.write().await?;
+        let row = trials::get(&mut writer, trial).await?;
+        let payload = json!({ "trial_id": trial, "number": row.number, "reason": reason });
+        events::append(&mut writer, row.study_id, "trial_not_explained", &payload).await?;
+        Ok(commit(writer).await?)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // The state is whole between any two statements that hold the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Explainer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Explainer").field("state", &self.state).finish_non_exhaustive()
+    }
+}

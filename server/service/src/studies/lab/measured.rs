@@ -1,0 +1,211 @@
+//! What was made of the recordings: muscle activity over the cycle, limit cycles; beside the model where the gait of a
+//! walk may be known.
+
+use super::recording::{EmgReading, MotionReading, WHAT};
+use super::session::{gait_of, still_shown};
+use crate::error::Error;
+use gait_optimizer::Gait;
+use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
+use gait_optimizer::phase_portrait::PhasePortrait;
+use gaitwright_compute::OnPool;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::lab_recordings::{self, LabRecording, RecordingKind};
+use gaitwright_store::lab_sessions;
+use gaitwright_store::{Connection, LabRecordingId, LabSessionId, Packed, PackedText, Store, Writer, gaits};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Muscle activity of a walk over the gait cycle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WalkActivity {
+    /// 1, 2, 3.
+    pub walk: u8,
+    /// What it was made of.
+    pub recording_id: LabRecordingId,
+    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, in shares of
+    /// the peak of walk 1.
+    #[schema(value_type = Vec<Object>)]
+    pub channels: Vec<CycleActivity>,
+    /// Mean over the cycle of each channel.
+    pub averages: Vec<f64>,
+    /// Distance from walk 1: in all, and of each channel; none for walk 1.
+    #[schema(value_type = Option<Object>)]
+    pub emg_rmse: Option<EmgRmse>,
+}
+
+/// What was made of a session's electromyograms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EmgResult {
+    /// How they were filtered.
+    #[schema(value_type = Object)]
+    pub settings: EmgSettings,
+    /// The walks that were recorded.
+    pub walks: Vec<WalkActivity>,
+}
+
+/// The newest recording of each walk.
+fn newest(recordings: &[LabRecording], kind: RecordingKind) -> Vec<&LabRecording> {
+    let of_walk = |walk| recordings.iter().rfind(|recording| recording.kind == kind && recording.walk == walk);
+    (1..=super::WALKS).filter_map(of_walk).collect()
+}
+
+/// Filters, cuts and normalises the newest electromyograms of a session.
+///
+/// # Errors
+/// [`Error::Invalid`] naming a setting, [`Error::Conflict`] without a recording of walk 1.
+pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings) -> Result<EmgResult, Error> {
+    let mut db = store.read().await?;
+    still_shown(&mut db, id).await?;
+    let recordings = lab_recordings::of_session(&mut db, id).await?;
+    let mut files: Vec<(u8, LabRecordingId, EmgReading, PackedText)> = Vec::new();
+    for recording in newest(&recordings, RecordingKind::Electromyogram) {
+        let (reading, file) = lab_recordings::file(&mut db, recording.id).await?;
+        files.push((recording.walk, recording.id, reading, file));
+    }
+    drop(db);
+    if files.first().is_none_or(|(walk, ..)| *walk != 1) {
+        return Err(Error::conflict("there is no electromyogram of walk 1, which the others are measured by"));
+    }
+    let process = move |pool: &OnPool| {
+        let mut walks: Vec<WalkActivity> = Vec::new();
+        let mut normal: Vec<CycleActivity> = Vec::new();
+        for (walk, recording_id, reading, file) in &files {
+            let (recording, strikes) = reading.read(WHAT, &file.text(pool)?)?;
+            let measured = recording.cycles(&strikes, &settings)?;
+            let activity = if walks.is_empty() {
+                normal = measured;
+                Activity::of_normal_walking(&normal)?
+            } else {
+                Activity::of_gait(&measured, &normal)?
+            };
+            let Activity { channels, averages, emg_rmse } = activity;
+            walks.push(WalkActivity { walk: *walk, recording_id: *recording_id, channels, averages, emg_rmse });
+        }
+        Ok(EmgResult { settings, walks })
+    };
+    store.compute(process).await?
+}
+
+/// Keeps what was made of a session's electromyograms.
+///
+/// # Errors
+/// What the database reports.
+pub async fn keep_result(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: LabSessionId,
+    result: &EmgResult,
+) -> Result<(), Error> {
+    let kept = lab_recordings::insert_result(writer, actor, id, result).await?;
+    let used: Vec<LabRecordingId> = result.walks.iter().map(|walk| walk.recording_id).collect();
+    let detail = json!({ "result": kept, "settings": result.settings, "recordings": used });
+    audit::append(writer, actor, "lab_session.process", &format!("lab session {id}"), &detail).await?;
+    Ok(())
+}
+
+/// The model's muscles beside the channels of a walk.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WalkModel {
+    /// 2 or 3.
+    pub walk: u8,
+    /// Each channel whose muscle the model has.
+    #[schema(value_type = Vec<Object>)]
+    pub muscles: Vec<ModelActivity>,
+}
+
+/// What was made of a session's electromyograms, and the model beside it.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct EmgView {
+    /// What was measured.
+    pub result: EmgResult,
+    /// The activations of the gaits that were walked with; empty as long as the order is blinded, and for gaits without
+    /// muscles.
+    pub model: Vec<WalkModel>,
+}
+
+/// The newest result of a session; none: nothing was processed yet.
+///
+/// # Errors
+/// What the database reports.
+pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>, Error> {
+    let mut db = store.read().await?;
+    let Some(result) = lab_recordings::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
+    drop(db);
+    beside_model(store, id, result).await.map(Some)
+}
+
+/// A result of a session with the model's muscles beside it, where its gaits may be known.
+///
+/// # Errors
+/// What the database reports.
+pub async fn beside_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<EmgView, Error> {
+    let mut db = store.read().await?;
+    let mut gaits = Vec::new();
+    for walk in &result.walks {
+        gaits.extend(known_gait(&mut db, id, walk.walk).await?.map(|gait| (walk.walk, gait)));
+    }
+    drop(db);
+    store.compute(move |pool| view(pool, result, &gaits)).await?
+}
+
+/// A result with the model's muscles beside it.
+fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Result<EmgView, Error> {
+    let mut model = Vec::new();
+    for (number, gait) in gaits {
+        let gait = gait.unpack(pool)?;
+        let channels = result.walks.iter().filter(|walk| walk.walk == *number).flat_map(|walk| &walk.channels);
+        let muscles: Vec<ModelActivity> = channels.filter_map(|channel| model_activity(&gait, channel)).collect();
+        if !muscles.is_empty() {
+            model.push(WalkModel { walk: *number, muscles });
+        }
+    }
+    Ok(EmgView { result, model })
+}
+
+/// The gait of a walk; none without the device, as long as the order is blinded, and where its trajectory was dropped.
+///
+/// # Errors
+/// What the database reports.
+pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Result<Option<Packed<Gait>>, Error> {
+    let session = lab_sessions::get(db, id).await?;
+    let Some(gait) = gait_of(&session, walk) else { return Ok(None) };
+    Ok(gaits::find(db, gait).await?)
+}
+
+/// The limit cycles of a walk.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LimitCycles {
+    /// 1, 2, 3.
+    pub walk: u8,
+    /// What they were made of.
+    pub recording_id: LabRecordingId,
+    /// Edge of the zero-phase low-pass before velocities were taken by central differences, Hz.
+    pub cutoff_hz: f64,
+    /// Angle (rad) and velocity (rad/s) of each joint that was recorded, sample after sample.
+    #[schema(value_type = Vec<Object>)]
+    pub joints: Vec<PhasePortrait>,
+}
+
+/// The limit cycles of the newest motion of each walk.
+///
+/// # Errors
+/// What the database reports.
+pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
+    let mut db = store.read().await?;
+    let recordings = lab_recordings::of_session(&mut db, id).await?;
+    let mut files: Vec<(u8, LabRecordingId, MotionReading, PackedText)> = Vec::new();
+    for recording in newest(&recordings, RecordingKind::Motion) {
+        let (reading, file) = lab_recordings::file(&mut db, recording.id).await?;
+        files.push((recording.walk, recording.id, reading, file));
+    }
+    drop(db);
+    let process = move |pool: &OnPool| {
+        let cycles = |(walk, recording_id, reading, file): (u8, LabRecordingId, MotionReading, PackedText)| {
+            let joints = reading.portraits(&file.text(pool)?)?;
+            Ok(LimitCycles { walk, recording_id, cutoff_hz: reading.cutoff_hz, joints })
+        };
+        files.into_iter().map(cycles).collect()
+    };
+    store.compute(process).await?
+}

@@ -1,0 +1,295 @@
+//! What is measured in a walk: brought as a file, read whole or refused with line, column and reason, kept as it was.
+
+use super::session::{checked_walk, still_open};
+use crate::error::Error;
+use crate::studies::recording::Unit;
+use clap::ValueEnum;
+use gait_optimizer::ModelError;
+use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
+use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
+use gaitwright_compute::{OnPool, Pool};
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::lab_recordings::{self, LabRecording, PackedRecording, RecordingKind};
+use gaitwright_store::lab_sessions::Act;
+use gaitwright_store::{Connection, LabRecordingId, LabSessionId, PackedText, Store, Writer};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// How a file that was brought is named in errors.
+pub(super) const WHAT: &str = "recording";
+
+/// Forms of files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Deserialize, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FileForm {
+    /// Comma-separated values, names in the first line that is no comment.
+    #[default]
+    Csv,
+    /// OpenSim motion or storage file (.mot, .sto).
+    Opensim,
+}
+
+/// How a file with electromyograms is to be read.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct EmgReading {
+    /// Form of the file.
+    pub form: FileForm,
+    /// Samples per second of a CSV file without a column `time_s`.
+    #[schema(minimum = 100, maximum = 20000)]
+    pub rate_hz: Option<f64>,
+    /// Column of each channel: RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R; empty: columns of these very names.
+    pub channels: BTreeMap<String, String>,
+    /// Right heel strikes, s from the start of the file's time; empty: from a column.
+    pub heel_strikes_s: Vec<f64>,
+    /// Column of a switch under the right heel, or of the vertical force under the right foot.
+    pub heel_strike_column: Option<String>,
+    /// The foot is on the ground where that column is above this.
+    pub heel_strike_threshold: f64,
+}
+
+impl Default for EmgReading {
+    fn default() -> Self {
+        Self {
+            form: FileForm::default(),
+            rate_hz: None,
+            channels: BTreeMap::new(),
+            heel_strikes_s: Vec::new(),
+            heel_strike_column: None,
+            heel_strike_threshold: 0.5,
+        }
+    }
+}
+
+impl EmgReading {
+    /// The channels and the heel strikes of a file, which is named `what` in errors.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column, or the field.
+    pub fn read(&self, what: &str, text: &str) -> Result<(EmgRecording, Vec<f64>), Error> {
+        if let Some(unknown) = self.channels.keys().find(|name| !CHANNELS.contains(&name.as_str())) {
+            return Err(Error::invalid("reading.channels", unknown.as_str(), &CHANNELS.join(", ")));
+        }
+        let whole = match (self.form, self.rate_hz) {
+            (FileForm::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
+            (FileForm::Opensim, None) => EmgRecording::from_opensim(what, text)?,
+            (FileForm::Opensim, Some(rate_hz)) => {
+                return Err(Error::invalid("reading.rate_hz", rate_hz, "nothing: an OpenSim file has its time"));
+            }
+        };
+        let same = CHANNELS.map(|name| (name, name));
+        let named = self.channels.iter().map(|(channel, column)| (channel.as_str(), column.as_str()));
+        let recording = if self.channels.is_empty() { whole.select(what, same)? } else { whole.select(what, named)? };
+        let strikes = match (&self.heel_strike_column, &self.heel_strikes_s[..]) {
+            (Some(column), []) => whole.strikes_of_column(what, column, self.heel_strike_threshold)?,
+            (None, given @ [_, _, ..]) => {
+                whole.check_strikes(what, given)?;
+                given.to_vec()
+            }
+            (_, given) => {
+                let allowed = "two times or more, or heel_strike_column in their place";
+                return Err(Error::invalid("reading.heel_strikes_s", json!(given), allowed));
+            }
+        };
+        Ok((recording, strikes))
+    }
+
+    /// Checks that a file has signals of muscles and can be cut into strides, whatever it is filtered with later.
+    fn check(&self, text: &str) -> Result<(), Error> {
+        let (recording, strikes) = self.read(WHAT, text)?;
+        recording.check_channels()?;
+        for (channel, values) in recording.channels {
+            let raw = Envelope { channel, start_s: recording.start_s, rate_hz: recording.rate_hz, values };
+            CycleActivity::cut(&raw, &strikes)?;
+        }
+        Ok(())
+    }
+}
+
+/// Electromyograms of a walk.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewEmg {
+    /// Of which walk.
+    #[schema(minimum = 1, maximum = 3)]
+    pub walk: u8,
+    /// The file's text.
+    pub recording: String,
+    /// How it is to be read.
+    #[serde(default)]
+    pub reading: EmgReading,
+}
+
+/// How a file with joint angles is to be read.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionReading {
+    /// Form of the file. CSV: `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad, knee_R_rad,
+    /// ankle_R_rad.
+    pub form: FileForm,
+    /// Unit of an OpenSim file whose header does not say it.
+    pub unit: Option<Unit>,
+    /// Edge of the low-pass before velocities are taken, Hz.
+    pub cutoff_hz: f64,
+}
+
+impl Default for MotionReading {
+    fn default() -> Self {
+        Self { form: FileForm::default(), unit: None, cutoff_hz: 6.0 }
+    }
+}
+
+impl MotionReading {
+    /// The phase portraits of a file.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column, or the field.
+    pub fn portraits(&self, text: &str) -> Result<Vec<PhasePortrait>, Error> {
+        self.joints(text)?.portraits(self.cutoff_hz).map_err(|error| match error {
+            ModelError::OutOfRange { field, value, minimum, maximum } => {
+                ModelError::OutOfRange { field: format!("reading.{field}"), value, minimum, maximum }.into()
+            }
+            other => other.into(),
+        })
+    }
+
+    fn joints(&self, text: &str) -> Result<JointRecording, Error> {
+        Ok(match self.form {
+            FileForm::Csv => JointRecording::from_csv(WHAT, text)?,
+            FileForm::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
+        })
+    }
+
+    /// Checks that a file has a limit cycle, and portraits with these settings.
+    fn check(&self, text: &str) -> Result<(), Error> {
+        self.joints(text)?.check_walking(WHAT)?;
+        self.portraits(text).map(|_| ())
+    }
+}
+
+/// Joint angles of a walk.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewMotion {
+    /// Of which walk.
+    #[schema(minimum = 1, maximum = 3)]
+    pub walk: u8,
+    /// The file's text.
+    pub recording: String,
+    /// How it is to be read.
+    #[serde(default)]
+    pub reading: MotionReading,
+}
+
+/// A file that was read whole, ready to be kept.
+#[derive(Debug)]
+pub struct Checked {
+    walk: u8,
+    packed: PackedRecording,
+}
+
+impl NewEmg {
+    /// Reads the file, on a thread of its own.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column, or the field.
+    pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
+        let check = move |pool: &OnPool| {
+            let walk = checked_walk(self.walk)?;
+            self.reading.check(&self.recording)?;
+            let packed = PackedRecording::new(pool, RecordingKind::Electromyogram, &self.reading, &self.recording)?;
+            Ok(Checked { walk, packed })
+        };
+        store.compute(check).await?
+    }
+}
+
+impl NewMotion {
+    /// Reads the file, on a thread of its own.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column, or the field.
+    pub async fn checked(self, store: &mut Store) -> Result<Checked, Error> {
+        let check = move |pool: &OnPool| {
+            let walk = checked_walk(self.walk)?;
+            self.reading.check(&self.recording)?;
+            let packed = PackedRecording::new(pool, RecordingKind::Motion, &self.reading, &self.recording)?;
+            Ok(Checked { walk, packed })
+        };
+        store.compute(check).await?
+    }
+}
+
+/// Checks a recording that is kept already, as if it were brought now.
+///
+/// # Errors
+/// [`Error::Invalid`] with line and column, or the field.
+pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &LabRecording) -> Result<(), Error> {
+    let id = kept.id;
+    match kept.kind {
+        RecordingKind::Electromyogram => {
+            let (reading, file) = lab_recordings::file::<EmgReading>(db, id).await?;
+            pool.run(move |pool| reading.check(&file.text(pool)?)).await?
+        }
+        RecordingKind::Motion => {
+            let (reading, file) = lab_recordings::file::<MotionReading>(db, id).await?;
+            pool.run(move |pool| reading.check(&file.text(pool)?)).await?
+        }
+    }
+}
+
+/// A file as it was brought.
+#[derive(Debug)]
+pub struct Brought {
+    /// What is known of it.
+    pub recording: LabRecording,
+    /// Its form.
+    pub form: FileForm,
+    /// The file.
+    pub file: PackedText,
+}
+
+/// A recording as it was brought.
+///
+/// # Errors
+/// [`Error::NotFound`], or that the file is not what its hash says.
+pub async fn brought(db: &mut Connection, id: LabRecordingId) -> Result<Brought, Error> {
+    /// What both kinds of recordings say of their reading.
+    #[derive(Deserialize)]
+    struct Reading {
+        form: FileForm,
+    }
+    let recording = lab_recordings::get(db, id).await?;
+    let (Reading { form }, file) = lab_recordings::file(db, id).await?;
+    Ok(Brought { recording, form, file })
+}
+
+/// Keeps a file with the walk that it is of.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when the session is closed, the walk was not recorded, or the very same file was
+/// brought of another walk.
+pub async fn keep(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: LabSessionId,
+    checked: &Checked,
+) -> Result<LabRecording, Error> {
+    let walk = checked.walk;
+    if still_open(writer, id).await?.done(Act::Walk(walk)).is_none() {
+        return Err(Error::conflict(format!("walk {walk} was not recorded yet: say so in the lab first")));
+    }
+    let brought = lab_recordings::of_session(writer, id).await?;
+    if let Some(other) = brought.iter().find(|other| other.walk != walk && checked.packed.is_file_of(other)) {
+        let other = other.walk;
+        return Err(Error::conflict(format!(
+            "this very file was brought as that of walk {other}: no two walks are alike"
+        )));
+    }
+    let added = lab_recordings::insert(writer, actor, id, walk, &checked.packed).await?;
+    let detail = json!({ "walk": walk, "kind": added.kind, "recording": added.id, "sha256": added.raw_sha256 });
+    audit::append(writer, actor, "lab_session.record", &format!("lab session {id}"), &detail).await?;
+    Ok(added)
+}

@@ -1,0 +1,155 @@
+//! Who reaches a study: members are added and removed, and a study is restricted to them. One way in for pages and REST.
+
+use crate::access::people::{self, NewUser};
+use crate::access::{Caller, Principal, Reach, Role};
+use crate::error::Error;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::members::{self, MEMBER_ALREADY, Member, MemberKind};
+use gaitwright_store::users::User;
+use gaitwright_store::{Connection, MemberId, OnConstraint, StudyId, Writer, tokens, users};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Somebody to add to a study.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewMember {
+    /// Person or program.
+    pub kind: MemberKind,
+    /// Name of a user who is not disabled, or of a token that is still good.
+    pub name: String,
+}
+
+/// Who reaches a study.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct StudyAccess {
+    /// Whether only members and administrators reach it. Raters need to be members in any case.
+    pub restricted: bool,
+    /// The members, in the order in which they were added.
+    pub members: Vec<Member>,
+}
+
+/// Who reaches a study.
+///
+/// # Errors
+/// What the database reports.
+pub async fn access(db: &mut Connection, study: StudyId) -> Result<StudyAccess, Error> {
+    Ok(StudyAccess {
+        restricted: members::is_restricted(db, study).await?,
+        members: members::of_study(db, study).await?,
+    })
+}
+
+/// Makes a user or a token a member of a study.
+///
+/// # Errors
+/// [`Error::Invalid`] for an unknown name, [`Error::Conflict`] for a member.
+pub async fn add(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewMember) -> Result<Member, Error> {
+    let who = match new.kind {
+        MemberKind::User => users::by_name(writer, &new.name)
+            .await?
+            .filter(|user| user.disabled_at.is_none())
+            .map(|user| Principal::User(user.id))
+            .ok_or_else(|| Error::invalid("name", new.name.as_str(), "the name of a user who is not disabled"))?,
+        MemberKind::Token => tokens::all(writer)
+            .await?
+            .into_iter()
+            .find(|token| token.name == new.name && token.is_good())
+            .map(|token| Principal::Token(token.id))
+            .ok_or_else(|| Error::invalid("name", new.name.as_str(), "the name of a token that is still good"))?,
+    };
+    insert(writer, actor, study, who).await
+}
+
+async fn insert(writer: &mut Writer, actor: &Actor, study: StudyId, who: Principal) -> Result<Member, Error> {
+    let id = members::insert(writer, study, who, actor.as_str())
+        .await
+        .on_constraint(MEMBER_ALREADY, || Error::conflict("this is a member of this study already"))?;
+    let member = members::get(writer, id).await?;
+    let detail = json!({ "member": id, "kind": member.kind, "name": member.name });
+    audit::append(writer, actor, "study.member_add", &format!("study {study}"), &detail).await?;
+    Ok(member)
+}
+
+/// Removes a member.
+///
+/// # Errors
+/// [`Error::NotFound`], [`Error::Conflict`] when it was removed already.
+pub async fn end(writer: &mut Writer, actor: &Actor, id: MemberId) -> Result<Member, Error> {
+    let member = members::get(writer, id).await?;
+    if !members::end(writer, id, actor.as_str()).await? {
+        return Err(Error::conflict("this member was removed already"));
+    }
+    let detail = json!({ "member": id, "kind": member.kind, "name": member.name });
+    audit::append(writer, actor, "study.member_end", &format!("study {}", member.study_id), &detail).await?;
+    Ok(member)
+}
+
+/// Restricts a study to its members and administrators, or opens it to all staff. Whoever restricts it stays a member.
+///
+/// # Errors
+/// What the database reports.
+pub async fn restrict(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    restricted: bool,
+) -> Result<StudyAccess, Error> {
+    if members::is_restricted(writer, study).await? != restricted {
+        members::set_restricted(writer, study, restricted, caller.actor.as_str()).await?;
+        let detail = json!({ "restricted": restricted });
+        audit::append(writer, &caller.actor, "study.restrict", &format!("study {study}"), &detail).await?;
+        keep_in(writer, caller, study).await?;
+    }
+    access(writer, study).await
+}
+
+/// Makes a caller a member who would not reach the study otherwise.
+pub(super) async fn keep_in(writer: &mut Writer, caller: &Caller, study: StudyId) -> Result<(), Error> {
+    if let Reach::Open(who) | Reach::Assigned(who) = caller.reach()
+        && !members::reaches(writer, caller.reach(), study).await?
+    {
+        insert(writer, &caller.actor, study, who).await?;
+    }
+    Ok(())
+}
+
+/// Assigns a rater to a study and makes a one-time sign-in link: the rater, and the secret of the link, which is not
+/// stored. A rater of that name who does not exist yet is added.
+///
+/// # Errors
+/// [`Error::Invalid`] for the name of somebody who is no rater, [`Error::Conflict`] for a rater who is disabled.
+pub async fn invite(
+    writer: &mut Writer,
+    actor: &Actor,
+    study: StudyId,
+    name: &str,
+) -> Result<(User, Member, String), Error> {
+    let user = match users::by_name(writer, name).await? {
+        Some(user) if user.role == Role::Rater => user,
+        Some(_) => return Err(Error::invalid("name", name, "the name of a rater, or one that is not taken")),
+        None => people::add(writer, actor, &NewUser { name: name.to_owned(), role: Role::Rater }).await?,
+    };
+    let secret = people::link(writer, actor, user.id).await?;
+    let present = members::of_study(writer, study).await?;
+    let present = present.into_iter().find(|member| member.kind == MemberKind::User && member.name == user.name);
+    let member = match present {
+        Some(member) => member,
+        None => insert(writer, actor, study, Principal::User(user.id)).await?,
+    };
+    Ok((user, member, secret))
+}
+
+/// Users and tokens that could be added to a study, by name.
+///
+/// # Errors
+/// What the database reports.
+pub async fn candidates(db: &mut Connection, present: &[Member]) -> Result<Vec<(MemberKind, String, String)>, Error> {
+    let is_new = |kind, name: &str| !present.iter().any(|member| member.kind == kind && member.name == name);
+    let users = users::all(db).await?.into_iter().filter(|user| user.disabled_at.is_none());
+    let users = users.map(|user| (MemberKind::User, user.name, user.role.as_str().to_owned()));
+    let tokens = tokens::all(db).await?.into_iter().filter(tokens::Token::is_good);
+    let tokens = tokens.map(|token| (MemberKind::Token, token.name, "token".to_owned()));
+    Ok(users.chain(tokens).filter(|(kind, name, _)| is_new(*kind, name)).collect())
+}

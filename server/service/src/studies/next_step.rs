@@ -1,0 +1,108 @@
+//! What a study needs next, as a pure function of where it stands.
+
+use super::belief::Beliefs;
+use super::choice;
+use super::comparison::{self, Question};
+use super::lifecycle::Act;
+use super::snapshot::StudySnapshot;
+use crate::error::Error;
+use gaitwright_compute::OnPool;
+use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::trials::{NewTrial, TrialState};
+use gaitwright_store::{FeedbackId, now};
+
+/// So many trials in a row without a result pause a study: something is wrong with the set-up.
+const FAILURES_IN_A_ROW: usize = 3;
+
+/// What a study needs next.
+pub(super) enum Step {
+    Nothing,
+    Act(Act, String),
+    Try(NewTrial),
+}
+
+/// Decides it, from the snapshot alone: `beliefs` spares computing what is known.
+pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<Step, Error> {
+    let study = &snapshot.study;
+    if study.plan.feedback_mode == FeedbackMode::Human {
+        match (study.state, comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
+            (StudyState::Running, Question::Pair(_)) => {
+                return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into()));
+            }
+            (StudyState::Waiting, Question::None) => return Ok(Step::Act(Act::Answered, String::new())),
+            // A person is asked about the newest gait as soon as it is certified; nothing is planned before.
+            (_, Question::AfterCertificate(_)) => return Ok(Step::Nothing),
+            _ => {}
+        }
+    }
+    if study.state != StudyState::Running {
+        return Ok(Step::Nothing);
+    }
+    let ended_in_a_row = snapshot.trials.iter().rev().filter(|trial| !trial.state.is_open());
+    let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
+    if failed == FAILURES_IN_A_ROW {
+        let message = snapshot.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
+        let reason = format!("{failed} trials in a row failed; the last: {}", message.unwrap_or_default());
+        return Ok(Step::Act(Act::Pause, reason));
+    }
+    let open = snapshot.open();
+    let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
+    if tried >= study.plan.trial_budget {
+        let finished = Step::Act(Act::Finish, format!("all {} trials are done", study.plan.trial_budget));
+        return Ok(if open == 0 { finished } else { Step::Nothing });
+    }
+    if let Some(reason) = snapshot.is_enough() {
+        return Ok(if open == 0 { Step::Act(Act::Finish, reason) } else { Step::Nothing });
+    }
+    if open >= study.plan.parallel_trials as usize || study.plan.evaluation == Evaluation::Script {
+        return Ok(Step::Nothing);
+    }
+    let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
+    match choice::next_trial(pool, snapshot, &belief) {
+        Ok(new) => Ok(Step::Try(new)),
+        Err(e) if e.is_exhausted() && open == 0 => {
+            Ok(Step::Act(Act::Finish, "every action of the search space was tried".into()))
+        }
+        Err(e) if e.is_exhausted() => Ok(Step::Nothing),
+        Err(choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
+        Err(choice::ChoiceError::Bounds(e)) => Err(e.into()),
+    }
+}
+
+/// The trials that would be proposed next, one for each answer to the question that waits for one.
+pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
+    let question = comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
+    let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
+    let mut likely: Vec<NewTrial> = Vec::new();
+    for said in [
+        FeedbackContent::Preference { winner: a, loser: b },
+        FeedbackContent::Preference { winner: b, loser: a },
+        FeedbackContent::Tie { a, b },
+    ] {
+        let mut then = snapshot.clone();
+        then.study.state = StudyState::Running;
+        then.feedback.push(FeedbackRow {
+            seq: snapshot.feedback.last().map_or(1, |row| row.seq + 1),
+            id: FeedbackId::fresh(),
+            study_id: snapshot.study.id,
+            said,
+            source: Source::Subject,
+            author: String::new(),
+            note: String::new(),
+            by_rater: false,
+            unblinded: false,
+            created_at: now(),
+            retraction: None,
+        });
+        // What is believed of answers that nobody gave is not kept.
+        if let Step::Try(new) = next_step(pool, &then, &Beliefs::default())?
+            && !likely
+                .iter()
+                .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))
+        {
+            likely.push(new);
+        }
+    }
+    Ok(likely)
+}

@@ -1,0 +1,156 @@
+//! Adding a subject, and what is known of the muscles: one way in for the forms and the REST interface.
+
+use crate::error::Error;
+use crate::printable;
+use gait_optimizer::Subject as Body;
+use gait_optimizer::muscle::MuscleParameters;
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::subjects::{self, Correction, PSEUDONYM_UNIQUE, Subject};
+use gaitwright_store::{Connection, OnConstraint, SubjectId, Writer};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A subject to add.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewSubject {
+    /// Site-given pseudonym: never a name.
+    #[schema(min_length = 1, max_length = 40)]
+    pub pseudonym: String,
+    /// Body height, m.
+    #[schema(minimum = 1.4, maximum = 2.2)]
+    pub height_m: f64,
+    /// Body mass, kg.
+    #[schema(minimum = 35, maximum = 160)]
+    pub body_mass_kg: f64,
+    /// Free text.
+    #[serde(default)]
+    #[schema(max_length = 4000)]
+    pub notes: String,
+}
+
+/// Checks what is said of a subject.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &str) -> Result<Body, Error> {
+    check_pseudonym(pseudonym)?;
+    let body = Body::new(height_m, body_mass_kg)?;
+    printable::note("notes", notes, 4000)?;
+    Ok(body)
+}
+
+/// Checks a subject and writes it.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the pseudonym is taken.
+pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<Subject, Error> {
+    let pseudonym = new.pseudonym.trim();
+    let body = checked(writer, new).await?;
+    let subject = subjects::insert(writer, pseudonym, body, &new.notes)
+        .await
+        .on_constraint(PSEUDONYM_UNIQUE, || is_taken(pseudonym))?;
+    let detail = json!({ "pseudonym": pseudonym, "height_m": body.height_m, "body_mass_kg": body.body_mass_kg });
+    audit::append(writer, actor, "subject.add", &format!("subject {}", subject.id), &detail).await?;
+    Ok(subject)
+}
+
+/// Checks a subject as [`add`] does, and writes nothing.
+///
+/// # Errors
+/// As [`add`].
+pub async fn checked(db: &mut Connection, new: &NewSubject) -> Result<Body, Error> {
+    let pseudonym = new.pseudonym.trim();
+    let body = check(pseudonym, new.height_m, new.body_mass_kg, &new.notes)?;
+    match subjects::by_pseudonym(db, pseudonym).await? {
+        Some(_) => Err(is_taken(pseudonym)),
+        None => Ok(body),
+    }
+}
+
+fn is_taken(pseudonym: &str) -> Error {
+    Error::conflict(format!("there is a subject {pseudonym:?} already"))
+}
+
+/// The right height and mass of a subject.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewCorrection {
+    /// Body height, m.
+    #[schema(minimum = 1.4, maximum = 2.2)]
+    pub height_m: f64,
+    /// Body mass, kg.
+    #[schema(minimum = 35, maximum = 160)]
+    pub body_mass_kg: f64,
+    /// Why it is corrected.
+    #[schema(min_length = 1, max_length = 2000, pattern = "\\S")]
+    pub reason: String,
+}
+
+/// Corrects height and mass of a subject. Studies made from now on solve with them; those that are there keep theirs.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], a conflict when nothing would change or the subject withdrew.
+pub async fn correct(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: SubjectId,
+    new: &NewCorrection,
+) -> Result<Correction, Error> {
+    let before = subjects::get(writer, id).await?.body();
+    let body = Body::new(new.height_m, new.body_mass_kg)?;
+    let reason = printable::reason("reason", &new.reason, ": why it is corrected")?;
+    if body == before {
+        return Err(Error::conflict("height and mass are these already"));
+    }
+    let correction = subjects::correct(writer, actor, id, body, reason).await?;
+    let detail = json!({
+        "height_m": body.height_m, "body_mass_kg": body.body_mass_kg, "reason": reason,
+        "before": { "height_m": before.height_m, "body_mass_kg": before.body_mass_kg },
+    });
+    audit::append(writer, actor, "subject.correct", &format!("subject {id}"), &detail).await?;
+    Ok(correction)
+}
+
+/// Writes down how the muscles of a subject differ from the published table: studies made from now on take it up.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], a conflict when the subject withdrew.
+pub async fn set_muscles(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: SubjectId,
+    muscles: &MuscleParameters,
+) -> Result<(), Error> {
+    subjects::get(writer, id).await?;
+    muscles.validate()?;
+    subjects::set_muscles(writer, actor, id, muscles).await?;
+    audit::append(writer, actor, "subject.muscles", &format!("subject {id}"), &json!({ "muscles": muscles })).await?;
+    Ok(())
+}
+
+/// Characters that look like themselves. Controls, joiners, direction overrides and letters without a shape make two
+/// pseudonyms look alike, or one look like another.
+fn is_visible(c: char) -> bool {
+    const SHAPELESS: [char; 4] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}'];
+    (c.is_alphanumeric() && !SHAPELESS.contains(&c)) || " -_.:/#+()".contains(c)
+}
+
+/// A pseudonym that could be a person's address, number or date of birth is refused.
+fn check_pseudonym(pseudonym: &str) -> Result<(), Error> {
+    let refuse = |allowed| Err(Error::invalid("pseudonym", pseudonym, allowed));
+    if pseudonym.is_empty() || pseudonym.chars().count() > 40 {
+        return refuse("1 to 40 characters");
+    }
+    let digits = pseudonym.chars().filter(|c| c.is_numeric()).count();
+    if pseudonym.contains('@') || digits > 5 {
+        return refuse("a code of the site such as S01: no address, no date, no long number");
+    }
+    if !pseudonym.chars().all(is_visible) {
+        return refuse(
+            "letters, digits, spaces and - _ . : / # + ( ): nothing that cannot be seen or turns text around",
+        );
+    }
+    Ok(())
+}

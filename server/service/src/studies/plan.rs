@@ -1,0 +1,333 @@
+//! Making a study: one way in for the form, the REST interface and the command line.
+
+use super::person::{self, NewSubject};
+use super::{catalogue, membership, recording, search};
+use crate::access::Caller;
+use crate::error::Error;
+use crate::printable;
+use gait_learner::{LearnerSettings, SearchSpace};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
+use gaitwright_store::audit::{self, Actor};
+use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState};
+use gaitwright_store::{
+    Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
+    schema, studies, subjects,
+};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A study to make. Everything but the subject has a default.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewStudy {
+    /// Who walks.
+    pub subject_id: SubjectId,
+    /// Name shown to people; by default made from subject and variant.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// With which device; by default the built-in one.
+    #[serde(default)]
+    pub device_id: Option<DeviceId>,
+    /// What Gait RMSE is measured against; by default the reference gait nearest to the subject in height and body mass, and
+    /// the built-in one where no reference says whose it is.
+    #[serde(default)]
+    pub reference_gait_id: Option<ReferenceGaitId>,
+    /// With muscles (C1-C12) or without (C1-C4).
+    #[serde(default = "yes")]
+    pub muscles: bool,
+    /// Settings of the gait problem; where they say nothing of muscles, those written down of the subject are taken.
+    #[serde(default)]
+    #[schema(value_type = Object)]
+    pub gait_settings: Box<GaitSettings>,
+    /// Limits of one solve.
+    #[serde(default)]
+    #[schema(value_type = Object)]
+    pub solve_options: SolveOptions,
+    /// Values of the bounds that are not tuned.
+    #[serde(default)]
+    #[schema(value_type = schema::Bounds)]
+    pub base_bounds: TunedBounds,
+    /// What is tuned; by default Table I.
+    #[serde(default)]
+    #[schema(value_type = Option<schema::SearchSpace>)]
+    pub search_space: Option<SearchSpace>,
+    /// Settings of the learner; what is left out is what is recommended for the method.
+    #[serde(default)]
+    #[schema(value_type = Object)]
+    pub learner: LearnerSettings,
+    /// Who answers the comparisons.
+    #[serde(default = "automatic")]
+    pub feedback_mode: FeedbackMode,
+    /// Who evaluates the trials.
+    #[serde(default = "optimizer")]
+    pub evaluation: Evaluation,
+    /// How many trials.
+    #[serde(default = "fifteen")]
+    #[schema(minimum = 1, maximum = 10000)]
+    pub trial_budget: u32,
+    /// No new trial once the solves so far took so many seconds together.
+    #[serde(default)]
+    pub solve_seconds_budget: Option<f64>,
+    /// Done when the best action stayed the same over so many results in a row.
+    #[serde(default)]
+    #[schema(minimum = 1, maximum = 10000)]
+    pub unchanged_limit: Option<u32>,
+    /// How many trials at the same time.
+    #[serde(default = "one")]
+    pub parallel_trials: u32,
+    /// Higher runs first.
+    #[serde(default)]
+    pub priority: i32,
+    /// Every random draw derives from it.
+    #[serde(default = "one_seed")]
+    pub seed: u64,
+    /// Whether to start at once.
+    #[serde(default = "yes")]
+    pub start: bool,
+    /// From the beginning only members and administrators reach it; whoever makes it is a member.
+    #[serde(default)]
+    pub restricted: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+fn automatic() -> FeedbackMode {
+    FeedbackMode::Automatic
+}
+fn optimizer() -> Evaluation {
+    Evaluation::Optimizer
+}
+fn fifteen() -> u32 {
+    15
+}
+fn one() -> u32 {
+    1
+}
+fn one_seed() -> u64 {
+    1
+}
+
+impl NewStudy {
+    /// A study of this subject with every default.
+    pub fn of(subject_id: SubjectId) -> Self {
+        Self {
+            subject_id,
+            name: None,
+            device_id: None,
+            reference_gait_id: None,
+            muscles: true,
+            gait_settings: Box::default(),
+            solve_options: SolveOptions::default(),
+            base_bounds: TunedBounds::default(),
+            search_space: None,
+            learner: LearnerSettings::default(),
+            feedback_mode: FeedbackMode::Automatic,
+            evaluation: Evaluation::Optimizer,
+            trial_budget: fifteen(),
+            solve_seconds_budget: None,
+            unchanged_limit: None,
+            parallel_trials: one(),
+            priority: 0,
+            seed: one_seed(),
+            start: true,
+            restricted: false,
+        }
+    }
+}
+
+impl NewStudy {
+    /// A study with the set-up of another one, not started.
+    pub fn like(plan: &StudyPlan) -> Self {
+        Self {
+            subject_id: plan.subject_id,
+            name: Some(plan.name.clone()),
+            device_id: Some(plan.device_id),
+            reference_gait_id: Some(plan.reference_gait_id),
+            muscles: plan.muscles,
+            gait_settings: plan.gait_settings.clone(),
+            solve_options: plan.solve_options,
+            base_bounds: plan.base_bounds,
+            search_space: Some(plan.search_space.clone()),
+            learner: plan.learner.clone(),
+            feedback_mode: plan.feedback_mode,
+            evaluation: plan.evaluation,
+            trial_budget: plan.trial_budget,
+            solve_seconds_budget: plan.solve_seconds_budget,
+            unchanged_limit: plan.unchanged_limit,
+            parallel_trials: plan.parallel_trials,
+            priority: plan.priority,
+            seed: plan.seed,
+            start: false,
+            restricted: false,
+        }
+    }
+}
+
+/// The largest seed: JSON readers keep 53 bits of an integer.
+pub const LARGEST_SEED: u64 = (1 << 53) - 1;
+
+/// Checks a study and writes it.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference.
+pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result<Study, Error> {
+    create_from(writer, actor, new, None).await
+}
+
+/// [`create`] by somebody who reaches it afterwards, also where it is restricted.
+///
+/// # Errors
+/// As [`create`].
+pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> Result<Study, Error> {
+    let study = create(writer, &caller.actor, new).await?;
+    membership::keep_in(writer, caller, study.id).await?;
+    Ok(study)
+}
+
+/// The same, noting the study whose set-up it has.
+pub(super) async fn create_from(
+    writer: &mut Writer,
+    actor: &Actor,
+    new: NewStudy,
+    forked_from: Option<StudyId>,
+) -> Result<Study, Error> {
+    writer.room()?;
+    let state = if new.start { StudyState::Running } else { StudyState::Draft };
+    // A fork has the very set-up of its parent.
+    let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
+    let restricted = new.restricted;
+    let mut plan = check(writer, new).await?;
+    if let Some(parent) = forked_from {
+        // Also where the subject was corrected meanwhile: the two are compared with each other.
+        plan.body = studies::get(writer, parent).await?.plan.body;
+    }
+    let study = studies::insert(writer, &plan, state, forked_from).await?;
+    if restricted {
+        members::set_restricted(writer, study.id, true, actor.as_str()).await?;
+    }
+    let payload = json!({ "state": study.state, "reason": "created" });
+    events::append(writer, study.id, "study_changed", &payload).await?;
+    let detail = json!({
+        "name": study.plan.name, "state": study.state, "seed": study.plan.seed, "forked_from": forked_from,
+        "restricted": restricted,
+    });
+    audit::append(writer, actor, "study.create", &format!("study {}", study.id), &detail).await?;
+    Ok(study)
+}
+
+/// What a study will be made of, every default filled in.
+///
+/// # Errors
+/// As [`create`]; nothing is written.
+pub async fn checked(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+    let new = with_own_muscles(db, new).await?;
+    check(db, new).await
+}
+
+/// As [`checked`], for a subject who is described and not written down yet; [`NewStudy::subject_id`] is not looked at.
+///
+/// # Errors
+/// As [`create`]; nothing is written.
+pub async fn checked_for_new(db: &mut Connection, subject: &NewSubject, new: NewStudy) -> Result<StudyPlan, Error> {
+    let body = person::checked(db, subject).await?;
+    check_for(db, subject.pseudonym.trim(), body, new).await
+}
+
+/// A study that says nothing of muscles takes those that are written down of its subject.
+async fn with_own_muscles(db: &mut Connection, mut new: NewStudy) -> Result<NewStudy, Error> {
+    if new.gait_settings.muscles.is_published() {
+        new.gait_settings.muscles = subjects::muscles(db, new.subject_id).await?;
+    }
+    Ok(new)
+}
+
+async fn check(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+    let subject = subjects::get(db, new.subject_id).await?;
+    check_for(db, &subject.pseudonym, subject.body(), new).await
+}
+
+async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStudy) -> Result<StudyPlan, Error> {
+    let device_id = match new.device_id {
+        Some(id) => devices::get(db, id).await?.id,
+        None => catalogue::device(db).await?.id,
+    };
+    let reference_gait_id = match new.reference_gait_id {
+        Some(id) => reference_gaits::get(db, id).await?.id,
+        None => match recording::nearest(db, &body).await? {
+            Some(nearest) => nearest.id,
+            None => catalogue::reference_gait(db).await?.id,
+        },
+    };
+    let variant = if new.muscles { "with muscles" } else { "without muscles" };
+    let name = match new.name.as_deref().map(str::trim) {
+        None | Some("") => format!("{}, {variant}, seed {}", pseudonym, new.seed),
+        Some(name) => printable::name("name", name, 120)?.to_owned(),
+    };
+    let search_space = match new.search_space {
+        Some(space) => space,
+        None => search::table_i().map_err(Error::Learner)?,
+    };
+    let plan = StudyPlan {
+        name,
+        subject_id: new.subject_id,
+        body: Some(body),
+        device_id,
+        reference_gait_id,
+        muscles: new.muscles,
+        gait_settings: new.gait_settings,
+        solve_options: new.solve_options,
+        base_bounds: new.base_bounds,
+        search_space,
+        learner: new.learner,
+        feedback_mode: new.feedback_mode,
+        evaluation: new.evaluation,
+        trial_budget: new.trial_budget,
+        solve_seconds_budget: new.solve_seconds_budget,
+        unchanged_limit: new.unchanged_limit,
+        parallel_trials: new.parallel_trials,
+        priority: new.priority,
+        seed: new.seed,
+    };
+    check_plan(&plan)?;
+    Ok(plan)
+}
+
+/// Checks every number of a study that is made, or that comes from elsewhere.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
+    printable::name("name", &plan.name, 120)?;
+    check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
+    check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
+    check_range("priority", i64::from(plan.priority), -10, 10)?;
+    if plan.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {
+        return Err(Error::invalid("solve_seconds_budget", json!(plan.solve_seconds_budget), "1 to 1e8, or absent"));
+    }
+    if let Some(limit) = plan.unchanged_limit {
+        check_range("unchanged_limit", i64::from(limit), 1, 10_000)?;
+    }
+    if plan.seed > LARGEST_SEED {
+        return Err(Error::invalid("seed", plan.seed, &format!("0 to {LARGEST_SEED}")));
+    }
+    plan.gait_settings.validate()?;
+    plan.solve_options.validate()?;
+    plan.base_bounds.validate()?;
+    search::validate(&plan.search_space, plan.base_bounds)?;
+    plan.learner.validate().map_err(Error::Learner)?;
+    if plan.learner.categories() != 2 {
+        let allowed = "one threshold: a trial is converged or not converged";
+        return Err(Error::invalid("learner.ordinal_thresholds", json!(plan.learner.ordinal_thresholds), allowed));
+    }
+    Ok(())
+}
+
+pub(super) fn check_range(field: &str, value: i64, minimum: i64, maximum: i64) -> Result<(), Error> {
+    if (minimum..=maximum).contains(&value) {
+        Ok(())
+    } else {
+        Err(Error::invalid(field, value, &format!("{minimum} to {maximum}")))
+    }
+}

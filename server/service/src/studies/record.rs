@@ -1,0 +1,213 @@
+//! Recording what a trial gave: its state, label, gait and the answers that Gait RMSE implies, exactly once, in
+//! one transaction.
+
+use super::comparison::{by_gait_rmse, partners};
+use super::preference::{self, PROGRAM};
+use super::snapshot::StudySnapshot;
+use super::trial_state::{self, Happening};
+use crate::error::Error;
+use gait_optimizer::{SolveOutcome, SolveStatus};
+use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::gaits::PackedGait;
+use gaitwright_store::jobs::{Lease, Troubles};
+use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::trials::{TrialEnd, TrialState};
+use gaitwright_store::{Store, TrialId, Writer, commit, events, gaits, jobs, results, studies, trials};
+use serde_json::json;
+use std::time::Duration;
+
+/// So often a result is compared anew because the study heard something meanwhile.
+const TRIES: u32 = 20;
+/// Pause after the first time, longer by as much after each.
+const FIRST_PAUSE: Duration = Duration::from_millis(10);
+
+/// Records a solve that ended by itself. `false`: the lease was not ours any more; what came is kept as evidence, and
+/// nobody hears of it.
+///
+/// # Errors
+/// What the database or the learner reports; nothing is recorded then.
+pub async fn ended(
+    store: &mut Store,
+    lease: &Lease,
+    worker: &str,
+    outcome: &SolveOutcome,
+    gait: Option<&PackedGait>,
+) -> Result<bool, Error> {
+    let Some(state) = trial_state::result_of(outcome.report.status) else {
+        return match outcome.report.status {
+            SolveStatus::Cancelled => interrupted(store, lease).await,
+            _ => broke(store, lease, "the solve ran out of time").await,
+        };
+    };
+    let end = TrialEnd {
+        state,
+        report: Some(outcome.report.clone()),
+        violations: outcome.violations.clone(),
+        message: message_of(outcome),
+    };
+    for attempt in 0..TRIES {
+        tokio::time::sleep(FIRST_PAUSE * attempt).await;
+        let mut reader = store.read().await?;
+        let study = studies::get(&mut reader, lease.study).await?;
+        let snapshot = StudySnapshot::read(&mut reader, study).await?;
+        drop(reader);
+        let answers = answers(store, &snapshot, lease.trial, &end).await?;
+
+        let mut writer = store.write().await?;
+        if !snapshot.is_current(&mut writer).await? {
+            continue;
+        }
+        let taken = jobs::finish(&mut writer, lease).await?;
+        results::keep(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, taken).await?;
+        if !taken {
+            commit(writer).await?;
+            return Ok(false);
+        }
+        trials::start(&mut writer, lease.trial).await?;
+        trials::finish(&mut writer, lease.trial, &end).await?;
+        if let Some(gait) = gait {
+            gaits::insert(&mut writer, lease.trial, gait).await?;
+        }
+        preference::compute(&mut writer, lease.study, (lease.trial, state), &answers, PROGRAM).await?;
+        tell(&mut writer, lease, state).await?;
+        commit(writer).await?;
+        return Ok(true);
+    }
+    // Its worker is free again; the trial is solved anew at most twice, and says why.
+    broke(store, lease, "the study heard answers faster than the result could be compared with them").await
+}
+
+/// Records a failure of the program: the job runs again at most twice, then the trial is `failed`.
+///
+/// # Errors
+/// What the database reports.
+pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, Error> {
+    tracing::warn!(trial = %lease.trial, attempt = lease.attempt, reason, "a solve failed");
+    let mut writer = store.write().await?;
+    let before = jobs::troubles(&mut writer, lease.job).await?;
+    let after = Troubles { failures: before.failures + 1, ..before };
+    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Broke(before), after, reason).await?;
+    commit(writer).await?;
+    Ok(recorded)
+}
+
+/// Records a lease that ran out.
+///
+/// # Errors
+/// What the database reports.
+pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
+    let mut writer = store.write().await?;
+    let before = jobs::troubles(&mut writer, lease.job).await?;
+    let after = Troubles { losses: before.losses + 1, ..before };
+    let reason = "its worker was not heard of again";
+    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Silent(before), after, reason).await?;
+    commit(writer).await?;
+    Ok(recorded)
+}
+
+/// Gives an interrupted trial back to the queue, uncounted.
+///
+/// # Errors
+/// What the database reports.
+pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
+    let mut writer = store.write().await?;
+    let same = jobs::troubles(&mut writer, lease.job).await?;
+    let recorded = give_up_or_requeue(&mut writer, lease, Happening::Interrupted, same, "").await?;
+    commit(writer).await?;
+    Ok(recorded)
+}
+
+/// Cancels an open trial on a person's order.
+///
+/// # Errors
+/// A conflict when the trial has ended, or what the database reports.
+pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Result<(), Error> {
+    let row = trials::get(writer, trial).await?;
+    let state = trial_state::after(row.state, Happening::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
+    jobs::cancel(writer, trial).await?;
+    let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
+    trials::finish(writer, trial, &end).await?;
+    let payload = json!({ "trial_id": trial, "number": row.number, "state": state });
+    Ok(events::append(writer, row.study_id, "trial_ended", &payload).await?)
+}
+
+/// Lets a trial that gave no result run once more.
+///
+/// # Errors
+/// A conflict when the trial has a result or is open, or what the database reports.
+pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
+    let row = trials::get(writer, trial).await?;
+    trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
+    if row.asked_by.is_some() {
+        return Err(Error::conflict("a script evaluates this trial: it asks for another one"));
+    }
+    jobs::reopen(writer, trial).await?;
+    trials::requeue(writer, trial, "").await?;
+    let payload = json!({ "trial_id": trial, "number": row.number, "state": TrialState::Queued });
+    Ok(events::append(writer, row.study_id, "trial_queued", &payload).await?)
+}
+
+async fn give_up_or_requeue(
+    writer: &mut Writer,
+    lease: &Lease,
+    happening: Happening,
+    after: Troubles,
+    reason: &str,
+) -> Result<bool, Error> {
+    if !jobs::finish(writer, lease).await? {
+        return Ok(false);
+    }
+    let state = trial_state::after(TrialState::Running, happening).map_err(|e| Error::Internal(e.to_string()))?;
+    if state == TrialState::Queued {
+        jobs::requeue(writer, lease.job, after).await?;
+        trials::requeue(writer, lease.trial, reason).await?;
+    } else {
+        let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
+        trials::finish(writer, lease.trial, &end).await?;
+    }
+    tell(writer, lease, state).await?;
+    Ok(true)
+}
+
+/// What Gait RMSE answers about the new trial, unless the study leaves the answers to people.
+async fn answers(
+    store: &mut Store,
+    snapshot: &StudySnapshot,
+    new: TrialId,
+    end: &TrialEnd,
+) -> Result<Vec<FeedbackContent>, Error> {
+    let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
+    let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
+    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+        return Ok(Vec::new());
+    }
+    let standing_there = snapshot.clone();
+    let partners = store.compute(move |pool| partners(pool, &standing_there, new)).await?.map_err(Error::Learner)?;
+    Ok(partners
+        .into_iter()
+        .filter_map(|id| snapshot.trial(id)?.gait_rmse_rad.map(|old| by_gait_rmse((new, rmse), (id, old))))
+        .collect())
+}
+
+async fn tell(writer: &mut Writer, lease: &Lease, state: TrialState) -> Result<(), Error> {
+    let trial = trials::get(writer, lease.trial).await?;
+    let kind = if state == TrialState::Queued { "trial_queued" } else { "trial_ended" };
+    let payload = json!({ "trial_id": lease.trial, "number": trial.number, "state": state });
+    Ok(events::append(writer, lease.study, kind, &payload).await?)
+}
+
+fn message_of(outcome: &SolveOutcome) -> String {
+    let worst = outcome.violations.first();
+    let cause = match outcome.report.status {
+        SolveStatus::Converged => return String::new(),
+        SolveStatus::Infeasible => "no gait meets all constraints near the point that was reached",
+        SolveStatus::Stalled => "the solver made no further progress",
+        SolveStatus::IterationLimit => "the iteration limit was reached",
+        SolveStatus::TimeLimit => "the time limit was reached",
+        SolveStatus::Cancelled => "cancelled",
+    };
+    match worst {
+        Some(row) => format!("{cause}; least satisfied: {} by {:.3e} {}", row.row, row.amount, row.unit),
+        None => cause.to_owned(),
+    }
+}

@@ -1,0 +1,112 @@
+//! What staff say of two gaits that is no preference: one way in for the form and the REST interface.
+
+use super::answer::attribution;
+use super::preference::{self, Again, GivenJudgement};
+use crate::access::Caller;
+use crate::error::Error;
+use crate::printable;
+use gaitwright_store::feedback::Source;
+use gaitwright_store::presentations::Judgement;
+use gaitwright_store::remarks::{self, Remark};
+use gaitwright_store::{RemarkId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
+use serde::Deserialize;
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// A remark.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = RemarkToMake)]
+pub struct NewRemark {
+    /// One gait.
+    pub first: TrialId,
+    /// The other one.
+    pub second: TrialId,
+    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`; which gait is better is a preference.
+    pub answer: Judgement,
+    /// Who says so: `subject`, `clinician` or `script`.
+    /// By default what the caller is.
+    #[serde(default)]
+    pub source: Option<Source>,
+    /// Name or pseudonym of who says so; by default the name of the caller.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 80)]
+    pub author: Option<String>,
+    /// Free text.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub note: String,
+}
+
+/// Writes a remark.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
+pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &NewRemark) -> Result<RemarkId, Error> {
+    let study = studies::get(writer, study).await?;
+    if !new.answer.is_remark() {
+        return Err(Error::invalid(
+            "answer",
+            json!(new.answer),
+            "cannot_tell, unsafe_first, unsafe_second, unsafe_both",
+        ));
+    }
+    let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
+    let statement = GivenJudgement {
+        study: study.id,
+        pair: (new.first, new.second),
+        fields: ("first", "second"),
+        said: new.answer,
+        attribution,
+        again: Again::Refused,
+    };
+    let id = write(writer, statement).await?;
+    let (first, second, author) = (new.first, new.second, attribution.author);
+    let detail = json!({ "study": study.id, "first": first, "second": second, "answer": new.answer, "author": author });
+    audit::append(writer, &caller.actor, "remark.give", &format!("remark {id}"), &detail).await?;
+    Ok(id)
+}
+
+/// Adds a remark, tells the learner what follows from it, and tells open pages.
+///
+/// # Errors
+/// As [`preference::hear`].
+pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<RemarkId, Error> {
+    let heard = preference::hear(writer, statement).await?;
+    let GivenJudgement { study, pair, said, attribution, .. } = statement;
+    let id = remarks::insert(writer, &remarks::NewRemark { study, pair, said, attribution, feedback: heard }).await?;
+    events::append(writer, study, "feedback_given", &json!({ "feedback_id": heard, "remark_id": id })).await?;
+    Ok(id)
+}
+
+/// Takes a remark back, and what the learner heard of it.
+///
+/// # Errors
+/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already
+/// or is of a subject who withdrew.
+pub async fn retract(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: Option<StudyId>,
+    id: RemarkId,
+    (author, reason): (Option<&str>, &str),
+) -> Result<Remark, Error> {
+    let remark = remarks::get(writer, id).await?;
+    if study.is_some_and(|study| study != remark.study_id) {
+        return Err(Error::NotFound { what: "remark".to_owned(), id: id.to_string() });
+    }
+    consents::may_be_shown(writer, remark.study_id).await?;
+    let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
+    let reason = printable::reason("reason", reason, ": why it is taken back")?;
+    if !remarks::retract(writer, id, author, reason).await? {
+        return Err(Error::conflict("this remark was taken back already"));
+    }
+    if let Some(heard) = remark.feedback_id {
+        let heard = feedback::get(writer, heard).await?;
+        feedback::retract(writer, &heard, author, reason).await?;
+    }
+    events::append(writer, remark.study_id, "feedback_retracted", &json!({ "remark_id": id })).await?;
+    let detail = json!({ "study": remark.study_id, "author": author, "reason": reason });
+    audit::append(writer, &caller.actor, "remark.retract", &format!("remark {id}"), &detail).await?;
+    Ok(remarks::get(writer, id).await?)
+}

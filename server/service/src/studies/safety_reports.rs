@@ -1,0 +1,154 @@
+//! What people said of gaits that is no preference, wherever they said it: gaits that must not be walked, and pairs of
+//! which somebody could not tell which is better.
+
+use crate::access::Reach;
+use crate::error::Error;
+use gaitwright_store::presentations::Judgement;
+use gaitwright_store::safety_reviews::{self, SafetyReview, SafetyVerdict};
+use gaitwright_store::studies::{self, Study};
+use gaitwright_store::{
+    Connection, Instant, PresentationId, RemarkId, StoreResult, StudyId, TrialId, lab_sessions, presentations, remarks,
+};
+use std::collections::HashSet;
+
+/// A gait that somebody called unsafe: nobody is asked about it, and it is not recommended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Closed {
+    /// The trial.
+    pub trial: TrialId,
+    /// Who said so, as shown.
+    pub by: String,
+    /// When.
+    pub at: Instant,
+    /// Where it was said.
+    pub said: SafetyReportSource,
+    /// What staff decided who looked at it.
+    pub review: Option<SafetyReview>,
+}
+
+/// Where somebody called a gait unsafe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SafetyReportSource {
+    /// A rater, comparing blindly.
+    Rater(PresentationId),
+    /// In a remark.
+    Staff(RemarkId),
+    /// The subject, in a lab session that is not unblinded.
+    Subject,
+}
+
+/// Studies that a caller reaches with gaits about which staff decided nothing since somebody called them unsafe, and how many gaits that are.
+///
+/// # Errors
+/// What the database reports.
+pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
+    let mut found = Vec::new();
+    for study in studies::with_safety_reports(db, reach, limit).await? {
+        let closed = SafetyReports::read(db, study.id).await?.closed.into_iter();
+        let waiting: HashSet<TrialId> = closed.filter(|c| c.review.is_none()).map(|c| c.trial).collect();
+        if !waiting.is_empty() {
+            found.push((study, waiting.len()));
+        }
+    }
+    Ok(found)
+}
+
+/// The safety reports of a study, and the pairs that nobody is asked about again.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SafetyReports {
+    /// Gaits that must not be walked.
+    pub closed: Vec<Closed>,
+    /// What closed a gait until staff let it be walked with again.
+    pub lifted: Vec<Closed>,
+    /// Pairs that are not asked about again.
+    pub skipped: Vec<(TrialId, TrialId)>,
+}
+
+impl SafetyReports {
+    /// Those that stand.
+    ///
+    /// # Errors
+    /// What the database reports.
+    pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
+        let mut found = Self::default();
+        for shown in presentations::remarks_of_study(db, study).await? {
+            if let Some((said, at)) = shown.answer.zip(shown.answered_at) {
+                let by = format!("rater {}", shown.rater);
+                let closed = |trial| Closed {
+                    trial,
+                    by: by.clone(),
+                    at,
+                    said: SafetyReportSource::Rater(shown.id),
+                    review: None,
+                };
+                found.hear(said, shown.pair(), closed);
+            }
+        }
+        for remark in remarks::of_study(db, study).await?.iter().filter(|remark| remark.retraction.is_none()) {
+            let (by, at, said) = (&remark.author, remark.created_at, SafetyReportSource::Staff(remark.id));
+            found.hear(remark.answer, remark.pair(), |trial| Closed { trial, by: by.clone(), at, said, review: None });
+        }
+        for session in lab_sessions::of_study(db, study).await? {
+            if session.done(lab_sessions::Act::Unblinded).is_some() {
+                // After unblinding its answers are remarks or preferences.
+                continue;
+            }
+            if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
+                // Naming one of the two would reveal the order: both are closed until unblinding.
+                let by = format!("the subject in lab session {}, of one of its two gaits or both", session.number);
+                let (at, said) = (answer.at, SafetyReportSource::Subject);
+                let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
+                found.closed.extend([session.gait_one, session.gait_two].map(closed));
+            }
+        }
+        found.review(&safety_reviews::of_study(db, study).await?);
+        Ok(found)
+    }
+
+    /// What was said before staff let a gait be walked with again closes it no more.
+    fn review(&mut self, reviews: &[SafetyReview]) {
+        for mut closed in std::mem::take(&mut self.closed) {
+            let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && closed.at <= review.said_until;
+            closed.review = reviews.iter().rfind(of_it).cloned();
+            let lifted = closed.review.as_ref().is_some_and(|review| review.verdict == SafetyVerdict::Walkable);
+            if lifted { self.lifted.push(closed) } else { self.closed.push(closed) }
+        }
+    }
+
+    fn hear(&mut self, said: Judgement, pair: (TrialId, TrialId), closed: impl Fn(TrialId) -> Closed) {
+        if said == Judgement::CannotTell {
+            self.skipped.push(pair);
+        }
+        self.closed.extend(said.unsafe_of(pair).into_iter().map(closed));
+    }
+
+    /// What closes the gait of this trial.
+    pub fn closing(mut self, trial: TrialId) -> Vec<Closed> {
+        self.closed.retain(|closed| closed.trial == trial);
+        self.closed
+    }
+
+    /// Whether somebody called the gait of this trial unsafe.
+    pub fn closes(&self, trial: TrialId) -> bool {
+        self.closed.iter().any(|closed| closed.trial == trial)
+    }
+
+    /// Whether somebody could not tell which of the two is better.
+    pub fn is_skipped(&self, (a, b): (TrialId, TrialId)) -> bool {
+        self.skipped.iter().any(|pair| *pair == (a, b) || *pair == (b, a))
+    }
+
+    /// Refuses a gait that somebody called unsafe; `field` named it.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`].
+    pub fn refuse(&self, field: &str, trial: TrialId) -> Result<(), Error> {
+        match self.closed.iter().find(|closed| closed.trial == trial) {
+            None => Ok(()),
+            Some(closed) => {
+                let allowed = format!("a gait that nobody called unsafe; this one was, by {}", closed.by);
+                Err(Error::invalid(field, trial.to_string(), &allowed))
+            }
+        }
+    }
+}

@@ -1,0 +1,676 @@
+//! The scheduler: proposes, dispatches, records, for every study that goes on by itself.
+//!
+//! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
+//! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
+
+use super::belief::Beliefs;
+use super::certifier::Certifier;
+use super::explainer::Explainer;
+use super::explanation::Effort;
+use super::lifecycle::{self, Act};
+use super::next_step::{Step, next_step};
+use super::plans_under_way::Plans;
+use super::prefetch::{LikelyNext, PREPARED, Prefetches, Prepared};
+use super::record;
+use super::snapshot::StudySnapshot;
+use super::solve_input::{PackedInput, SolveInput};
+use crate::error::Error;
+use crate::supervise::{Task, Tasks};
+use crate::workers::{AfterSolves, Assignment, Attempt, Board, Dispatch, Finding, IN_PROCESS, News};
+use futures_util::future::BoxFuture;
+use gait_optimizer::SolveStatus;
+use gaitwright_compute::OnPool;
+use gaitwright_store::jobs::Lease;
+use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
+use gaitwright_store::trials::{NewTrial, TrialState};
+use gaitwright_store::{Store, StoreError, StudyId, TrialId, commit, events, gaits, jobs, now, studies, trials};
+use serde_json::json;
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::{Mutex, Notify, OnceCell, watch};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+/// Signs of life come with every iteration; so many of them are written down during a lease.
+const HEARTBEATS_PER_LEASE: u32 = 3;
+/// The plan is looked at this often even when nothing seems to happen.
+const IDLE: Duration = Duration::from_secs(5);
+/// Changes within this time lead to one plan.
+const TOGETHER: Duration = Duration::from_millis(10);
+
+/// Runs the studies of a record.
+#[derive(Debug, Clone)]
+pub struct Scheduler(Arc<Inner>);
+
+struct Inner {
+    store: Store,
+    /// The record with a pool of its own: a job does not wait for the posterior of another study.
+    unpacking: Store,
+    engine: Arc<dyn Dispatch>,
+    /// How far the running solves are.
+    board: Arc<Board>,
+    /// Solves that are run before anybody asked for them.
+    prefetches: Prefetches,
+    /// Where the studies stand that wait for an answer, as of the last plan: what may be prefetched.
+    waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
+    /// What certifies the best gaits of studies that ended, and what explains their trials without a gait.
+    after_solves: Option<(Certifier, Explainer)>,
+    beliefs: Arc<Beliefs>,
+    /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
+    /// where no job of a trial is.
+    hand_over: Mutex<()>,
+    /// With `Some`, the only study that is looked at.
+    only: Option<StudyId>,
+    /// Something changed: plan again.
+    wake: Notify,
+    /// Counts what was written, for listeners that then read the events.
+    pulse: watch::Sender<u64>,
+    shutdown: CancellationToken,
+    tasks: TaskTracker,
+    /// How the tasks of this scheduler are.
+    health: Tasks,
+    leases_taken_back: OnceCell<()>,
+}
+
+impl fmt::Debug for Inner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scheduler")
+            .field("engine", &self.engine.name())
+            .field("only", &self.only)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Scheduler {
+    /// A scheduler over a record; [`Self::run`] sets it to work. Without `after_solves`, a gait is certified when somebody asks,
+    /// and nothing is explained.
+    pub fn new(
+        store: &Store,
+        engine: Arc<dyn Dispatch>,
+        only: Option<StudyId>,
+        after_solves: Option<AfterSolves>,
+    ) -> Self {
+        // What requests compute never holds up the planning.
+        let store = store.with_own_pool();
+        let beliefs = Arc::<Beliefs>::default();
+        let over_record = |AfterSolves { certify, explain }| {
+            (Certifier::new(store.clone(), certify, Arc::clone(&beliefs)), Explainer::new(store.clone(), explain))
+        };
+        Self(Arc::new(Inner {
+            after_solves: after_solves.map(over_record),
+            unpacking: store.with_own_pool(),
+            store,
+            beliefs,
+            engine,
+            board: Arc::default(),
+            prefetches: Prefetches::default(),
+            waiting: watch::channel(Arc::default()).0,
+            hand_over: Mutex::default(),
+            only,
+            wake: Notify::new(),
+            pulse: watch::channel(0).0,
+            shutdown: CancellationToken::new(),
+            tasks: TaskTracker::new(),
+            health: Tasks::default(),
+            leases_taken_back: OnceCell::new(),
+        }))
+    }
+
+    /// The record.
+    pub fn store(&self) -> &Store {
+        &self.0.store
+    }
+
+    /// How far the running solves are.
+    pub fn board(&self) -> &Arc<Board> {
+        &self.0.board
+    }
+
+    /// What the learner believes of the studies that were asked about last.
+    pub fn beliefs(&self) -> &Arc<Beliefs> {
+        &self.0.beliefs
+    }
+
+    /// How many solves can run at the same time.
+    pub fn workers(&self) -> usize {
+        self.0.engine.size()
+    }
+
+    /// Changes whenever something was recorded.
+    pub fn pulse(&self) -> watch::Receiver<u64> {
+        self.0.pulse.subscribe()
+    }
+
+    /// Ends when the scheduler is told to stop: for streams that would otherwise go on for ever.
+    pub fn stopping(&self) -> CancellationToken {
+        self.0.shutdown.clone()
+    }
+
+    /// Says that the record changed: plans are made anew and listeners told.
+    pub fn changed(&self) {
+        self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
+        self.0.wake.notify_one();
+    }
+
+    /// Asks for the best gaits of a study to be certified, where the record has no certificate of `next`. `false`: that is done
+    /// only when somebody asks for one gait.
+    pub fn certify_best_of(&self, study: StudyId, next: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.ask(study, next))
+    }
+
+    /// Asks for the gait of one trial to be certified. `false`: this process certifies none.
+    pub fn certify(&self, trial: TrialId) -> bool {
+        self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
+    }
+
+    /// Whether a gait of a study is being certified, or waits for that.
+    pub fn is_certifying(&self, study: StudyId, gait: TrialId) -> bool {
+        self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.is_at(study, gait))
+    }
+
+    /// What this process does about the explanation of a trial.
+    pub fn explaining(&self, trial: TrialId) -> Effort {
+        self.0.after_solves.as_ref().map_or(Effort::None, |(_, explainer)| explainer.effort(trial))
+    }
+
+    /// Asks the solve of a trial to stop within one iteration.
+    pub async fn cancel_solve(&self, trial: TrialId) {
+        self.0.engine.withdraw(self.0.prefetches.name_of(trial)).await;
+        self.0.board.close(trial);
+    }
+
+    /// Keeps another task of the service running until the scheduler is told to stop; [`Self::trouble`] speaks of it too.
+    pub async fn keep<F>(&self, name: &'static str, begin: impl Fn(Task) -> F)
+    where
+        F: Future<Output = Result<(), Error>> + Send + 'static,
+    {
+        self.0.health.keep(name, &self.0.shutdown, begin).await;
+    }
+
+    /// Tells the scheduler to stop; [`Self::run`] returns soon after.
+    pub fn stop(&self) {
+        self.0.shutdown.cancel();
+    }
+
+    /// Works until told to stop. Solves that run in this process then are given back to the queue.
+    ///
+    /// # Errors
+    /// What the database reports at the end; a task that fails before is begun again, and [`Self::trouble`] says so.
+    pub async fn run(&self) -> Result<(), Error> {
+        let keep = |name, begin: fn(Self, Task) -> BoxFuture<'static, Result<(), Error>>| {
+            let scheduler = self.clone();
+            async move {
+                let begin = |task| begin(scheduler.clone(), task);
+                scheduler.0.health.keep(name, &scheduler.0.shutdown, begin).await;
+            }
+        };
+        tokio::join!(
+            keep("planning", |scheduler, task| Box::pin(async move { scheduler.keep_planning(&task).await })),
+            keep("listening to workers", |scheduler, task| Box::pin(
+                async move { scheduler.keep_listening(&task).await }
+            )),
+            keep("preparing what comes next", |scheduler, task| {
+                Box::pin(async move { scheduler.keep_prefetching(&task).await })
+            }),
+            keep("certifying gaits", |scheduler, task| Box::pin(async move { scheduler.keep_certifying(&task).await })),
+            keep("explaining trials", |scheduler, task| Box::pin(
+                async move { scheduler.keep_explaining(&task).await }
+            )),
+        );
+        self.0.tasks.close();
+        self.0.tasks.wait().await;
+        self.withdraw(self.0.prefetches.forget_running()).await;
+        self.take_back_leases().await
+    }
+
+    /// Why studies do not go on as they should, in words; none: they do.
+    pub fn trouble(&self) -> Option<String> {
+        self.0.health.trouble().or_else(|| self.0.engine.trouble())
+    }
+
+    /// Certifies what solves gave, for ever.
+    async fn keep_certifying(&self, task: &Task) -> Result<(), Error> {
+        let Some((certifier, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        certifier.run(self.pulse(), || self.changed(), |study| explainer.take_up(study)).await;
+        Ok(())
+    }
+
+    /// Explains what solves did not give, for ever.
+    async fn keep_explaining(&self, task: &Task) -> Result<(), Error> {
+        let Some((_, explainer)) = &self.0.after_solves else { return std::future::pending().await };
+        task.works();
+        explainer.run(self.pulse(), || self.changed()).await;
+        Ok(())
+    }
+
+    async fn keep_planning(&self, task: &Task) -> Result<(), Error> {
+        // Once: what is leased after that runs.
+        self.0.leases_taken_back.get_or_try_init(|| self.take_back_leases()).await?;
+        let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
+        let mut plans = Plans::default();
+        // Since when there may be something to hand out.
+        let mut since = None;
+        loop {
+            self.look_after_leases().await?;
+            self.begin_plans(&mut plans).await?;
+            since.get_or_insert_with(Instant::now);
+            task.works();
+            let looked = tokio::time::sleep(pause);
+            tokio::pin!(looked);
+            loop {
+                let hand_out_at = since.map(|since| plans.hand_out_at(since));
+                tokio::select! {
+                    Some((study, snapshot)) = plans.next() => {
+                        let again = plans.ended(study, snapshot?);
+                        self.0.waiting.send_replace(plans.waiting());
+                        since.get_or_insert_with(Instant::now);
+                        if again {
+                            break;
+                        }
+                    }
+                    () = tokio::time::sleep_until(hand_out_at.unwrap_or_else(Instant::now).into()), if since.is_some() => {
+                        self.dispatch().await?;
+                        since = None;
+                    }
+                    // Nothing new for so long, or something new; what comes close together is planned with once.
+                    () = &mut looked => break,
+                    () = self.0.wake.notified() => {
+                        tokio::time::sleep(TOGETHER).await;
+                        break;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Jobs that ended with the process that ran them go back to the queue, uncounted.
+    async fn take_back_leases(&self) -> Result<(), Error> {
+        let engine = self.0.engine.outlives_process().then_some(IN_PROCESS);
+        let mut reader = self.0.store.read().await?;
+        let left = jobs::leased(&mut reader, engine).await?;
+        drop(reader);
+        for lease in left {
+            self.give_back(&lease).await?;
+        }
+        Ok(())
+    }
+
+    async fn look_after_leases(&self) -> Result<(), Error> {
+        let mut reader = self.0.store.read().await?;
+        let expired = jobs::expired(&mut reader, now()).await?;
+        let held_up = jobs::held_up(&mut reader).await?;
+        drop(reader);
+        for lease in expired {
+            self.look_after(&lease).await?;
+        }
+        for lease in held_up {
+            self.give_back(&lease).await?;
+        }
+        Ok(())
+    }
+
+    /// Begins a plan of each active study. Each is made apart: what is computed for a large study holds up no other.
+    async fn begin_plans(&self, plans: &mut Plans) -> Result<(), Error> {
+        let active = studies::active(&mut *self.0.store.read().await?).await?;
+        self.withdraw(self.0.prefetches.forget(|id| active.iter().any(|study| study.id == id))).await;
+        plans.keep(|id| active.iter().any(|study| study.id == id));
+        for study in active.into_iter().filter(|study| self.0.only.is_none_or(|only| only == study.id)) {
+            let scheduler = self.clone();
+            plans.begin(study.id, async move {
+                match scheduler.plan(study.clone()).await {
+                    Err(error) if error.is_of_machine() => Err(error),
+                    // It would fail again: somebody has to see it.
+                    Err(error) => scheduler.hold(&study, &error).await.map(|()| None),
+                    snapshot => snapshot,
+                }
+            });
+        }
+        Ok(())
+    }
+
+    /// Takes a job back from the engine, uncounted.
+    async fn give_back(&self, lease: &Lease) -> Result<(), Error> {
+        self.cancel_solve(lease.trial).await;
+        record::interrupted(&self.0.store, lease).await.map(drop)
+    }
+
+    /// A lease ran out. What no worker took yet is handed over once more, in case the engine forgot it; what a worker
+    /// took and is silent about is taken from it.
+    async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
+        let state = trials::get(&mut *self.0.store.read().await?, lease.trial).await?.state;
+        if state == TrialState::Queued {
+            self.live_on(lease).await?;
+            return self.submit(lease).await;
+        }
+        self.cancel_solve(lease.trial).await;
+        record::silent(&self.0.store, lease).await?;
+        Ok(())
+    }
+
+    /// Proposes trials until the study has as many open ones as it may, or moves it to another state. Gives where it
+    /// stands when it waits for an answer.
+    async fn plan(&self, mut study: Study) -> Result<Option<StudySnapshot>, Error> {
+        let mut store = self.0.store.clone();
+        loop {
+            let mut reader = store.read().await?;
+            let snapshot = StudySnapshot::read(&mut reader, study.clone()).await?;
+            drop(reader);
+            self.certify_for_people(&snapshot);
+            let beliefs = Arc::clone(&self.0.beliefs);
+            let decide = move |pool: &OnPool| {
+                let step = next_step(pool, &snapshot, &beliefs);
+                (snapshot, step)
+            };
+            let (snapshot, step) = store.compute(decide).await?;
+            match step? {
+                Step::Nothing => return Ok(Some(snapshot).filter(|s| s.study.state == StudyState::Waiting)),
+                Step::Act(act, reason) => match self.act(&snapshot.study, act, &reason).await? {
+                    Some(changed) => study = changed,
+                    None => return Ok(None),
+                },
+                Step::Try(new) => {
+                    if !self.propose(&snapshot, &new).await? {
+                        return Ok(None);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Has the gaits certified that people will be asked about: nobody is asked before.
+    fn certify_for_people(&self, snapshot: &StudySnapshot) {
+        if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+            for trial in snapshot.trials.iter().filter(|trial| snapshot.waits_for_certificate(trial)) {
+                self.certify(trial.id);
+            }
+        }
+    }
+
+    /// Pauses a study that cannot be planned, with the reason.
+    async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
+        tracing::error!(study = %study.id, %error, "cannot plan a study; it is paused");
+        self.act(study, Act::Pause, &format!("it cannot be planned: {error}")).await.map(drop)
+    }
+
+    async fn act(&self, study: &Study, act: Act, reason: &str) -> Result<Option<Study>, Error> {
+        let state = lifecycle::after(study.state, act)?;
+        let mut writer = self.0.store.write().await?;
+        if !studies::set_state(&mut writer, study, state, reason).await? {
+            return Ok(None);
+        }
+        let payload = json!({ "state": state, "reason": reason });
+        events::append(&mut writer, study.id, "study_changed", &payload).await?;
+        let changed = studies::get(&mut writer, study.id).await?;
+        commit(writer).await?;
+        self.changed();
+        Ok(Some(changed).filter(|s| matches!(s.state, StudyState::Running | StudyState::Waiting)))
+    }
+
+    /// Writes trial and job in one transaction, if the record is still what the choice was made from.
+    async fn propose(&self, snapshot: &StudySnapshot, new: &NewTrial) -> Result<bool, Error> {
+        let study = snapshot.study.id;
+        let mut writer = self.0.store.write().await?;
+        if let Err(shortage) = writer.room() {
+            tracing::warn!(%study, %shortage, "no trial is planned");
+            return Ok(false);
+        }
+        let current = studies::get(&mut writer, study).await?;
+        if current.state != StudyState::Running || !snapshot.is_current(&mut writer).await? {
+            self.0.wake.notify_one();
+            return Ok(false);
+        }
+        let trial = trials::insert(&mut writer, study, new).await?;
+        jobs::insert(&mut writer, trial).await?;
+        let payload = json!({ "trial_id": trial, "number": new.number, "state": TrialState::Queued });
+        events::append(&mut writer, study, "trial_queued", &payload).await?;
+        commit(writer).await?;
+        self.changed();
+        Ok(true)
+    }
+
+    /// Hands jobs to the engine as long as it takes some.
+    async fn dispatch(&self) -> Result<(), Error> {
+        while let Some(lease) = self.lease().await? {
+            self.submit(&lease).await?;
+        }
+        Ok(())
+    }
+
+    async fn lease(&self) -> Result<Option<Lease>, Error> {
+        let engine = &self.0.engine;
+        // Asked with every change: the only writer is left to those who write.
+        let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        if queued == 0 || leased as usize >= engine.size() {
+            return Ok(None);
+        }
+        let mut writer = self.0.store.write().await?;
+        let until = now().after(engine.lease());
+        let Some(lease) = jobs::lease(&mut writer, engine.name(), until, self.0.only, engine.size()).await? else {
+            return Ok(None);
+        };
+        commit(writer).await?;
+        Ok(Some(lease))
+    }
+
+    async fn submit(&self, lease: &Lease) -> Result<(), Error> {
+        let assignment = match assignment(&mut self.0.unpacking.clone(), lease).await {
+            Ok(assignment) => assignment,
+            Err(error) => {
+                record::broke(&self.0.store, lease, &error.to_string()).await?;
+                return Ok(());
+            }
+        };
+        let attempt = assignment.attempt;
+        let hand_over = self.0.hand_over.lock().await;
+        match self.0.prefetches.claim(&assignment) {
+            Prepared::Nothing => {}
+            Prepared::Running => return self.started(attempt, PREPARED).await,
+            Prepared::Done(finding) => {
+                drop(hand_over);
+                self.started(attempt, PREPARED).await?;
+                self.ended(attempt, PREPARED, finding).await?;
+                self.changed();
+                return Ok(());
+            }
+        }
+        if self.busy().await? > self.0.engine.size() {
+            self.withdraw(self.0.prefetches.forget_running()).await;
+        }
+        if let Err(error) = self.0.engine.submit(assignment).await {
+            // The lease runs out, and the job is handed over again.
+            tracing::error!(trial = %lease.trial, %error, "a job was not taken");
+        }
+        Ok(())
+    }
+
+    /// How many solves are out, also those that nobody asked for.
+    async fn busy(&self) -> Result<usize, Error> {
+        let (_, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        Ok(leased as usize + self.0.prefetches.running())
+    }
+
+    /// Runs what studies will need next, whatever the answers that they wait for, where no worker is needed for others.
+    async fn keep_prefetching(&self, task: &Task) -> Result<(), Error> {
+        task.works();
+        let mut waiting = self.0.waiting.subscribe();
+        let mut likely = LikelyNext::default();
+        // The sender lives as long as this scheduler.
+        while waiting.changed().await.is_ok() {
+            let snapshots = Arc::clone(&waiting.borrow_and_update());
+            likely.keep(|study| snapshots.iter().any(|snapshot| snapshot.study.id == study));
+            for snapshot in snapshots.iter() {
+                if let Err(error) = self.prefetch(&mut likely, snapshot).await {
+                    tracing::warn!(study = %snapshot.study.id, %error, "what comes next cannot be prepared");
+                }
+            }
+        }
+        Ok(())
+    }
+
+    async fn prefetch(&self, likely: &mut LikelyNext, snapshot: &StudySnapshot) -> Result<(), Error> {
+        let study = &snapshot.study;
+        if !likely.knows(snapshot) {
+            self.withdraw(self.0.prefetches.forget(|other| other != study.id)).await;
+        }
+        let mut store = self.0.store.clone();
+        let mut unpacking = self.0.unpacking.clone();
+        for new in likely.of(&mut store, snapshot).await? {
+            if self.busy().await? >= self.0.engine.size() {
+                return Ok(());
+            }
+            // No trial has this name: what comes of it is kept here until one asks.
+            let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
+            let mut reader = unpacking.read().await?;
+            let input = PackedInput::of(&mut reader, &study.plan, new.action, new.warm_started_from).await?;
+            drop(reader);
+            let input = unpacking.compute(move |pool| input.unpack(pool)).await??;
+            let assignment = assigned(attempt, new.number, input);
+            let _hand_over = self.0.hand_over.lock().await;
+            if self.busy().await? < self.0.engine.size()
+                && self.0.prefetches.begin(study.id, &assignment)
+                && let Err(error) = self.0.engine.submit(assignment).await
+            {
+                self.withdraw(self.0.prefetches.forget_running()).await;
+                return Err(error.into());
+            }
+        }
+        Ok(())
+    }
+
+    async fn withdraw(&self, names: Vec<TrialId>) {
+        for name in names {
+            self.0.engine.withdraw(name).await;
+        }
+    }
+
+    /// Hears what comes of the jobs.
+    async fn keep_listening(&self, task: &Task) -> Result<(), Error> {
+        task.works();
+        let mut written: HashMap<TrialId, Instant> = HashMap::new();
+        loop {
+            let news = match self.0.prefetches.hear(self.0.engine.next().await) {
+                Ok(news) => news,
+                Err(receipt) => {
+                    receipt.sign().await;
+                    self.0.wake.notify_one();
+                    continue;
+                }
+            };
+            let heard = match news {
+                News::Started { attempt, worker } => {
+                    written.insert(attempt.trial, Instant::now());
+                    self.started(attempt, &worker).await
+                }
+                News::Iterated { attempt, record } => {
+                    self.0.board.add(attempt.trial, record);
+                    let last = written.entry(attempt.trial).or_insert_with(Instant::now);
+                    if last.elapsed() < self.0.engine.lease() / HEARTBEATS_PER_LEASE {
+                        continue;
+                    }
+                    *last = Instant::now();
+                    self.heartbeat(attempt).await
+                }
+                News::Ended { attempt, worker, finding, receipt } => {
+                    written.remove(&attempt.trial);
+                    let scheduler = self.clone();
+                    self.0.tasks.spawn(async move {
+                        match scheduler.ended(attempt, &worker, finding).await {
+                            Ok(()) => receipt.sign().await,
+                            // Not signed for: it comes again, or the lease runs out.
+                            Err(error) => tracing::error!(trial = %attempt.trial, %error, "cannot record a trial"),
+                        }
+                        scheduler.changed();
+                    });
+                    Ok(())
+                }
+            };
+            heard?;
+        }
+    }
+
+    /// A worker took a job.
+    async fn started(&self, attempt: Attempt, worker: &str) -> Result<(), Error> {
+        let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
+        let mut writer = self.0.store.write().await?;
+        if !jobs::heartbeat(&mut writer, &lease, now().after(self.0.engine.lease())).await? {
+            drop(writer);
+            self.cancel_solve(attempt.trial).await;
+            return Ok(());
+        }
+        trials::start(&mut writer, lease.trial).await?;
+        let trial = trials::get(&mut writer, lease.trial).await?;
+        let payload = json!({ "trial_id": trial.id, "number": trial.number, "state": trial.state, "worker": worker });
+        events::append(&mut writer, lease.study, "trial_started", &payload).await?;
+        commit(writer).await?;
+        self.0.board.open(trial.id, lease.study, trial.number);
+        self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
+        Ok(())
+    }
+
+    /// The lease of an attempt. `None`: the record has no such trial; what was prefetched in vain speaks of one.
+    async fn lease_of(&self, attempt: Attempt) -> Result<Option<Lease>, Error> {
+        match jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await {
+            Err(StoreError::Missing { .. }) => {
+                tracing::debug!(trial = %attempt.trial, "news of a solve that nobody waits for");
+                Ok(None)
+            }
+            found => Ok(Some(found?)),
+        }
+    }
+
+    async fn heartbeat(&self, attempt: Attempt) -> Result<(), Error> {
+        let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
+        if !self.live_on(&lease).await? {
+            self.cancel_solve(attempt.trial).await;
+        }
+        Ok(())
+    }
+
+    /// Keeps a lease alive. `false`: it is another attempt's by now.
+    async fn live_on(&self, lease: &Lease) -> Result<bool, Error> {
+        let mut writer = self.0.store.write().await?;
+        let ours = jobs::heartbeat(&mut writer, lease, now().after(self.0.engine.lease())).await?;
+        commit(writer).await?;
+        Ok(ours)
+    }
+
+    /// Records what came of an attempt.
+    async fn ended(&self, attempt: Attempt, worker: &str, finding: Finding) -> Result<(), Error> {
+        self.0.board.close(attempt.trial);
+        let mut store = self.0.store.clone();
+        let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
+        let (outcome, iterations) = match finding {
+            Finding::Ended { outcome, iterations } => (outcome, iterations),
+            Finding::Broke(reason) => return record::broke(&store, &lease, &reason).await.map(drop),
+        };
+        let pack = move |pool: &OnPool| {
+            let packed = gaits::PackedGait::new(pool, &outcome, &iterations);
+            (outcome, packed)
+        };
+        let (outcome, packed) = store.compute(pack).await?;
+        let packed = packed?;
+        if packed.is_none() && outcome.report.status == SolveStatus::Converged {
+            let reason = "the solver called a gait converged that holds numbers that are not finite";
+            return record::broke(&store, &lease, reason).await.map(drop);
+        }
+        record::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
+    }
+}
+
+/// The solve of a leased job.
+async fn assignment(store: &mut Store, lease: &Lease) -> Result<Assignment, Error> {
+    let mut reader = store.read().await?;
+    let number = trials::get(&mut reader, lease.trial).await?.number;
+    let input = PackedInput::of_trial(&mut reader, lease.trial).await?;
+    drop(reader);
+    let input = store.compute(move |pool| input.unpack(pool)).await??;
+    Ok(assigned(Attempt { trial: lease.trial, number: lease.attempt }, number, input))
+}
+
+fn assigned(attempt: Attempt, number: u32, input: SolveInput) -> Assignment {
+    let SolveInput { problem, options, warm_start } = input;
+    Assignment { attempt, number, problem, warm_start, options }
+}

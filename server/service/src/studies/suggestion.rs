@@ -1,0 +1,77 @@
+//! Coactive feedback: "with these bounds it would have been better than in that trial".
+
+use super::answer::{attribution, comparable};
+use super::preference;
+use crate::access::Caller;
+use crate::error::Error;
+use gait_learner::ActionIndex;
+use gaitwright_store::feedback::Source;
+use gaitwright_store::studies::Study;
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{FeedbackId, StudyId, TrialId, Writer, audit, events, studies};
+use serde::Deserialize;
+use serde_json::json;
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// A suggestion.
+#[derive(Debug, Clone, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Suggestion {
+    /// The trial that would have been better.
+    pub over: TrialId,
+    /// With these values of tuned bounds (`{"a5": 0.026}`), each a level of the search space; the others as they were.
+    pub bounds: BTreeMap<String, f64>,
+    /// Who says so: `subject`, `clinician` or `script`.
+    /// By default what the caller is.
+    #[serde(default)]
+    pub source: Option<Source>,
+    /// Name or pseudonym of who says so; by default the name of the caller.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 80)]
+    pub author: Option<String>,
+    /// Free text.
+    #[serde(default)]
+    #[schema(max_length = 2000)]
+    pub note: String,
+}
+
+/// Writes a suggestion.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
+pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Suggestion) -> Result<FeedbackId, Error> {
+    let study = studies::get(writer, study).await?;
+    let trial = comparable(writer, study.id, "over", new.over).await?;
+    let suggested = action(&study, &trial, &new.bounds)?;
+    let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
+    let id = preference::suggest(writer, &trial, suggested, attribution).await?;
+    events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
+    let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": attribution.author });
+    audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;
+    Ok(id)
+}
+
+/// The action of the trial with these bounds in place of its own.
+fn action(study: &Study, trial: &Trial, bounds: &BTreeMap<String, f64>) -> Result<ActionIndex, Error> {
+    let space = &study.plan.search_space;
+    let dimensions = space.dimensions();
+    if let Some(unknown) = bounds.keys().find(|name| !dimensions.iter().any(|dimension| dimension.name == **name)) {
+        let names: Vec<&str> = dimensions.iter().map(|dimension| dimension.name.as_str()).collect();
+        return Err(Error::invalid("bounds", unknown.as_str(), &names.join(", ")));
+    }
+    let mut levels = space.levels(trial.action_index);
+    for (level, dimension) in levels.iter_mut().zip(dimensions) {
+        let Some(&value) = bounds.get(&dimension.name) else { continue };
+        let place = dimension.values.iter().position(|known| known.to_bits() == value.to_bits());
+        *level = place.ok_or_else(|| {
+            let known: Vec<String> = dimension.values.iter().map(f64::to_string).collect();
+            Error::invalid(&format!("bounds.{}", dimension.name), value, &known.join(", "))
+        })?;
+    }
+    let suggested = space.index_of_levels(&levels).map_err(Error::Learner)?;
+    if suggested == trial.action_index {
+        return Err(Error::invalid("bounds", json!(bounds), "others than those of the trial"));
+    }
+    Ok(suggested)
+}

@@ -1,0 +1,194 @@
+//! The engine of one machine: one named thread per running solve.
+
+use super::dispatch::{Dispatch, DispatchError, Finding, News, Receipt};
+use super::{Assignment, Evaluate};
+use futures_util::future::BoxFuture;
+use gait_optimizer::CancelToken;
+use gaitwright_compute::priority::{SOLVER, STACK_BYTES, stand_back};
+use gaitwright_store::TrialId;
+use std::any::Any;
+use std::collections::HashMap;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use tokio::sync::mpsc::{self, UnboundedReceiver, UnboundedSender};
+
+/// Its name in the record.
+pub const IN_PROCESS: &str = "in-process";
+/// Longer than any iteration takes, on any machine that is worth waiting for.
+pub const LEASE: Duration = Duration::from_mins(1);
+
+type Running = Arc<Mutex<HashMap<TrialId, (u32, CancelToken)>>>;
+
+/// Threads that solve.
+pub struct InProcess {
+    evaluate: Arc<dyn Evaluate>,
+    size: usize,
+    lease: Duration,
+    stands_back: bool,
+    running: Running,
+    news: UnboundedSender<News>,
+    heard: tokio::sync::Mutex<UnboundedReceiver<News>>,
+}
+
+impl InProcess {
+    /// At most `size` solves at the same time (at least one).
+    pub fn new(size: usize, evaluate: Arc<dyn Evaluate>) -> Self {
+        let (news, heard) = mpsc::unbounded_channel();
+        Self {
+            evaluate,
+            size: size.max(1),
+            lease: LEASE,
+            stands_back: false,
+            running: Running::default(),
+            news,
+            heard: tokio::sync::Mutex::new(heard),
+        }
+    }
+
+    /// Solves give way to whoever waits for an answer of this process.
+    #[must_use]
+    pub fn standing_back(mut self) -> Self {
+        self.stands_back = true;
+        self
+    }
+
+    /// A solve without an iteration for so long is taken for lost.
+    #[must_use]
+    pub fn with_lease(mut self, lease: Duration) -> Self {
+        self.lease = lease;
+        self
+    }
+
+    /// Begins a solve on a thread of its own, unless this attempt runs already.
+    fn begin(&self, assignment: Assignment) -> Result<(), DispatchError> {
+        let attempt = assignment.attempt;
+        let cancel = CancelToken::new();
+        {
+            let mut running = self.running();
+            if running.get(&attempt.trial).is_some_and(|(number, _)| *number == attempt.number) {
+                return Ok(());
+            }
+            if let Some((_, superseded)) = running.insert(attempt.trial, (attempt.number, cancel.clone())) {
+                superseded.cancel();
+            }
+        }
+        let (evaluate, news, stands_back) = (Arc::clone(&self.evaluate), self.news.clone(), self.stands_back);
+        let running = Arc::clone(&self.running);
+        let work = move || {
+            if stands_back {
+                stand_back(SOLVER);
+            }
+            // Nobody listens any more when the process is shutting down.
+            let _ = news.send(News::Started { attempt, worker: IN_PROCESS.to_owned() });
+            let finding = solve(evaluate.as_ref(), &assignment, &news, &cancel);
+            let mut running = lock(&running);
+            if running.get(&attempt.trial).is_some_and(|(number, _)| *number == attempt.number) {
+                running.remove(&attempt.trial);
+            }
+            drop(running);
+            let (worker, receipt) = (IN_PROCESS.to_owned(), Receipt::not_needed());
+            let _ = news.send(News::Ended { attempt, worker, finding, receipt });
+        };
+        let thread = std::thread::Builder::new().name("solver".to_owned()).stack_size(STACK_BYTES).spawn(work);
+        thread.map(drop).map_err(|error| {
+            self.running().remove(&attempt.trial);
+            DispatchError::Unreachable(format!("no thread for a solve: {error}"))
+        })
+    }
+
+    fn running(&self) -> MutexGuard<'_, HashMap<TrialId, (u32, CancelToken)>> {
+        lock(&self.running)
+    }
+}
+
+impl Dispatch for InProcess {
+    fn name(&self) -> &'static str {
+        IN_PROCESS
+    }
+
+    fn size(&self) -> usize {
+        self.size
+    }
+
+    fn lease(&self) -> Duration {
+        self.lease
+    }
+
+    fn outlives_process(&self) -> bool {
+        false
+    }
+
+    fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>> {
+        Box::pin(async move { self.begin(assignment) })
+    }
+
+    fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
+        Box::pin(async move {
+            // A thread that hangs keeps its place in memory, but nothing waits for it.
+            if let Some((_, cancel)) = self.running().remove(&trial) {
+                cancel.cancel();
+            }
+        })
+    }
+
+    fn next(&self) -> BoxFuture<'_, News> {
+        Box::pin(async move {
+            match self.heard.lock().await.recv().await {
+                Some(news) => news,
+                // Cannot be: this engine holds a sender itself.
+                None => std::future::pending().await,
+            }
+        })
+    }
+}
+
+impl Drop for InProcess {
+    fn drop(&mut self) {
+        for (_, cancel) in self.running().values() {
+            cancel.cancel();
+        }
+    }
+}
+
+impl fmt::Debug for InProcess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("InProcess").field("size", &self.size).finish_non_exhaustive()
+    }
+}
+
+fn solve(
+    evaluate: &dyn Evaluate,
+    assignment: &Assignment,
+    news: &UnboundedSender<News>,
+    cancel: &CancelToken,
+) -> Finding {
+    let attempt = assignment.attempt;
+    let mut iterations = Vec::new();
+    let found = catch_unwind(AssertUnwindSafe(|| {
+        let mut observer = |record: &gait_optimizer::IterationRecord| {
+            iterations.push(*record);
+            let _ = news.send(News::Iterated { attempt, record: *record });
+        };
+        evaluate.evaluate(assignment, &mut observer, cancel)
+    }));
+    match found {
+        Ok(Ok(outcome)) => Finding::Ended { outcome: Box::new(outcome), iterations },
+        Ok(Err(reason)) => Finding::Broke(reason),
+        Err(panic) => Finding::Broke(format!("the solver panicked: {}", words_of(panic.as_ref()))),
+    }
+}
+
+fn lock(running: &Running) -> MutexGuard<'_, HashMap<TrialId, (u32, CancelToken)>> {
+    // The map is whole between any two statements that hold the lock.
+    running.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn words_of(panic: &(dyn Any + Send)) -> String {
+    panic
+        .downcast_ref::<&str>()
+        .map(|text| (*text).to_owned())
+        .or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "no message".to_owned())
+}

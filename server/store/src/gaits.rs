@@ -1,0 +1,177 @@
+//! Gaits: the trajectory of a finished solve, kept as the optimiser wrote it.
+
+use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json, now};
+use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
+use gaitwright_compute::OnPool;
+use serde::de::DeserializeOwned;
+use sqlx::Row;
+
+/// A gait made ready to be written.
+#[derive(Debug)]
+pub struct PackedGait {
+    format_version: u32,
+    speed_m_s: Option<f64>,
+    stride_length_m: Option<f64>,
+    stride_time_s: Option<f64>,
+    gait: Vec<u8>,
+    warm_start: Vec<u8>,
+    iterations: Vec<u8>,
+    sha256: String,
+}
+
+impl PackedGait {
+    /// Serialises and compresses what a solve gave. `None` when it holds numbers that are not finite: the
+    /// last iterate of a diverging solve is nothing to show or to start from.
+    ///
+    /// # Errors
+    /// When serialising fails.
+    pub fn new(pool: &OnPool, outcome: &SolveOutcome, iterations: &[IterationRecord]) -> StoreResult<Option<Self>> {
+        let gait = json::to_text("gait", &outcome.gait)?;
+        let warm_start = json::to_text("warm start", &outcome.warm_start)?;
+        // JSON has no word for such numbers: they are written as null and cannot be read back.
+        if serde_json::from_str::<Gait>(&gait).is_err() || serde_json::from_str::<WarmStart>(&warm_start).is_err() {
+            return Ok(None);
+        }
+        let finite: Vec<&IterationRecord> = iterations.iter().filter(|record| is_finite(record)).collect();
+        Ok(Some(Self {
+            format_version: outcome.gait.format_version,
+            speed_m_s: Some(outcome.gait.speed_m_s),
+            stride_length_m: Some(outcome.gait.stride_length_m),
+            stride_time_s: Some(outcome.gait.stride_time_s),
+            sha256: json::sha256(gait.as_bytes()),
+            gait: json::compress(pool, "gait", gait.as_bytes())?,
+            warm_start: json::compress(pool, "warm start", warm_start.as_bytes())?,
+            iterations: json::compress(pool, "iterations", json::to_text("iterations", &finite)?.as_bytes())?,
+        }))
+    }
+}
+
+fn is_finite(record: &IterationRecord) -> bool {
+    [record.objective, record.constraint_violation, record.dual_infeasibility, record.barrier, record.step]
+        .iter()
+        .all(|x| x.is_finite())
+}
+
+/// Writes the gait of a trial.
+///
+/// # Errors
+/// A violated constraint when it has one already, or what the database reports.
+pub async fn insert(db: &mut Connection, trial: TrialId, packed: &PackedGait) -> StoreResult<()> {
+    sqlx::query(
+        "insert into gaits (trial_id, format_version, speed_m_s, stride_length_m, stride_time_s, gait, warm_start, \
+         iterations, gait_sha256, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(trial)
+    .bind(packed.format_version)
+    .bind(packed.speed_m_s)
+    .bind(packed.stride_length_m)
+    .bind(packed.stride_time_s)
+    .bind(&packed.gait[..])
+    .bind(&packed.warm_start[..])
+    .bind(&packed.iterations[..])
+    .bind(&packed.sha256)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// Whether the columns beside a gait say what is in it.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_described(db: &mut Connection, trial: TrialId, gait: &Gait) -> StoreResult<bool> {
+    let row = sqlx::query(
+        "select format_version = ? and speed_m_s is ? and stride_length_m is ? and stride_time_s is ? \
+         from gaits where trial_id = ?",
+    )
+    .bind(gait.format_version)
+    .bind(gait.speed_m_s)
+    .bind(gait.stride_length_m)
+    .bind(gait.stride_time_s)
+    .bind(trial)
+    .fetch_one(db)
+    .await?;
+    Ok(row.try_get(0)?)
+}
+
+/// Whether the gait of a trial, or the last iterate of a solve without one, is here: a script may have told figures alone, and trajectories are pruned.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
+    let row = sqlx::query("select exists(select 1 from gaits where trial_id = ?)").bind(trial).fetch_one(db).await?;
+    Ok(row.try_get(0)?)
+}
+
+/// The gait of a trial.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Gait>> {
+    let sql = "select gait, gait_sha256 from gaits where trial_id = ?";
+    let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?.ok_or_else(|| missing(trial))?;
+    Ok(Packed::new(PackedText::new("gait", row.try_get("gait")?, Some(row.try_get("gait_sha256")?))))
+}
+
+/// [`get`]; `None` when the trial has none.
+///
+/// # Errors
+/// What the database reports.
+pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Packed<Gait>>> {
+    match get(db, trial).await {
+        Ok(gait) => Ok(Some(gait)),
+        Err(StoreError::Missing { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// What another solve can start from.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<WarmStart>> {
+    column(db, trial, "warm start", "select warm_start from gaits where trial_id = ?").await
+}
+
+/// The iterations of the solve.
+///
+/// # Errors
+/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Vec<IterationRecord>>> {
+    column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await
+}
+
+/// Drops the gaits of a study but those of these trials, those that they started from, and those that people walk with in
+/// lab sessions: how many.
+///
+/// # Errors
+/// What the database reports.
+pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[TrialId]) -> StoreResult<u64> {
+    let done = sqlx::query(
+        "delete from gaits where trial_id in (select id from trials where study_id = ?1) \
+         and trial_id not in (select value from json_each(?2)) \
+         and trial_id not in (select warm_started_from from trials where warm_started_from is not null \
+                              and id in (select value from json_each(?2))) \
+         and trial_id not in (select gait_one from lab_sessions union select gait_two from lab_sessions)",
+    )
+    .bind(study)
+    .bind(json::to_text("trials", &kept)?)
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected())
+}
+
+async fn column<T: DeserializeOwned>(
+    db: &mut Connection,
+    trial: TrialId,
+    what: &'static str,
+    sql: &'static str,
+) -> StoreResult<Packed<T>> {
+    let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?.ok_or_else(|| missing(trial))?;
+    Ok(Packed::new(PackedText::new(what, row.try_get(0)?, None)))
+}
+
+fn missing(trial: TrialId) -> StoreError {
+    StoreError::Missing { what: "gait of trial", id: trial.to_string() }
+}

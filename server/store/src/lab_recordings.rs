@@ -1,0 +1,224 @@
+//! What was measured in the walks of a lab session, and what was made of it.
+
+use super::audit::Actor;
+use super::{
+    Connection, EmgResultId, Instant, LabRecordingId, LabSessionId, PackedText, StoreError, StoreResult, json, now,
+};
+use gaitwright_compute::OnPool;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// What a recording is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordingKind {
+    /// Muscle activity.
+    Electromyogram,
+    /// Joint angles.
+    Motion,
+}
+
+impl RecordingKind {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Electromyogram => "electromyogram",
+            Self::Motion => "motion",
+        }
+    }
+}
+
+impl FromStr for RecordingKind {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Electromyogram, Self::Motion]
+            .into_iter()
+            .find(|kind| kind.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "kind of a recording", reason: text.to_owned() })
+    }
+}
+
+/// A recording, without the file itself.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LabRecording {
+    /// Identifier.
+    pub id: LabRecordingId,
+    /// The session.
+    pub session_id: LabSessionId,
+    /// Of which walk: 1, 2, 3.
+    pub walk: u8,
+    /// What it is of.
+    pub kind: RecordingKind,
+    /// SHA-256 of the file.
+    pub raw_sha256: String,
+    /// Who brought it.
+    pub actor: String,
+    /// When.
+    pub created_at: Instant,
+}
+
+/// A file made ready to be written.
+#[derive(Debug)]
+pub struct PackedRecording {
+    kind: RecordingKind,
+    reading: String,
+    raw: Vec<u8>,
+    raw_sha256: String,
+}
+
+impl PackedRecording {
+    /// Compresses a file; `reading` says how it is to be read.
+    ///
+    /// # Errors
+    /// When serialising fails.
+    pub fn new<T: Serialize>(pool: &OnPool, kind: RecordingKind, reading: &T, file: &str) -> StoreResult<Self> {
+        Ok(Self {
+            kind,
+            reading: json::to_text("reading of a recording", reading)?,
+            raw: json::compress(pool, "recording", file.as_bytes())?,
+            raw_sha256: json::sha256(file.as_bytes()),
+        })
+    }
+
+    /// Whether it is the file of a recording of the same kind.
+    pub fn is_file_of(&self, recording: &LabRecording) -> bool {
+        (self.kind, &self.raw_sha256) == (recording.kind, &recording.raw_sha256)
+    }
+}
+
+/// Adds a recording.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn insert(
+    db: &mut Connection,
+    actor: &Actor,
+    session: LabSessionId,
+    walk: u8,
+    packed: &PackedRecording,
+) -> StoreResult<LabRecording> {
+    let added = LabRecording {
+        id: LabRecordingId::fresh(),
+        session_id: session,
+        walk,
+        kind: packed.kind,
+        raw_sha256: packed.raw_sha256.clone(),
+        actor: actor.as_str().to_owned(),
+        created_at: now(),
+    };
+    sqlx::query(
+        "insert into lab_recordings (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(added.id)
+    .bind(session)
+    .bind(walk)
+    .bind(packed.kind.as_str())
+    .bind(&packed.reading)
+    .bind(&packed.raw[..])
+    .bind(&packed.raw_sha256)
+    .bind(&added.actor)
+    .bind(added.created_at)
+    .execute(db)
+    .await?;
+    Ok(added)
+}
+
+/// All but the file itself.
+const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, created_at from lab_recordings";
+
+/// The recording with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: LabRecordingId) -> StoreResult<LabRecording> {
+    let sql = AssertSqlSafe(format!("{SELECT} where id = ?"));
+    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| missing(id))
+}
+
+/// Every recording of a session, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<LabRecording>> {
+    let sql = AssertSqlSafe(format!("{SELECT} where session_id = ? order by id"));
+    sqlx::query(sql).bind(session).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+fn missing(id: LabRecordingId) -> StoreError {
+    StoreError::Missing { what: "recording", id: id.to_string() }
+}
+
+/// The file of a recording, and how it is to be read.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) -> StoreResult<(T, PackedText)> {
+    let row = sqlx::query("select reading, raw, raw_sha256 from lab_recordings where id = ?")
+        .bind(id)
+        .fetch_optional(db)
+        .await?
+        .ok_or_else(|| missing(id))?;
+    let file = PackedText::new("recording", row.try_get("raw")?, Some(row.try_get("raw_sha256")?));
+    Ok((json::column(&row, "reading")?, file))
+}
+
+/// Adds what was made of a session's electromyograms.
+///
+/// # Errors
+/// When serialising fails, or what the database reports.
+pub async fn insert_result<T: Serialize>(
+    db: &mut Connection,
+    actor: &Actor,
+    session: LabSessionId,
+    document: &T,
+) -> StoreResult<EmgResultId> {
+    let id = EmgResultId::fresh();
+    sqlx::query("insert into emg_results (id, session_id, document, actor, created_at) values (?, ?, ?, ?, ?)")
+        .bind(id)
+        .bind(session)
+        .bind(json::to_text("electromyogram result", document)?)
+        .bind(actor.as_str())
+        .bind(now())
+        .execute(db)
+        .await?;
+    Ok(id)
+}
+
+/// What was made of a session's electromyograms last.
+///
+/// # Errors
+/// What the database reports.
+pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Option<T>> {
+    let row = sqlx::query("select document from emg_results where session_id = ? order by id desc limit 1")
+        .bind(session)
+        .fetch_optional(db)
+        .await?;
+    row.as_ref().map(|row| json::column(row, "document")).transpose()
+}
+
+/// Everything that was made of a session's electromyograms, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
+    let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
+    rows.fetch_all(db).await?.iter().map(|row| json::column(row, "document")).collect()
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<LabRecording> {
+    Ok(LabRecording {
+        id: row.try_get("id")?,
+        session_id: row.try_get("session_id")?,
+        walk: row.try_get("walk")?,
+        kind: row.try_get::<&str, _>("kind")?.parse()?,
+        raw_sha256: row.try_get("raw_sha256")?,
+        actor: row.try_get("actor")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

@@ -1,0 +1,235 @@
+//! Lab sessions: who walks with which two gaits, and what happened to them. The order of the gaits is an allocation
+//! (`super::allocations`).
+
+use super::allocations::{self, OfSession};
+use super::audit::Actor;
+use super::lab_answers::{self, LabAnswer};
+use super::members::{binds, reached};
+use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
+use crate::reach::Reach;
+use serde::Serialize;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// Something that happens to a session, once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Act {
+    /// A walk was recorded: 1, 2, 3.
+    Walk(u8),
+    /// Unblinded: somebody knows which walk was with which gait.
+    Unblinded,
+    /// Nothing is recorded any more.
+    Closed,
+}
+
+impl Act {
+    const ALL: [Self; 5] = [Self::Walk(1), Self::Walk(2), Self::Walk(3), Self::Unblinded, Self::Closed];
+
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Walk(1) => "walk_1",
+            Self::Walk(2) => "walk_2",
+            Self::Walk(_) => "walk_3",
+            Self::Unblinded => "unblinded",
+            Self::Closed => "closed",
+        }
+    }
+}
+
+impl FromStr for Act {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|act| act.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "act of a lab session", reason: text.to_owned() })
+    }
+}
+
+/// That it happened.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Done {
+    /// Why, or what was noted.
+    pub note: String,
+    /// Who did it.
+    pub actor: String,
+    /// When.
+    pub at: Instant,
+}
+
+/// A session of the record. What of it may be seen is decided in `studies::lab`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabSession {
+    /// Identifier.
+    pub id: LabSessionId,
+    /// The study.
+    pub study_id: StudyId,
+    /// 1, 2, ... of this study.
+    pub number: u32,
+    /// One of the two gaits.
+    pub gait_one: TrialId,
+    /// The other one.
+    pub gait_two: TrialId,
+    /// What may be known of the order of its gaits.
+    pub allocation: OfSession,
+    /// Free text.
+    pub notes: String,
+    /// Who planned it.
+    pub actor: String,
+    /// When.
+    pub created_at: Instant,
+    /// What happened, in order.
+    pub acts: Vec<(Act, Done)>,
+    /// What the person who walked said of the two gaits, in order.
+    pub answers: Vec<LabAnswer>,
+}
+
+impl LabSession {
+    /// Whether this happened, and how.
+    pub fn done(&self, act: Act) -> Option<&Done> {
+        self.acts.iter().find(|(known, _)| *known == act).map(|(_, done)| done)
+    }
+
+    /// The answer that stands.
+    pub fn answer(&self) -> Option<&LabAnswer> {
+        self.answers.last().filter(|answer| !answer.taken_back)
+    }
+
+    /// The gaits of walks 2 and 3; none before the session is unblinded.
+    pub fn walked(&self) -> Option<(TrialId, TrialId)> {
+        let one_first = self.allocation.gait_one_first?;
+        Some(if one_first { (self.gait_one, self.gait_two) } else { (self.gait_two, self.gait_one) })
+    }
+}
+
+/// A session to write.
+#[derive(Debug, Clone)]
+pub struct NewLabSession<'a> {
+    /// The study.
+    pub study_id: StudyId,
+    /// 1, 2, ... of this study.
+    pub number: u32,
+    /// One of the two gaits.
+    pub gait_one: TrialId,
+    /// The other one.
+    pub gait_two: TrialId,
+    /// Free text.
+    pub notes: &'a str,
+}
+
+/// Adds a session.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>) -> StoreResult<LabSessionId> {
+    let id = LabSessionId::fresh();
+    sqlx::query(
+        "insert into lab_sessions (id, study_id, number, gait_one, gait_two, gait_one_first, notes, actor, created_at) \
+         values (?, ?, ?, ?, ?, 0, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(new.study_id)
+    .bind(new.number)
+    .bind(new.gait_one)
+    .bind(new.gait_two)
+    .bind(new.notes)
+    .bind(actor.as_str())
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// Writes that something happened to a session. `false`: it had happened before.
+///
+/// # Errors
+/// What the database reports.
+pub async fn act(db: &mut Connection, actor: &Actor, id: LabSessionId, act: Act, note: &str) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "insert into lab_acts (session_id, act, note, actor, created_at) values (?, ?, ?, ?, ?) \
+         on conflict (session_id, act) do nothing",
+    )
+    .bind(id)
+    .bind(act.as_str())
+    .bind(note)
+    .bind(actor.as_str())
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+/// The session with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: LabSessionId) -> StoreResult<LabSession> {
+    let row = sqlx::query("select * from lab_sessions where id = ?").bind(id).fetch_optional(&mut *db).await?;
+    let row = row.ok_or_else(|| StoreError::Missing { what: "lab session", id: id.to_string() })?;
+    whole(db, &row).await
+}
+
+/// The sessions of a study, in order.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<LabSession>> {
+    let query = sqlx::query("select * from lab_sessions where study_id = ? order by number").bind(study);
+    let rows = query.fetch_all(&mut *db).await?;
+    all(db, &rows).await
+}
+
+/// Sessions that a caller reaches and that are not closed, of subjects who did not withdraw, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<LabSession>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
+        "select l.* from lab_sessions l join studies s on s.id = l.study_id \
+         where s.subject_id not in (select subject_id from withdrawn_subjects) \
+         and not exists (select 1 from lab_acts a where a.session_id = l.id and a.act = 'closed') and ",
+        reached!("s.id"),
+        " order by l.id desc limit ?4"
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
+    .bind(limit)
+    .fetch_all(&mut *db)
+    .await?;
+    all(db, &rows).await
+}
+
+async fn all(db: &mut Connection, rows: &[SqliteRow]) -> StoreResult<Vec<LabSession>> {
+    let mut found = Vec::with_capacity(rows.len());
+    for row in rows {
+        found.push(whole(db, row).await?);
+    }
+    Ok(found)
+}
+
+async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> {
+    let id: LabSessionId = row.try_get("id")?;
+    let acts = sqlx::query("select * from lab_acts where session_id = ? order by rowid").bind(id);
+    let acts = acts.fetch_all(&mut *db).await?;
+    let act = |row: &SqliteRow| -> StoreResult<(Act, Done)> {
+        let done = Done { note: row.try_get("note")?, actor: row.try_get("actor")?, at: row.try_get("created_at")? };
+        Ok((row.try_get::<&str, _>("act")?.parse()?, done))
+    };
+    Ok(LabSession {
+        id,
+        study_id: row.try_get("study_id")?,
+        number: row.try_get("number")?,
+        gait_one: row.try_get("gait_one")?,
+        gait_two: row.try_get("gait_two")?,
+        allocation: allocations::session(&mut *db, id).await?,
+        notes: row.try_get("notes")?,
+        actor: row.try_get("actor")?,
+        created_at: row.try_get("created_at")?,
+        acts: acts.iter().map(act).collect::<StoreResult<_>>()?,
+        answers: lab_answers::of_session(db, id).await?,
+    })
+}

@@ -1,0 +1,221 @@
+//! Members of studies, and which studies are restricted to them.
+
+use super::{Connection, Instant, MemberId, StoreError, StoreResult, StudyId, now};
+use crate::reach::{Principal, Reach};
+use crate::rights::Role;
+use serde::{Deserialize, Serialize};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Row};
+use utoipa::ToSchema;
+
+/// SQL that holds where a caller reaches the study of a column. `?1`, `?2` and `?3` are what [`binds`] gives.
+macro_rules! reached {
+    ($study:literal) => {
+        concat!(
+            "(?1 or ",
+            $study,
+            " in (select study_id from current_study_members where principal = ?3) or (?2 and ",
+            $study,
+            " not in (select study_id from restricted_studies)))"
+        )
+    };
+}
+pub(super) use reached;
+
+/// The first three values of a query with [`reached`]: whether every study is reached, whether open ones are, and whose
+/// memberships count.
+pub(super) fn binds(reach: Reach) -> (bool, bool, Option<String>) {
+    let principal = reach.principal().map(|principal| match principal {
+        Principal::User(id) => id.to_string(),
+        Principal::Token(id) => id.to_string(),
+    });
+    (reach.is_every(), reach.is_open(), principal)
+}
+
+/// People or programs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MemberKind {
+    /// A person.
+    User,
+    /// A program.
+    Token,
+}
+
+/// A member of a study.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Member {
+    /// Identifier of the membership.
+    pub id: MemberId,
+    /// The study.
+    pub study_id: StudyId,
+    /// Person or program.
+    pub kind: MemberKind,
+    /// Name of the user or the token.
+    pub name: String,
+    /// Role of a user.
+    pub role: Option<Role>,
+    /// Who made it a member.
+    pub added_by: String,
+    /// Since when.
+    pub created_at: Instant,
+}
+
+/// What the trigger says of somebody who is a member.
+pub const MEMBER_ALREADY: &str = "a member of this study already";
+
+/// Whether a caller reaches a study. It does not reach one that does not exist.
+///
+/// # Errors
+/// What the database reports.
+pub async fn reaches(db: &mut Connection, reach: Reach, study: StudyId) -> StoreResult<bool> {
+    let (every, open, principal) = binds(reach);
+    let found = sqlx::query(concat!("select 1 from studies s where s.id = ?4 and ", reached!("s.id")))
+        .bind(every)
+        .bind(open)
+        .bind(principal)
+        .bind(study)
+        .fetch_optional(db)
+        .await?;
+    Ok(found.is_some())
+}
+
+/// Whether a caller reaches any study.
+///
+/// # Errors
+/// What the database reports.
+pub async fn reaches_any(db: &mut Connection, reach: Reach) -> StoreResult<bool> {
+    let (every, open, principal) = binds(reach);
+    let found = sqlx::query(concat!("select 1 from studies s where ", reached!("s.id"), " limit 1"))
+        .bind(every)
+        .bind(open)
+        .bind(principal)
+        .fetch_optional(db)
+        .await?;
+    Ok(found.is_some())
+}
+
+const MEMBERS: &str = "select m.*, coalesce(u.name, t.name) as name, u.role as role from study_members m \
+                       left join users u on u.id = m.user_id left join tokens t on t.id = m.token_id ";
+
+/// The present members of a study, in the order in which they were added.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Member>> {
+    let sql =
+        format!("{MEMBERS} where m.study_id = ? and m.id in (select id from current_study_members) order by m.id");
+    let rows = sqlx::query(AssertSqlSafe(sql)).bind(study).fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// A membership, also one that has ended.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: MemberId) -> StoreResult<Member> {
+    let row = sqlx::query(AssertSqlSafe(format!("{MEMBERS} where m.id = ?"))).bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "member", id: id.to_string() })
+}
+
+/// Adds a member.
+///
+/// # Errors
+/// [`MEMBER_ALREADY`], or what the database reports.
+pub async fn insert(db: &mut Connection, study: StudyId, who: Principal, actor: &str) -> StoreResult<MemberId> {
+    let (user, token) = match who {
+        Principal::User(id) => (Some(id), None),
+        Principal::Token(id) => (None, Some(id)),
+    };
+    let id = MemberId::fresh();
+    sqlx::query(
+        "insert into study_members (id, study_id, user_id, token_id, actor, created_at) values (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(study)
+    .bind(user)
+    .bind(token)
+    .bind(actor)
+    .bind(now())
+    .execute(db)
+    .await?;
+    Ok(id)
+}
+
+/// Ends a membership. `false`: it had ended already.
+///
+/// # Errors
+/// What the database reports.
+pub async fn end(db: &mut Connection, id: MemberId, actor: &str) -> StoreResult<bool> {
+    let sql = "insert into study_member_ends (member_id, actor, created_at) values (?, ?, ?) on conflict do nothing";
+    Ok(sqlx::query(sql).bind(id).bind(actor).bind(now()).execute(db).await?.rows_affected() == 1)
+}
+
+/// Whether a study is restricted to its members.
+///
+/// # Errors
+/// What the database reports.
+pub async fn is_restricted(db: &mut Connection, study: StudyId) -> StoreResult<bool> {
+    let found =
+        sqlx::query("select 1 from restricted_studies where study_id = ?").bind(study).fetch_optional(db).await?;
+    Ok(found.is_some())
+}
+
+/// Restricts a study to its members, or opens it to staff.
+///
+/// # Errors
+/// What the database reports.
+pub async fn set_restricted(db: &mut Connection, study: StudyId, restricted: bool, actor: &str) -> StoreResult<()> {
+    sqlx::query("insert into study_restrictions (study_id, restricted, actor, created_at) values (?, ?, ?, ?)")
+        .bind(study)
+        .bind(restricted)
+        .bind(actor)
+        .bind(now())
+        .execute(db)
+        .await?;
+    Ok(())
+}
+
+/// Makes the members of a restricted study, other than raters, members of another one, which is restricted, too. Nothing
+/// happens where the study is open.
+///
+/// # Errors
+/// What the database reports.
+pub async fn inherit(db: &mut Connection, from: StudyId, to: StudyId, actor: &str) -> StoreResult<()> {
+    if !is_restricted(db, from).await? {
+        return Ok(());
+    }
+    set_restricted(db, to, true, actor).await?;
+    let rows = sqlx::query(
+        "select m.user_id, m.token_id, u.role from current_study_members m \
+                            left join users u on u.id = m.user_id where m.study_id = ?",
+    )
+    .bind(from)
+    .fetch_all(&mut *db)
+    .await?;
+    for row in &rows {
+        if row.try_get::<Option<&str>, _>("role")? == Some(Role::Rater.as_str()) {
+            continue;
+        }
+        let user = row.try_get::<Option<_>, _>("user_id")?.map(Principal::User);
+        let token = row.try_get::<Option<_>, _>("token_id")?.map(Principal::Token);
+        if let Some(who) = user.or(token) {
+            insert(db, to, who, actor).await?;
+        }
+    }
+    Ok(())
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Member> {
+    let role: Option<&str> = row.try_get("role")?;
+    let user: Option<&str> = row.try_get("user_id")?;
+    Ok(Member {
+        id: row.try_get("id")?,
+        study_id: row.try_get("study_id")?,
+        kind: if user.is_some() { MemberKind::User } else { MemberKind::Token },
+        name: row.try_get("name")?,
+        role: role.map(str::parse).transpose()?,
+        added_by: row.try_get("actor")?,
+        created_at: row.try_get("created_at")?,
+    })
+}

@@ -1,0 +1,510 @@
+//! Studies: one tuning each.
+
+use super::members::{binds, reached};
+use super::{
+    Connection, DeviceId, Instant, ReferenceGaitId, StoreError, StoreResult, StudyId, SubjectId, json, now, schema,
+};
+use crate::reach::Reach;
+use gait_learner::{LearnerSettings, SearchSpace};
+use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::str::FromStr;
+use utoipa::ToSchema;
+
+/// Where a study stands. Which change is allowed is decided in `studies::lifecycle`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StudyState {
+    /// Being set up: nothing runs.
+    Draft,
+    /// Proposing and evaluating.
+    Running,
+    /// Waiting for a person's answer.
+    Waiting,
+    /// Held by a person.
+    Paused,
+    /// Reached its budget or its stopping rule.
+    Finished,
+    /// Ended by a person before that.
+    Stopped,
+}
+
+impl StudyState {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Running => "running",
+            Self::Waiting => "waiting",
+            Self::Paused => "paused",
+            Self::Finished => "finished",
+            Self::Stopped => "stopped",
+        }
+    }
+
+    /// Finished or stopped.
+    pub fn has_ended(self) -> bool {
+        matches!(self, Self::Finished | Self::Stopped)
+    }
+}
+
+impl FromStr for StudyState {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Draft, Self::Running, Self::Waiting, Self::Paused, Self::Finished, Self::Stopped]
+            .into_iter()
+            .find(|state| state.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "study state", reason: text.to_owned() })
+    }
+}
+
+/// Who answers the comparisons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FeedbackMode {
+    /// Gait RMSE answers every comparison.
+    Automatic,
+    /// People answer; the study waits for them.
+    Human,
+    /// Gait RMSE answers, people may add answers of their own.
+    Mixed,
+}
+
+impl FeedbackMode {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Automatic => "automatic",
+            Self::Human => "human",
+            Self::Mixed => "mixed",
+        }
+    }
+}
+
+impl FromStr for FeedbackMode {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Automatic, Self::Human, Self::Mixed]
+            .into_iter()
+            .find(|mode| mode.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "feedback mode", reason: text.to_owned() })
+    }
+}
+
+/// Who evaluates the trials.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Evaluation {
+    /// The program: each trial is an optimisation.
+    Optimizer,
+    /// Scripts of the lab: they ask for trials and tell what these gave.
+    Script,
+}
+
+impl Evaluation {
+    /// As stored and shown.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Optimizer => "optimizer",
+            Self::Script => "script",
+        }
+    }
+}
+
+impl FromStr for Evaluation {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::Optimizer, Self::Script]
+            .into_iter()
+            .find(|evaluation| evaluation.as_str() == text)
+            .ok_or_else(|| StoreError::Damaged { what: "evaluation", reason: text.to_owned() })
+    }
+}
+
+/// What a study is made of; fixed once it has left `draft`.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct StudyPlan {
+    /// Name shown to people.
+    pub name: String,
+    /// Who walks.
+    pub subject_id: SubjectId,
+    /// Height and mass that it solves with, also after a correction; none: those that were entered first.
+    #[schema(value_type = Option<schema::Body>)]
+    pub body: Option<Body>,
+    /// With which device.
+    pub device_id: DeviceId,
+    /// What Gait RMSE is measured against.
+    pub reference_gait_id: ReferenceGaitId,
+    /// With muscles (C1-C12) or without (C1-C4).
+    pub muscles: bool,
+    /// Settings of the gait problem; boxed, as plans pass through many futures.
+    #[schema(value_type = Object)]
+    pub gait_settings: Box<GaitSettings>,
+    /// Limits of one solve.
+    #[schema(value_type = Object)]
+    pub solve_options: SolveOptions,
+    /// Values of the bounds that are not tuned.
+    #[schema(value_type = schema::Bounds)]
+    pub base_bounds: TunedBounds,
+    /// What is tuned: dimensions named `a1`..`a8`.
+    #[schema(value_type = schema::SearchSpace)]
+    pub search_space: SearchSpace,
+    /// Settings of the learner.
+    #[schema(value_type = Object)]
+    pub learner: LearnerSettings,
+    /// Who answers the comparisons.
+    pub feedback_mode: FeedbackMode,
+    /// Who evaluates the trials.
+    pub evaluation: Evaluation,
+    /// How many trials.
+    pub trial_budget: u32,
+    /// No new trial once the solves so far took so many seconds together.
+    pub solve_seconds_budget: Option<f64>,
+    /// Done when the best action stayed the same over so many results in a row.
+    pub unchanged_limit: Option<u32>,
+    /// How many trials at the same time; 1 is the published, reproducible order.
+    pub parallel_trials: u32,
+    /// Higher runs first.
+    pub priority: i32,
+    /// Every random draw of the study derives from it.
+    pub seed: u64,
+}
+
+impl StudyPlan {
+    /// Whether a study of the other plan would try the same: same person, problem, learner and draws. Name, priority
+    /// and how many trials run at the same time do not matter.
+    pub fn tries_the_same_as(&self, other: &Self) -> bool {
+        // Studies from before there were corrections do not say what they solve with: it is what was entered.
+        let bodies_differ = self.body.is_some() && other.body.is_some() && self.body != other.body;
+        if bodies_differ {
+            return false;
+        }
+        let own =
+            |plan: &Self| Self { name: String::new(), body: None, priority: 0, parallel_trials: 1, ..plan.clone() };
+        own(self) == own(other)
+    }
+}
+
+/// A study of the record.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Study {
+    /// Identifier.
+    pub id: StudyId,
+    /// What it is made of.
+    #[serde(flatten)]
+    pub plan: StudyPlan,
+    /// The study whose set-up it was made from.
+    pub forked_from: Option<StudyId>,
+    /// Where it stands.
+    pub state: StudyState,
+    /// Why it stands there, in words; may be empty.
+    pub state_reason: String,
+    /// Counts the changes of the row.
+    pub revision: i64,
+    /// When it was made.
+    pub created_at: Instant,
+    /// When it last changed.
+    pub updated_at: Instant,
+}
+
+/// Settings as a study recorded them, with every weight there was. Before there was one on the bend of activations, none
+/// was meant; a new study that does not name it has the default instead.
+fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
+    let mut document: Value = json::from_text("gait_settings", text)?;
+    if let Some(weights) = document.get_mut("regularisation").and_then(Value::as_object_mut) {
+        weights.entry("activation_bend").or_insert_with(|| 0.0.into());
+    }
+    serde_json::from_value(document).map_err(|e| StoreError::Damaged { what: "gait_settings", reason: e.to_string() })
+}
+
+/// Adds a study.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn insert(
+    db: &mut Connection,
+    plan: &StudyPlan,
+    state: StudyState,
+    forked_from: Option<StudyId>,
+) -> StoreResult<Study> {
+    let at = now();
+    let id = StudyId::fresh();
+    sqlx::query(
+        "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
+         solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
+         seed, state, evaluation, solve_seconds_budget, unchanged_limit, forked_from, created_at, updated_at, \
+         height_m, body_mass_kg) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(id)
+    .bind(&plan.name)
+    .bind(plan.subject_id)
+    .bind(plan.device_id)
+    .bind(plan.reference_gait_id)
+    .bind(plan.muscles)
+    .bind(json::to_text("gait settings", &plan.gait_settings)?)
+    .bind(json::to_text("solve options", &plan.solve_options)?)
+    .bind(json::to_text("base bounds", &plan.base_bounds)?)
+    .bind(json::to_text("search space", &plan.search_space)?)
+    .bind(json::to_text("learner settings", &plan.learner)?)
+    .bind(plan.feedback_mode.as_str())
+    .bind(plan.trial_budget)
+    .bind(plan.parallel_trials)
+    .bind(plan.priority)
+    .bind(i64::try_from(plan.seed).unwrap_or(i64::MAX))
+    .bind(state.as_str())
+    .bind(plan.evaluation.as_str())
+    .bind(plan.solve_seconds_budget)
+    .bind(plan.unchanged_limit)
+    .bind(forked_from)
+    .bind(at)
+    .bind(at)
+    .bind(plan.body.map(|body| body.height_m))
+    .bind(plan.body.map(|body| body.body_mass_kg))
+    .execute(db)
+    .await?;
+    Ok(Study {
+        id,
+        plan: plan.clone(),
+        forked_from,
+        state,
+        state_reason: String::new(),
+        revision: 1,
+        created_at: at,
+        updated_at: at,
+    })
+}
+
+/// The study with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
+    let row = sqlx::query("select * from studies where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "study", id: id.to_string() })
+}
+
+/// At most `limit` studies older than `before` that a caller reaches, newest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn page(db: &mut Connection, reach: Reach, before: Option<StudyId>, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where ",
+        reached!("id"),
+        " and (?4 is null or id < ?4) order by id desc limit ?5"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(before).bind(limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// The studies that ask raters for comparisons and that a caller reaches, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn asking_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where state in ('running', 'waiting') and feedback_mode <> 'automatic' and ",
+        reached!("id"),
+        " order by priority desc, id"
+    );
+    sqlx::query(sql).bind(every).bind(open).bind(principal).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// Every study that proposes trials by itself, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
+    let rows = sqlx::query("select * from studies where state in ('running', 'waiting') order by priority desc, id")
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The newest studies that a caller reaches and that go on only when a person does something.
+///
+/// # Errors
+/// What the database reports.
+pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!(
+        "select * from studies where state in ('waiting', 'paused', 'draft') and ",
+        reached!("id"),
+        " order by id desc limit ?4"
+    );
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(limit);
+    query.fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// The newest studies that a caller reaches in which somebody called a gait unsafe and did not take it back, of subjects
+/// who did not withdraw.
+///
+/// # Errors
+/// What the database reports.
+pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let rows = sqlx::query(concat!(
+        "select * from studies s where s.subject_id not in (select subject_id from withdrawn_subjects) and ",
+        reached!("s.id"),
+        " and s.id in (\
+         select m.study_id from remarks m where m.answer glob 'unsafe*' \
+         and m.id not in (select remark_id from remark_retractions) \
+         union select p.study_id from presentations p join presentation_answers a on a.presentation_id = p.id \
+         where a.answer glob 'unsafe*' \
+         union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
+         where a.answer glob 'unsafe*') order by s.id desc limit ?4",
+    ))
+    .bind(every)
+    .bind(open)
+    .bind(principal)
+    .bind(limit)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The newest studies of a subject that a caller reaches.
+///
+/// # Errors
+/// What the database reports.
+pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
+    let (every, open, principal) = binds(reach);
+    let sql = concat!("select * from studies where subject_id = ?4 and ", reached!("id"), " order by id desc limit ?5");
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal);
+    query.bind(subject).bind(limit).fetch_all(db).await?.iter().map(from_row).collect()
+}
+
+/// Studies of a subject that did not end.
+///
+/// # Errors
+/// What the database reports.
+pub async fn open_of(db: &mut Connection, subject: SubjectId) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where subject_id = ? and state not in ('finished', 'stopped') order by id")
+            .bind(subject)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Studies that ended before an instant.
+///
+/// # Errors
+/// What the database reports.
+pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<Study>> {
+    let rows =
+        sqlx::query("select * from studies where state in ('finished', 'stopped') and updated_at < ? order by id")
+            .bind(at)
+            .fetch_all(db)
+            .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// What can be changed of a study in place.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// Name shown to people.
+    pub name: String,
+    /// Higher runs first.
+    pub priority: i32,
+    /// How many trials at the same time.
+    pub parallel_trials: u32,
+    /// How many trials.
+    pub trial_budget: u32,
+}
+
+/// Changes a study in place.
+///
+/// # Errors
+/// A violated constraint, or what the database reports.
+pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &Limits) -> StoreResult<()> {
+    sqlx::query(
+        "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
+         updated_at = ? where id = ?",
+    )
+    .bind(&limits.name)
+    .bind(limits.priority)
+    .bind(limits.parallel_trials)
+    .bind(limits.trial_budget)
+    .bind(now())
+    .bind(id)
+    .execute(db)
+    .await?;
+    Ok(())
+}
+
+/// Moves a study to another state, if it still is in the state it was read in. `false`: it was not.
+///
+/// # Errors
+/// What the database reports.
+pub async fn set_state(db: &mut Connection, study: &Study, state: StudyState, reason: &str) -> StoreResult<bool> {
+    let done = sqlx::query(
+        "update studies set state = ?, state_reason = ?, revision = revision + 1, updated_at = ? \
+         where id = ? and state = ?",
+    )
+    .bind(state.as_str())
+    .bind(reason)
+    .bind(now())
+    .bind(study.id)
+    .bind(study.state.as_str())
+    .execute(db)
+    .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+fn body_of(row: &SqliteRow) -> StoreResult<Option<Body>> {
+    let (height, mass): (Option<f64>, Option<f64>) = (row.try_get("height_m")?, row.try_get("body_mass_kg")?);
+    Ok(height.zip(mass).map(|(height_m, body_mass_kg)| Body { height_m, body_mass_kg }))
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Study> {
+    Ok(Study {
+        id: row.try_get("id")?,
+        plan: StudyPlan {
+            name: row.try_get("name")?,
+            subject_id: row.try_get("subject_id")?,
+            body: body_of(row)?,
+            device_id: row.try_get("device_id")?,
+            reference_gait_id: row.try_get("reference_gait_id")?,
+            muscles: row.try_get("muscles")?,
+            gait_settings: Box::new(recorded_settings(row.try_get("gait_settings")?)?),
+            solve_options: json::column(row, "solve_options")?,
+            base_bounds: json::column(row, "base_bounds")?,
+            search_space: json::column(row, "search_space")?,
+            learner: json::column(row, "learner")?,
+            feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
+            evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
+            trial_budget: row.try_get("trial_budget")?,
+            solve_seconds_budget: row.try_get("solve_seconds_budget")?,
+            unchanged_limit: row.try_get("unchanged_limit")?,
+            parallel_trials: row.try_get("parallel_trials")?,
+            priority: row.try_get("priority")?,
+            seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),
+        },
+        forked_from: row.try_get("forked_from")?,
+        state: row.try_get::<&str, _>("state")?.parse()?,
+        state_reason: row.try_get("state_reason")?,
+        revision: row.try_get("revision")?,
+        created_at: row.try_get("created_at")?,
+        updated_at: row.try_get("updated_at")?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_of_before_the_weight_on_bends_mean_none() {
+        let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
+            "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
+        assert_eq!(recorded_settings(old).unwrap(), GaitSettings::reference_problem());
+        let new = serde_json::to_string(&GaitSettings::default()).unwrap();
+        assert_eq!(recorded_settings(&new).unwrap(), GaitSettings::default());
+    }
+}

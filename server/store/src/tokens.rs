@@ -1,0 +1,145 @@
+//! Tokens: how programs of the lab say who they are. Stored as hashes.
+
+use super::audit::Actor;
+use super::{Connection, Instant, StoreError, StoreResult, TokenId, UserId, json, now};
+use crate::rights::Right;
+use serde::Serialize;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
+
+/// A token; its secret was shown once.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Token {
+    /// Identifier.
+    pub id: TokenId,
+    /// What it is for, unique.
+    pub name: String,
+    /// What it allows.
+    pub scopes: Vec<Right>,
+    /// Who made it. It ends when this user is disabled or is no administrator any more.
+    pub created_by: String,
+    /// When it was made.
+    pub created_at: Instant,
+    /// When it ends by itself.
+    pub expires_at: Option<Instant>,
+    /// When it was ended.
+    pub revoked_at: Option<Instant>,
+}
+
+impl Token {
+    /// Whether it was not revoked and has not ended.
+    pub fn is_good(&self) -> bool {
+        self.revoked_at.is_none() && self.expires_at.is_none_or(|at| at > now())
+    }
+}
+
+/// The unique name, as SQLite names it in a violation.
+pub const NAME_UNIQUE: &str = "tokens.name";
+
+/// Adds a token.
+///
+/// # Errors
+/// A violated constraint ([`NAME_UNIQUE`]), or what the database reports.
+pub async fn insert(
+    db: &mut Connection,
+    name: &str,
+    hash: &str,
+    scopes: &[Right],
+    created_by: &Actor,
+    expires_at: Option<Instant>,
+) -> StoreResult<Token> {
+    let token = Token {
+        id: TokenId::fresh(),
+        name: name.to_owned(),
+        scopes: scopes.to_vec(),
+        created_by: created_by.as_str().to_owned(),
+        created_at: now(),
+        expires_at,
+        revoked_at: None,
+    };
+    sqlx::query(
+        "insert into tokens (id, name, hash, scopes, created_by, maker, created_at, expires_at) \
+         values (?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(token.id)
+    .bind(name)
+    .bind(hash)
+    .bind(json::to_text("scopes", &scopes)?)
+    .bind(created_by.as_str())
+    .bind(created_by.user_id())
+    .bind(token.created_at)
+    .bind(expires_at)
+    .execute(db)
+    .await?;
+    Ok(token)
+}
+
+/// The token with this hash, unless it was revoked.
+///
+/// # Errors
+/// What the database reports.
+pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Token>> {
+    let row =
+        sqlx::query("select * from tokens where hash = ? and revoked_at is null").bind(hash).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
+}
+
+/// The tokens that a user made and nobody revoked. Older versions kept the maker's name alone.
+///
+/// # Errors
+/// What the database reports.
+pub async fn made_by(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
+    let rows = sqlx::query(
+        "select t.* from tokens t join users u on u.id = ? where t.revoked_at is null and (t.maker = u.id or \
+         t.maker is null and t.created_by in ('admin ' || u.name, 'clinician ' || u.name, 'rater ' || u.name)) \
+         order by t.id",
+    )
+    .bind(user)
+    .fetch_all(db)
+    .await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// The token with this identifier.
+///
+/// # Errors
+/// [`StoreError::Missing`], or what the database reports.
+pub async fn get(db: &mut Connection, id: TokenId) -> StoreResult<Token> {
+    let row = sqlx::query("select * from tokens where id = ?").bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "token", id: id.to_string() })
+}
+
+/// Every token, oldest first.
+///
+/// # Errors
+/// What the database reports.
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<Token>> {
+    let rows = sqlx::query("select * from tokens order by id").fetch_all(db).await?;
+    rows.iter().map(from_row).collect()
+}
+
+/// Ends a token. `false`: it had ended already.
+///
+/// # Errors
+/// What the database reports.
+pub async fn revoke(db: &mut Connection, id: TokenId) -> StoreResult<bool> {
+    let done = sqlx::query("update tokens set revoked_at = ? where id = ? and revoked_at is null")
+        .bind(now())
+        .bind(id)
+        .execute(db)
+        .await?;
+    Ok(done.rows_affected() == 1)
+}
+
+fn from_row(row: &SqliteRow) -> StoreResult<Token> {
+    Ok(Token {
+        id: row.try_get("id")?,
+        name: row.try_get("name")?,
+        scopes: json::column(row, "scopes")?,
+        created_by: row.try_get("created_by")?,
+        created_at: row.try_get("created_at")?,
+        expires_at: row.try_get("expires_at")?,
+        revoked_at: row.try_get("revoked_at")?,
+    })
+}

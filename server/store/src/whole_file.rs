@@ -1,0 +1,185 @@
+//! Files that get their name when they are whole, checked and on the disk. Until then they are hidden beside it.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Ending of a file that is not whole yet.
+const PART: &str = ".copying";
+/// What SQLite keeps beside a database while it writes one.
+const COMPANIONS: [&str; 3] = ["-journal", "-wal", "-shm"];
+
+/// A file that is being written. Dropped before it is kept, it is removed.
+#[derive(Debug)]
+pub(crate) struct WholeFile {
+    part: PathBuf,
+    file: File,
+    kept: bool,
+}
+
+impl WholeFile {
+    /// Begins an empty file beside `target`, for its owner alone. Removes the parts of `family` that killed processes left:
+    /// hidden files whose name begins with it.
+    pub(crate) fn begin(target: &Path, family: &str) -> io::Result<Self> {
+        let folder = folder_of(target);
+        remove_left_over(folder, family);
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        for number in 0_u32.. {
+            let part = folder.join(format!(".{name}.{}-{number}{PART}", std::process::id()));
+            match private().write(true).read(true).create_new(true).open(&part) {
+                Ok(file) => {
+                    // While this process lives. Where files cannot be locked, parts stay until somebody removes them.
+                    let _ = file.try_lock();
+                    return Ok(Self { part, file, kept: false });
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(io::ErrorKind::AlreadyExists.into())
+    }
+
+    /// Where it is until it is kept.
+    pub(crate) fn part(&self) -> &Path {
+        &self.part
+    }
+
+    /// To write with.
+    pub(crate) fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Gives it its name. A file that has the name already stays, and this one is removed.
+    pub(crate) fn keep_as(mut self, target: &Path) -> io::Result<()> {
+        self.file.sync_all()?;
+        rename_to_new(&self.part, target)?;
+        self.kept = true;
+        sync_folder(target)
+    }
+
+    /// Gives it its name, also where another file has it; that one is gone then.
+    pub(crate) fn replace(mut self, target: &Path) -> io::Result<()> {
+        self.file.sync_all()?;
+        std::fs::rename(&self.part, target)?;
+        self.kept = true;
+        sync_folder(target)
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        if !self.kept {
+            remove(&self.part);
+        }
+    }
+}
+
+/// For a file that its owner alone may read.
+pub(crate) fn private() -> OpenOptions {
+    #[allow(unused_mut, reason = "not where there are no permissions of this kind")]
+    let mut options = OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options
+}
+
+/// Makes the names in the folder of a file durable.
+///
+/// # Errors
+/// What the file system reports.
+pub fn sync_folder(of: &Path) -> io::Result<()> {
+    // Elsewhere a folder cannot be opened, and names are durable with their files.
+    if cfg!(unix) { File::open(folder_of(of))?.sync_all() } else { Ok(()) }
+}
+
+/// The folder that a file lies in.
+pub(crate) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
+}
+
+fn remove_left_over(folder: &Path, family: &str) {
+    let start = format!(".{family}");
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let Some(name) = name.to_str().filter(|name| name.starts_with(&start)) else { continue };
+        let name = COMPANIONS.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name);
+        let part = folder.join(name);
+        // Without the part itself, its companion belongs to nobody.
+        if name.ends_with(PART) && File::open(&part).map_or(true, |part| part.try_lock().is_ok()) {
+            remove(&part);
+        }
+    }
+}
+
+/// Removes a part and its companions. What cannot be removed now is removed as a left-over later.
+fn remove(part: &Path) {
+    for ending in std::iter::once("").chain(COMPANIONS) {
+        let mut name = part.as_os_str().to_owned();
+        name.push(ending);
+        let _ = std::fs::remove_file(name);
+    }
+}
+
+fn rename_to_new(part: &Path, target: &Path) -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        use rustix::io::Errno;
+        match renameat_with(CWD, part, CWD, target, RenameFlags::NOREPLACE) {
+            // Not on every file system.
+            Err(Errno::INVAL | Errno::NOSYS) => {}
+            done => return Ok(done?),
+        }
+    }
+    if target.exists() {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
+    std::fs::rename(part, target)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_gets_its_name_only_when_it_is_kept_and_never_takes_one_in_use() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.db.backup-1");
+        let mut first = WholeFile::begin(&target, "a.db").unwrap();
+        first.file().write_all(b"whole").unwrap();
+        assert!(!target.exists());
+        let second = WholeFile::begin(&target, "a.db").unwrap();
+        first.keep_as(&target).unwrap();
+        assert!(second.keep_as(&target).is_err());
+        assert_eq!(std::fs::read(&target).unwrap(), b"whole");
+        drop(WholeFile::begin(&target, "a.db").unwrap());
+        assert_eq!(names(folder.path()), ["a.db.backup-1"]);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            assert_eq!(std::fs::metadata(&target).unwrap().permissions().mode() & 0o777, 0o600);
+        }
+    }
+
+    #[test]
+    fn parts_of_killed_processes_are_removed_and_those_in_use_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.db.backup-2");
+        std::fs::write(folder.path().join(".a.db.backup-1.77-0.copying"), "half").unwrap();
+        std::fs::write(folder.path().join(".a.db.backup-0.77-0.copying-journal"), "half").unwrap();
+        std::fs::write(folder.path().join(".b.csv.77-0.copying"), "of another family").unwrap();
+        let at_work = WholeFile::begin(&target, "a.db").unwrap();
+        let other = WholeFile::begin(&target, "a.db").unwrap();
+        assert!(at_work.part().exists() && other.part().exists() && names(folder.path()).len() == 3);
+        drop((at_work, other));
+        assert_eq!(names(folder.path()), [".b.csv.77-0.copying"]);
+    }
+}
