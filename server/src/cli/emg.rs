@@ -1,5 +1,6 @@
 //! `gaitwright emg`: muscle activity over the gait cycle from a recording, without the service.
 
+use super::choices::{EMG_FORMATS, one_of};
 use super::out_file::OutFile;
 use super::output::data;
 use super::problem::read;
@@ -20,7 +21,7 @@ pub(super) struct Emg {
     #[arg(long, value_name = "FILE")]
     normal: Option<PathBuf>,
     /// Form of both files.
-    #[arg(long, value_enum, default_value = "csv")]
+    #[arg(long, value_parser = one_of::<FileForm>(EMG_FORMATS), default_value = "csv")]
     form: FileForm,
     /// Samples per second, 100 to 20000, of a CSV file without a column time_s.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]

@@ -2,6 +2,7 @@
 
 mod body;
 mod certify;
+mod choices;
 mod config;
 mod convert;
 mod emg;

@@ -1,5 +1,6 @@
 //! `gaitwright reference`: a reference gait from a recording.
 
+use super::choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem::read;
@@ -17,10 +18,10 @@ pub(super) struct Reference {
     #[arg(long, value_name = "TEXT")]
     name: String,
     /// Form of the recording.
-    #[arg(long, value_enum, default_value = "opensim")]
+    #[arg(long, value_parser = one_of::<Form>(JOINT_ANGLE_FORMATS), default_value = "opensim")]
     form: Form,
     /// Unit of an OpenSim file whose header does not say it.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of::<Unit>(ANGLE_UNITS))]
     unit: Option<Unit>,
     /// Column of the vertical force under the right foot in an OpenSim file; default with --forces: ground_force_vy, of
     /// Camargo 2021 Treadmill_R_vy.
@@ -31,7 +32,7 @@ pub(super) struct Reference {
     #[arg(long, value_name = "FILE")]
     forces: Option<PathBuf>,
     /// How right heel strikes are found.
-    #[arg(long, value_enum, default_value = "kinematics", conflicts_with = "heel_strikes_s")]
+    #[arg(long, value_parser = one_of::<Strikes>(HEEL_STRIKES), default_value = "kinematics", conflicts_with = "heel_strikes_s")]
     strikes: Strikes,
     /// Right heel strikes, s, as in 0.41,1.52,2.63.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]

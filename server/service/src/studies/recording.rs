@@ -2,7 +2,6 @@
 
 use crate::error::Error;
 use crate::printable;
-use clap::ValueEnum;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, Walker, distance};
 use gait_optimizer::{ReferenceGait as Definition, Subject};
 use gaitwright_store::audit::{self, Actor};
@@ -22,7 +21,7 @@ const CAMARGO_FORCE_COLUMN: &str = "Treadmill_R_vy";
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
 /// Forms of recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Deserialize, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
     /// OpenSim motion or storage file (.mot, .sto) of a gait model.
@@ -35,7 +34,7 @@ pub enum Form {
 }
 
 /// Units of angles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Unit {
     /// Degrees.
@@ -54,7 +53,7 @@ impl From<Unit> for AngleUnit {
 }
 
 /// How right heel strikes are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Deserialize, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Strikes {
     /// Where the vertical force under the right foot rises above 20 N.

@@ -3,7 +3,6 @@
 use super::session::{checked_walk, still_open};
 use crate::error::Error;
 use crate::studies::recording::Unit;
-use clap::ValueEnum;
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
 use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
@@ -21,7 +20,7 @@ use utoipa::ToSchema;
 pub(super) const WHAT: &str = "recording";
 
 /// Forms of files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Deserialize, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FileForm {
     /// Comma-separated values, names in the first line that is no comment.
