@@ -275,7 +275,7 @@ async fn a_link_signs_in_once_and_a_password_after_that() {
     let ada = session_of(&first);
     let again = send(&service, &As::Nobody, &Method::POST, &path, FORM, "").await;
     assert_eq!(again.status, StatusCode::UNAUTHORIZED, "a link works once");
-    assert!(again.text.contains("this link was used or is too old"), "{}", again.text);
+    assert!(again.text.contains("This link was already used or has expired"), "{}", again.text);
 
     let me = send(&service, &ada, &Method::GET, "/api/v1/me", "", "").await.json();
     assert_eq!((&me["name"], &me["role"]), (&json!("Ada"), &json!("admin")));

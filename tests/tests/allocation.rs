@@ -1,4 +1,5 @@
-//! Allocations: balanced, drawn by the operating system, and concealed from everything but the device until somebody unblinds.
+//! Allocations: balanced, drawn by the operating system, and concealed from everything but the device until somebody
+//! unblinds.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -34,8 +35,8 @@ fn chi_squared(count: usize, of: usize) -> f64 {
     2.0 * (count as f64 - half).powi(2) / half
 }
 
-/// Whether so many right guesses of so many are chance: within five standard deviations of one half, which chance leaves
-/// less than once in a million.
+/// Whether so many right guesses of so many are chance: within five standard deviations of one half, which chance
+/// leaves less than once in a million.
 fn is_chance(right: usize, of: usize) -> bool {
     (right as f64 - of as f64 / 2.0).abs() <= 2.5 * (of as f64).sqrt()
 }
@@ -238,8 +239,8 @@ fn bit(text: &str) -> bool {
     Sha256::digest(text.as_bytes())[0] & 1 == 1
 }
 
-/// Every rule by which a guess can follow from the rows of a table that has one row per order: each column as it is, each bit of
-/// the sum of its bytes, and whether it grew since the row before.
+/// Every rule by which a guess can follow from the rows of a table that has one row per order: each column as it is,
+/// each bit of the sum of its bytes, and whether it grew since the row before.
 fn guesses(seen: &Seen, table: &str) -> Vec<(String, Vec<bool>)> {
     let width = seen.tables[table].first().map_or(0, Vec::len);
     let mut all = Vec::new();
@@ -294,8 +295,8 @@ async fn a_program_that_reads_everything_but_allocations_guesses_1_000_orders_no
     let by_seed = |k: usize| bit(&format!("1 lab session {}", k / 250));
     assert!(is_chance((0..1000).filter(|k| by_seed(*k) == truth[*k]).count(), 1000));
 
-    // The seal of an allocation is a hash of its row. Without the nonce it would tell: all but the order is known or can be
-    // tried.
+    // The seal of an allocation is a hash of its row. Without the nonce it would tell: all but the order is known or
+    // can be tried.
     let seals = &seen.tables["seals"];
     let mut right = 0;
     for (id, order) in ids.iter().zip(&truth) {
@@ -390,7 +391,8 @@ async fn exchange_orders(database: &Path) {
     pool.close().await;
 }
 
-/// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a side.
+/// Everything that a reader, a rater, an administrator or nobody can fetch of these, but what the rater is shown on a
+/// side.
 async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str) -> Vec<(String, String)> {
     let document: Value = serde_json::from_str(&gaitwright_http::openapi::text().unwrap()).unwrap();
     // Each address, in every form that it can be asked for.
@@ -577,7 +579,7 @@ async fn an_archive_leaves_out_orders_that_are_blind_and_a_session_without_one_c
     let device = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
     let mut writer = store.write().await.unwrap();
     let refused = lab::for_device(&mut writer, &device, ids[1], 2).await.unwrap_err();
-    assert!(refused.to_string().contains("left its order out"), "{refused}");
+    assert!(refused.to_string().contains("did not include the allocation"), "{refused}");
     drop(writer);
     store.close().await;
     drop(store);

@@ -157,11 +157,19 @@ fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
 const FORGERIES: [Forgery; 56] = [
-    ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "not those of its report"),
-    ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its Gait RMSE is stated as 0.01 rad"),
+    ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its figures differ from its solve report"),
+    ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated Gait RMSE is 0.01 rad"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "negative or not finite"),
-    ("a better cost", |r| r.first("trials")["cost_of_transport"] = 0.01.into(), "not those of its report"),
-    ("a violation that converges", |r| everywhere(r, "max_violation", 0.5), "converged with a violation of 0.5"),
+    (
+        "a better cost",
+        |r| r.first("trials")["cost_of_transport"] = 0.01.into(),
+        "its figures differ from its solve report",
+    ),
+    (
+        "a violation that converges",
+        |r| everywhere(r, "max_violation", 0.5),
+        "it is converged, but its violation is 0.5",
+    ),
     (
         "parts of an RMSE",
         |r| {
@@ -171,7 +179,7 @@ const FORGERIES: [Forgery; 56] = [
             let result = r.table("results").into_iter().find(|row| row["trial_id"] == id).unwrap();
             within(result, "report", |report| report["gait_rmse_parts_rad"] = parts.clone());
         },
-        "its Gait RMSE is stated as",
+        "its stated Gait RMSE is",
     ),
     ("a gait that is not its hash", |r| r.first("gaits")["gait_sha256"] = "0".repeat(64).into(), "has changed"),
     (
@@ -195,14 +203,14 @@ const FORGERIES: [Forgery; 56] = [
     (
         "a changed angle",
         |r| gait(r.first("gaits"), |g| g["domains"][0]["q"][1][5] = 1.0.into()),
-        "its Gait RMSE is stated as",
+        "its stated Gait RMSE is",
     ),
     ("a gait without domains", |r| gait(r.first("gaits"), |g| g["domains"] = json!([])), "number of domains"),
     ("a gait of missing points", |r| gait(r.first("gaits"), |g| g["domains"][0]["qd"] = json!([])), "has 0 entries"),
     ("a gait of another device", |r| gait(r.first("gaits"), |g| g["device"]["name"] = "X".into()), "another device"),
     ("a gait of other bounds", |r| gait(r.first("gaits"), |g| g["bounds"]["a1"] = 16.0.into()), "another device"),
     ("a gait that is no gait", |r| gait(r.first("gaits"), |g| *g = json!({})), "missing field"),
-    ("another speed beside it", |r| r.first("gaits")["speed_m_s"] = 9.0.into(), "not as its row describes it"),
+    ("another speed beside it", |r| r.first("gaits")["speed_m_s"] = 9.0.into(), "its gait does not match its row"),
     (
         "a warm start of another mesh",
         |r| {
@@ -250,7 +258,7 @@ const FORGERIES: [Forgery; 56] = [
                 s["pseudonym"] = "S77".into();
             });
         },
-        "not of its study",
+        "do not belong to its study",
     ),
     (
         "another device",
@@ -263,7 +271,7 @@ const FORGERIES: [Forgery; 56] = [
         "2 rows of devices",
     ),
     ("another study", |r| r.copy("studies", |s| s["id"] = "01900000-0000-7000-8000-000000000001".into()), "2 studies"),
-    ("an identifier that is none", |r| r.first("studies")["id"] = "x".into(), "no identifier"),
+    ("an identifier that is none", |r| r.first("studies")["id"] = "x".into(), "not an identifier"),
     ("a seed beyond the range", |r| r.first("studies")["seed"] = (-1).into(), "studies_seed"),
     (
         "a learner that is none",
@@ -277,21 +285,33 @@ const FORGERIES: [Forgery; 56] = [
         "search_space",
     ),
     ("a state that is none", |r| r.first("studies")["state"] = "won".into(), "studies_state"),
-    ("a gap in the numbers", |r| r.table("trials")[7]["number"] = 9.into(), "expected number 8"),
-    ("another action", |r| within(r.first("trials"), "action", |a| a["a2"] = 75.0.into()), "not that of its index"),
+    ("a gap in the numbers", |r| r.table("trials")[7]["number"] = 9.into(), "should have number 8"),
+    (
+        "another action",
+        |r| within(r.first("trials"), "action", |a| a["a2"] = 75.0.into()),
+        "the action does not match its index",
+    ),
     ("an action out of space", |r| r.first("trials")["action_index"] = 99_999_999.into(), "not in the search space"),
-    ("a converged trial that did not", |r| r.first("trials")["state"] = "not_converged".into(), "does not make it"),
-    ("a failed trial with figures", |r| r.first("trials")["state"] = "failed".into(), "has the report of one"),
+    (
+        "a converged trial that did not",
+        |r| r.first("trials")["state"] = "not_converged".into(),
+        "contradicts the state",
+    ),
+    ("a failed trial with figures", |r| r.first("trials")["state"] = "failed".into(), "has a solve report"),
     (
         "a best trial from nowhere",
         |r| r.first("trials")["best_before"] = "01900000-0000-7000-8000-000000000001".into(),
         "FOREIGN KEY",
     ),
-    ("an open job of a trial that ended", |r| r.first("jobs")["state"] = "queued".into(), "its job says otherwise"),
+    (
+        "an open job of a trial that ended",
+        |r| r.first("jobs")["state"] = "queued".into(),
+        "its state contradicts its job",
+    ),
     (
         "another result",
         |r| within(r.first("results"), "report", |p| p["iterations"] = 1.into()),
-        "not the one that was taken",
+        "its result differs from the accepted one",
     ),
     (
         "a label turned",
@@ -299,7 +319,7 @@ const FORGERIES: [Forgery; 56] = [
             let label = r.table("feedback").into_iter().find(|row| row["kind"] == "label").unwrap();
             label["category"] = (1 - label["category"].as_i64().unwrap()).into();
         },
-        "is not that of a trial",
+        "does not match the trial state",
     ),
     (
         "a label taken away",
@@ -316,10 +336,18 @@ const FORGERIES: [Forgery; 56] = [
             let (a, b) = (row["trial_a"].clone(), row["trial_b"].clone());
             (row["trial_a"], row["trial_b"]) = (b, a);
         },
-        "Gait RMSE says otherwise",
+        "the preference contradicts Gait RMSE",
     ),
-    ("a tie of Gait RMSE", |r| of_source(r, "gait_rmse")["kind"] = "tie".into(), "Gait RMSE says otherwise"),
-    ("a preference from nowhere", |r| of_source(r, "clinician")["source"] = "convergence".into(), "compares nothing"),
+    (
+        "a tie of Gait RMSE",
+        |r| of_source(r, "gait_rmse")["kind"] = "tie".into(),
+        "the preference contradicts Gait RMSE",
+    ),
+    (
+        "a preference from nowhere",
+        |r| of_source(r, "clinician")["source"] = "convergence".into(),
+        "the source of a preference is convergence",
+    ),
     (
         "a suggestion out of space",
         |r| {
@@ -338,19 +366,23 @@ const FORGERIES: [Forgery; 56] = [
     (
         "an author that reads backwards",
         |r| of_source(r, "clinician")["author"] = "a\u{202e}b".into(),
-        "characters that print",
+        "printable characters",
     ),
-    ("a consent", |r| r.0.push(("consents".to_owned(), json!({"seq": 1}))), "no archive holds"),
+    ("a consent", |r| r.0.push(("consents".to_owned(), json!({"seq": 1}))), "which no archive has"),
 ];
 
 /// Forgeries of what only the whole file shows.
 const MORE: [Forgery; 8] =
     [
-        ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "no archive holds"),
-        ("a certificate", |r| r.0.push(("certificates".to_owned(), json!({"passed": 1}))), "no archive holds"),
+        ("an audit row", |r| r.0.push(("audit".to_owned(), json!({"seq": 1}))), "which no archive has"),
+        ("a certificate", |r| r.0.push(("certificates".to_owned(), json!({"passed": 1}))), "which no archive has"),
         ("an unknown column", |r| r.first("trials")["certified"] = 1.into(), "unknown column"),
-        ("a time to come", |r| r.first("trials")["created_at"] = "2999-01-01T00:00:00.000Z".into(), "has not come yet"),
-        ("no time at all", |r| r.first("feedback")["created_at"] = "soon".into(), "no instant"),
+        (
+            "a time to come",
+            |r| r.first("trials")["created_at"] = "2999-01-01T00:00:00.000Z".into(),
+            "which is in the future",
+        ),
+        ("no time at all", |r| r.first("feedback")["created_at"] = "soon".into(), "not a time"),
         (
             "trials before their study",
             |r| {
@@ -424,7 +456,7 @@ async fn only_a_trusted_signature_vouches_for_answers_and_an_unsigned_study_is_m
     for (what, forged, why) in [
         ("unsigned", file.clone(), "signed by nobody"),
         ("turned, signature dropped", turned(&signed), "signed by nobody"),
-        ("turned, old signature", with_end_of(&turned(&signed), &signed), "do not fit the hash at its end"),
+        ("turned, old signature", with_end_of(&turned(&signed), &signed), "do not match the hash at its end"),
     ] {
         let refusal = import_trusting(&store, &forged, std::slice::from_ref(&own)).await.unwrap_err().to_string();
         assert!(refusal.contains(why), "{what}: {refusal}");
@@ -485,7 +517,7 @@ async fn rows_without_their_gait_are_counted_and_rows_that_are_not_their_hash_ar
     let changed = content.replacen("\"author\":\"K\"", "\"author\":\"L\"", 1);
     let store = Store::open(&folder.path().join("c.db")).await.unwrap();
     let refusal = import(&store, &framed(&changed)).await.unwrap_err().to_string();
-    assert!(refusal.contains("not what its hash says"), "{refusal}");
+    assert!(refusal.contains("does not match its hash"), "{refusal}");
     store.close().await;
 }
 
@@ -499,13 +531,13 @@ async fn an_entity_that_is_known_with_other_content_is_refused_by_name() {
             "subjects",
             "notes",
             json!("another"),
-            format!("subject {person} is known here with other content (notes differs)"),
+            format!("subject {person} exists here with different content (notes differs)"),
         ),
         (
             "devices",
             "created_at",
             json!("2020-01-01T00:00:00.000Z"),
-            "is known here with other content (created_at".to_owned(),
+            "exists here with different content (created_at".to_owned(),
         ),
     ] {
         let database = folder.path().join(format!("{table}.db"));

@@ -110,16 +110,16 @@ fn what_cannot_be_processed_is_refused_and_nothing_is_written() {
         (&["half.csv", column[0], column[1]][..], "half.csv, line 1502"),
         (&["word.csv", column[0], column[1]], "word.csv, line 1502, column 2"),
         (&["walk.csv", "--normal", "word.csv", column[0], column[1]], "word.csv, line 1502, column 2"),
-        (&["nowhere.csv", column[0], column[1]], "cannot read nowhere.csv"),
-        (&["walk.csv"], "two times or more"),
+        (&["nowhere.csv", column[0], column[1]], "Cannot read nowhere.csv"),
+        (&["walk.csv"], "at least two times"),
         (&["walk.csv", "--heel-strike-column", "toe"], "column \"toe\" is missing"),
         (&["walk.csv", "--heel-strikes-s", "0.4,99"], "heel strike (s) = 99"),
         (&["walk.csv", column[0], column[1], "--band-high-hz", "500"], "emg.band_high_hz = 500"),
         (&["walk.csv", column[0], column[1], "--order", "3"], "emg.order: unknown value \"3\""),
-        (&["walk.csv", column[0], column[1], "--channels", "TA"], "expected CHANNEL=COLUMN"),
+        (&["walk.csv", column[0], column[1], "--channels", "TA"], "write CHANNEL=COLUMN"),
         (&["walk.csv", column[0], column[1], "--channels", "XX=TA_L"], "RF_L, TA_L, BF_L"),
         (&["walk.csv", column[0], column[1], "--rate-hz", "NaN"], "rate_hz = NaN"),
-        (&["walk.csv", column[0], column[1], "--cycles", "walk.csv"], "is read by this command"),
+        (&["walk.csv", column[0], column[1], "--cycles", "walk.csv"], "is an input of this command"),
     ] {
         let output = emg(folder.path(), &[arguments, &["--envelopes", "e.csv"]].concat());
         let text = String::from_utf8_lossy(&output.stderr);

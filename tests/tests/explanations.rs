@@ -147,8 +147,8 @@ async fn what_has_no_solve_without_a_gait_is_not_explained() {
     assert_eq!(service.post(&format!("/api/v1/trials/{told}/tell"), &outcome).await.status, StatusCode::OK);
     service.wait_for(script, &[StudyState::Finished]).await;
     for (trial, reason) in [
-        (service.trials(study).await[0].id, "only a trial that did not converge is explained"),
-        (told, "a script evaluated trial 1"),
+        (service.trials(study).await[0].id, "Only a trial that did not converge can be explained"),
+        (told, "Trial 1 was evaluated by a script"),
     ] {
         let refused = ask(&service, trial).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{}", refused.text);

@@ -148,7 +148,7 @@ async fn the_form_for_a_study_takes_no_field_for_granted() {
         ("trial_budget", "-1", "allowed: 1 to 10000"),
         ("parallel_trials", "1.5", "allowed: 1 to 64"),
         ("seed", "-1", "allowed: 0 to 9007199254740991"),
-        ("basin_within_percent", "101", "within, %: \"101\" is not accepted; allowed: 0 to 100, or nothing"),
+        ("basin_within_percent", "101", "within, % is \"101\"; it must be 0 to 100, or nothing"),
         ("basin_within_percent", "all", "allowed: 0 to 100, or nothing"),
         ("subject", "paper-1", "a subject of the list"),
         ("pseudonym", "S09", "A new subject"),
@@ -180,7 +180,7 @@ async fn an_answer_is_taken_back_in_its_own_study_only() {
     let form = format!("saved={id}&author=K&reason=typo");
     for elsewhere in [UNKNOWN.to_owned(), other.to_string()] {
         let answer = service.post_text(&format!("/studies/{elsewhere}/retract"), FORM, &form).await;
-        is_page(&answer, StatusCode::NOT_FOUND, "does not exist");
+        is_page(&answer, StatusCode::NOT_FOUND, "There is no ");
     }
     let read = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
     assert_eq!(read["retraction"], json!(null), "nothing was taken back");
@@ -237,7 +237,7 @@ async fn a_second_answer_of_the_same_person_is_refused_until_the_first_is_retrac
     }
     let rest = json!({"trial_a": b, "trial_b": a, "answer": "no_difference", "author": "K"});
     let rest = service.post(&format!("/api/v1/studies/{study}/preferences"), &rest).await;
-    assert!(rest.status == StatusCode::CONFLICT && rest.text.contains("retract that answer first"), "{}", rest.text);
+    assert!(rest.status == StatusCode::CONFLICT && rest.text.contains("Retract that answer first"), "{}", rest.text);
     assert_eq!(service.feedback(study).await.len(), before + 1);
     let saved = first.headers["location"].to_str().unwrap().split("saved=").nth(1).unwrap().to_owned();
     let back = format!("saved={saved}&author=K&reason=slip");
@@ -418,8 +418,8 @@ async fn a_refused_new_study_says_which_field_in_its_own_words_and_opens_it() {
         format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
-        ("lengthscale_a1=-5", "lengthscale_a1", "Lengthscale of a1: -5.0 is not accepted; allowed: 0.05 to 50000"),
-        ("lengthscale_a3=0", "lengthscale_a3", "Lengthscale of a3: 0.0 is not accepted; allowed: 0.001 to 2000"),
+        ("lengthscale_a1=-5", "lengthscale_a1", "Lengthscale of a1 is -5.0; it must be 0.05 to 50000"),
+        ("lengthscale_a3=0", "lengthscale_a3", "Lengthscale of a3 is 0.0; it must be 0.001 to 2000"),
         ("values_a1=15,x", "values_a1", "Values of a1: "),
         ("trial_budget=many", "trial_budget", "Trials: "),
         ("seed=x", "seed", "Seed: "),

@@ -68,10 +68,10 @@ async fn subjects_are_made_listed_and_refused() {
     for (field, value, detail) in [
         ("height_m", json!(17.27), "[1.4, 2.2]"),
         ("body_mass_kg", json!(-1), "[35, 160]"),
-        ("pseudonym", json!("jane@example.org"), "no address"),
-        ("pseudonym", json!("1980-02-03"), "no date"),
+        ("pseudonym", json!("jane@example.org"), "not an address"),
+        ("pseudonym", json!("1980-02-03"), "a date"),
         ("pseudonym", json!(" "), "1 to 40"),
-        ("notes", json!("bell\u{7}"), "characters that print"),
+        ("notes", json!("bell\u{7}"), "printable characters"),
     ] {
         let answer = service.post("/api/v1/subjects", &with(field, value.clone())).await;
         is_problem(&answer, StatusCode::UNPROCESSABLE_ENTITY, invalid, detail);
@@ -79,9 +79,9 @@ async fn subjects_are_made_listed_and_refused() {
     }
     for (body, detail) in [
         (with("height_m", json!("tall")), "field height_m"),
-        (with("name", json!("Jane")), "field name is not known"),
+        (with("name", json!("Jane")), "field name is unknown"),
         (json!({"pseudonym": "S03"}), "field height_m is missing"),
-        (json!("a subject"), "the whole document is not an object with named fields"),
+        (json!("a subject"), "The document is not an object with named fields"),
         (json!(["S03", 1.7, 65]), "is not an object with named fields"),
     ] {
         is_problem(
@@ -117,7 +117,7 @@ async fn unknown_things_are_not_found() {
         "/api/v1/nothing".to_owned(),
     ] {
         let answer = service.fetch(&path).await;
-        is_problem(&answer, StatusCode::NOT_FOUND, "/problems/not-found", "does not exist");
+        is_problem(&answer, StatusCode::NOT_FOUND, "/problems/not-found", "There is no ");
     }
     for path in [format!("/studies/{unknown}"), format!("/trials/{unknown}"), "/nothing".to_owned()] {
         let answer = service.fetch(&path).await;
@@ -296,7 +296,7 @@ async fn a_study_is_paused_resumed_and_stopped_and_refuses_what_makes_no_sense()
     let nothing = json!({});
     assert_eq!(service.post(&act("pause"), &nothing).await.json()["state"], "paused");
     let twice = service.post(&act("pause"), &nothing).await;
-    is_problem(&twice, StatusCode::CONFLICT, "/problems/conflict", "possible from here: resume, stop");
+    is_problem(&twice, StatusCode::CONFLICT, "/problems/conflict", "Possible now: resume, stop");
     assert_eq!(service.post(&act("resume"), &nothing).await.json()["state"], "running");
     service.wait_for_trials(study, 2).await;
     assert_eq!(service.post(&act("stop"), &nothing).await.json()["state"], "stopped");

@@ -298,7 +298,7 @@ async fn a_session_is_planned_with_two_converged_gaits_of_its_study() {
     let path = format!("/api/v1/studies/{study}/lab-sessions");
     for (two, expected) in [
         (foreign, "a trial of this study"),
-        (no_gait, "only a converged gait can be walked with"),
+        (no_gait, "Only a converged gait can be walked"),
         (gaits[0].id, "another gait than gait_one"),
     ] {
         let refused = service.post(&path, &json!({"gait_one": gaits[0].id, "gait_two": two})).await;
@@ -401,7 +401,7 @@ async fn electromyograms_are_measured_by_normal_walking_and_can_be_processed_ane
         assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
     }
     let same = service.post(&bring, &with_heel(3, &electromyogram(1.5))).await;
-    assert!(same.status == StatusCode::CONFLICT && same.text.contains("brought as that of walk 2"), "{}", same.text);
+    assert!(same.status == StatusCode::CONFLICT && same.text.contains("already uploaded for walk 2"), "{}", same.text);
     let done = service.post(&format!("{api}/emg-results"), &json!({})).await;
     assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
     let walks = done.json()["result"]["walks"].as_array().unwrap().clone();
@@ -480,7 +480,7 @@ async fn a_file_that_is_not_whole_keeps_nothing_and_says_where() {
         (with_heel(1, &whole.replace("\n1.5,", "\n1.5,x")), "recording, line 1502, column 2"),
         (with_heel(1, &whole.replace("TA_L", "TA")), "column \\\"TA_L\\\" is missing"),
         (with_heel(4, &whole), "1, 2 or 3"),
-        (json!({"walk": 1, "recording": whole}), "two times or more, or heel_strike_column"),
+        (json!({"walk": 1, "recording": whole}), "at least two times, or absent if heel_strike_column"),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 0.2]}}), "none of the 1 strides"),
         (json!({"walk": 1, "recording": whole, "reading": {"heel_strikes_s": [0.1, 99.0]}}), "heel strike (s) = 99"),
         (json!({"walk": 1, "recording": whole, "reading": {"channels": {"XX": "TA_L"}}}), "RF_L, TA_L, BF_L"),

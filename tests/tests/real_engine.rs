@@ -81,7 +81,9 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     let unknown =
         cli::run(BINARY, folder, &[&["solve", "--warm", "many.json", "--warm-basin", "9"][..], &COARSE].concat());
     assert_eq!(unknown.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&unknown.stderr).contains("--warm-basin 9 is not in many.json; there are: 1, 2"));
+    assert!(
+        String::from_utf8_lossy(&unknown.stderr).contains("many.json has no basin 9 for --warm-basin. Basins: 1, 2")
+    );
 
     let actions = "a1,a2,a3,a4,a5,a6,a7,a8\n20,90,0.3,1.4,0.013,0.5,50,40\n20,90,0.3,1.4,0,0.5,5,5\n";
     std::fs::write(folder.join("actions.csv"), actions).unwrap();
@@ -157,7 +159,7 @@ fn a_gait_names_those_it_came_from() {
     assert_eq!(fresh["lineage"]["id"], first["lineage"]["id"]);
     let output = gaitwright(folder, &[&["solve", "--warm", "nothing.json"][..], &COARSE].concat());
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(text.contains("  started from       its own guesses: nothing converged from gait "), "{text}");
+    assert!(text.contains("  started from       initial guesses: the warm start from gait "), "{text}");
 }
 
 #[test]
@@ -192,7 +194,7 @@ fn the_figures_outlive_the_file() {
     std::fs::remove_dir_all(&place).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("cannot write place/gait.json"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("Cannot write place/gait.json"));
     assert!(json_of(&output)["status"].is_string());
 }
 
@@ -210,7 +212,7 @@ fn a_file_that_is_there_is_not_lost() {
     let onto_itself = [&["solve", "--warm", "gait.json", "--out", "link.json"][..], &COARSE].concat();
     let output = cli::run(BINARY, folder, &onto_itself);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("gait.json is read by this command"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("gait.json is an input of this command"));
 
     // A link is followed.
     std::fs::write(folder.join("target.json"), "old").unwrap();
@@ -316,11 +318,11 @@ async fn an_interrupted_study_goes_on_and_studies_of_another_kind_are_left_alone
     let output = child.wait_with_output().unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(130), "{text}");
-    assert!(text.contains("the same command goes on from there"), "{text}");
+    assert!(text.contains("run the same command again to continue"), "{text}");
     assert_eq!(json_of(&output)["state"], "running");
 
     let again = gaitwright(folder.path(), &arguments);
-    assert!(String::from_utf8_lossy(&again.stderr).contains("going on with study"));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("continuing study"));
     let summary = json_of(&again);
     assert_eq!((&summary["study_id"], &summary["state"]), (&json!(ours.unwrap()), &json!("finished")));
     let store = Store::open(&database).await.unwrap();
@@ -349,7 +351,7 @@ async fn a_failed_trial_is_told_by_the_exit_code() {
         cli::run(BINARY, folder.path(), &["tune", "--muscles", "off", "--trials", "2", "--workers", "1", "--json"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{text}");
-    assert!(text.contains("1 of 2 trials failed; the last, trial 1: ") && text.contains("panics"), "{text}");
+    assert!(text.contains("1 of 2 trials failed; the last one was trial 1: ") && text.contains("panics"), "{text}");
     assert_eq!((&json_of(&output)["study_id"], &json_of(&output)["state"]), (&json!(study), &json!("finished")));
 }
 

@@ -16,8 +16,8 @@ const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 fn nonsense_is_refused_before_anything_is_solved() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, expected) in [
-        (["reproduce", "--trials", "0"], "allowed is a whole number from 1 to 10000"),
-        (["reproduce", "--seeds", "101"], "allowed is a whole number from 1 to 100"),
+        (["reproduce", "--trials", "0"], "must be a whole number from 1 to 10000"),
+        (["reproduce", "--seeds", "101"], "must be a whole number from 1 to 100"),
         (["reproduce", "--subject", "3"], "possible values: 1, 2, both"),
     ] {
         let output = cli::run(BINARY, folder.path(), &arguments);
@@ -45,8 +45,9 @@ async fn trials_that_failed_are_told_and_end_with_a_code_of_their_own() {
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{text}");
     for variant in ["without", "with"] {
-        let told =
-            format!("gaitwright: subject 1, {variant} muscles, seed 1: 1 of 3 trials failed; the last, trial 2: ");
+        let told = format!(
+            "gaitwright: subject 1, {variant} muscles, seed 1: 1 of 3 trials failed; the last one was trial 2: "
+        );
         assert!(text.contains(&told), "{text}");
     }
     assert!(out.join("report.html").exists());

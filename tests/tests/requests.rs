@@ -104,9 +104,9 @@ async fn a_field_of_the_wrong_type_is_named_with_its_value_and_what_would_be_rea
     let subject = service.subject().await;
     for (path, body, field, value, allowed) in [
         ("studies", json!({"subject_id": subject, "trial_budget": "x"}), "trial_budget", json!("x"), "a whole number"),
-        ("studies", json!({"subject_id": subject, "seed": -1}), "seed", json!(-1), "a whole number, 0 or more"),
+        ("studies", json!({"subject_id": subject, "seed": -1}), "seed", json!(-1), "a whole number of at least 0"),
         ("studies", json!({"subject_id": subject, "muscles": 3}), "muscles", json!(3), "true or false"),
-        ("studies", json!({}), "subject_id", Value::Null, "it must be there"),
+        ("studies", json!({}), "subject_id", Value::Null, "present"),
         ("subjects", json!({"pseudonym": "S", "height_m": "1.7"}), "height_m", json!("1.7"), "a number"),
     ] {
         let refused = service.post(&format!("/api/v1/{path}"), &body).await;

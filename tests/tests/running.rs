@@ -98,7 +98,7 @@ async fn full_disk_is_answered_with_507_and_the_service_goes_on_when_there_is_ro
     let (number, answer) = refused.expect("the file grew");
     assert_eq!(answer.status, StatusCode::INSUFFICIENT_STORAGE, "{}", answer.text);
     assert_eq!(answer.json()["type"], "/problems/storage-full");
-    assert!(answer.text.contains("the change did not happen"), "{}", answer.text);
+    assert!(answer.text.contains("Nothing was changed"), "{}", answer.text);
     set(&service, "max_page_count = 1000000").await;
     assert_eq!(service.post("/api/v1/subjects", &subject(number)).await.status, StatusCode::CREATED);
     service.stop().await;
@@ -193,13 +193,13 @@ async fn studies_are_refused_and_answers_taken_when_space_runs_short() {
     service.store.set_reserve(u64::MAX);
     let answer = service.post("/api/v1/studies", &study).await;
     assert_eq!(answer.status, StatusCode::INSUFFICIENT_STORAGE, "{}", answer.text);
-    assert!(answer.text.contains("the disk is nearly full"), "{}", answer.text);
+    assert!(answer.text.contains("The disk is nearly full"), "{}", answer.text);
     let subject = json!({"pseudonym": "S1", "height_m": 1.7, "body_mass_kg": 70.0});
     assert_eq!(service.post("/api/v1/subjects", &subject).await.status, StatusCode::CREATED);
     let ready = service.fetch("/ready").await;
     assert!(ready.status == StatusCode::OK && ready.text.contains("nearly full"), "{}", ready.text);
     for page in ["/", "/studies/new", "/subjects", "/system", "/rate", "/help"] {
-        assert!(service.fetch(page).await.text.contains("the disk is nearly full"), "{page}");
+        assert!(service.fetch(page).await.text.contains("The disk is nearly full"), "{page}");
     }
     assert_eq!(service.fetch("/health").await.json()["status"], "short_of_space");
     service.store.set_reserve(0);

@@ -1,4 +1,5 @@
-//! What was called unsafe waits for somebody of the staff, who decides with a reason; what was said stays in the record.
+//! What was called unsafe waits for somebody of the staff, who decides with a reason; what was said stays in the
+//! record.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -106,13 +107,13 @@ async fn a_gait_that_staff_let_be_walked_with_again_is_recommended_again() {
     let best_id = best.as_str().unwrap();
     let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
-    assert!(for_the_device.text.contains("nobody walks with it"), "{}", for_the_device.text);
+    assert!(for_the_device.text.contains("It must not be walked until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["at"].clone();
     tokio::time::sleep(std::time::Duration::from_millis(2)).await;
     service.post(&remarks, &json!({"first": best, "second": other, "answer": "unsafe_first", "author": "K3"})).await;
     let late = decide(&service, best_id, &json!({"verdict": "walkable", "reason": "r", "said_until": seen})).await;
     assert_eq!(late.status, StatusCode::CONFLICT);
-    assert!(late.text.contains("called unsafe again, by K3"), "{}", late.text);
+    assert!(late.text.contains("reported as unsafe again, by K3"), "{}", late.text);
 
     // By the form, which sends what its page has shown.
     let page = service.fetch(&format!("/trials/{best_id}")).await.text;

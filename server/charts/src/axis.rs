@@ -1,4 +1,4 @@
-//! Axes: round ticks over a range.
+//! Axes of charts: a range with round ticks.
 
 use std::fmt::Display;
 
@@ -9,12 +9,12 @@ pub(super) struct Axis {
     pub(super) from: f64,
     /// Largest value shown.
     pub(super) to: f64,
-    /// Where the ticks are.
+    /// Values of the ticks.
     pub(super) ticks: Vec<f64>,
     decimals: usize,
 }
 
-/// A share of the distance between ticks that is too small to see.
+/// Fraction of the tick distance that is too small to see.
 const HAIR: f64 = 0.05;
 
 impl Axis {
@@ -33,7 +33,7 @@ impl Axis {
             (low, high) = (low - half, high + half);
         }
         let step = round_step((high - low) / count as f64);
-        // What is beyond a tick by a hair does not ask for another one.
+        // A value that is barely beyond a tick does not need another tick.
         let (first, last) = ((low / step + HAIR).floor(), (high / step - HAIR).ceil());
         let (from, to) = if exact { (low, high) } else { ((first * step).min(low), (last * step).max(high)) };
         let mut ticks = Vec::new();
@@ -41,7 +41,7 @@ impl Axis {
         while index <= last {
             let tick = index * step;
             if tick >= from - 1e-9 * step && tick <= to + 1e-9 * step {
-                // No tick is written as -0.
+                // Avoid a tick labelled -0.
                 ticks.push(if tick.abs() < step * 1e-9 { 0.0 } else { tick });
             }
             index += 1.0;
@@ -49,25 +49,25 @@ impl Axis {
         Self { from, to, ticks, decimals: decimals_of(step) }
     }
 
-    /// Drops the ticks between whole numbers.
+    /// Removes ticks between whole numbers.
     pub(super) fn keep_whole_ticks(&mut self) {
         self.ticks.retain(|tick| tick.fract() == 0.0);
         self.decimals = 0;
     }
 
-    /// Puts the ticks at these values, with as many decimals as tell them apart.
+    /// Sets the ticks to these values, with enough decimals to distinguish them.
     pub(super) fn set_ticks(&mut self, ticks: &[f64]) {
         let decimals = |tick: &f64| tick.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
         self.decimals = ticks.iter().map(decimals).max().unwrap_or(0).min(6);
         self.ticks = ticks.to_vec();
     }
 
-    /// Where a value lies between the ends, 0 to 1.
+    /// Position of a value between the ends, 0 to 1.
     pub(super) fn place(&self, value: f64) -> f64 {
         (value - self.from) / (self.to - self.from)
     }
 
-    /// A tick as text, all with the same decimals.
+    /// The text of a tick. All ticks have the same number of decimals.
     pub(super) fn text(&self, tick: f64) -> String {
         format!("{tick:.*}", self.decimals).replace('-', "\u{2212}")
     }
@@ -80,7 +80,7 @@ pub fn power_of_ten(exponent: impl Display) -> String {
         '1' => '¹',
         '2' => '²',
         '3' => '³',
-        // The others follow one another.
+        // The other superscripts are contiguous.
         digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
     };
     format!("10{}", exponent.to_string().chars().map(raised).collect::<String>())
@@ -102,7 +102,7 @@ fn round_step(raw: f64) -> f64 {
     round * power
 }
 
-/// Decimals that tell neighbouring ticks apart.
+/// Number of decimals that distinguishes neighbouring ticks.
 fn decimals_of(step: f64) -> usize {
     let mut decimals = 0;
     let mut scaled = step;
@@ -130,13 +130,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_a_hair_below_a_tick_asks_for_no_other_one() {
+    fn value_barely_below_a_tick_needs_no_further_tick() {
         let axis = Axis::over([-0.01, 1.02].into_iter(), 5, false);
         assert_eq!((axis.from, axis.to, axis.ticks[0]), (-0.01, 1.02, 0.0));
     }
 
     #[test]
-    fn powers_are_raised() {
+    fn powers_of_ten_have_superscripts() {
         assert_eq!([-12, 0, 3].map(power_of_ten), ["10⁻¹²", "10⁰", "10³"]);
     }
 
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_nonsense_make_an_axis_too() {
+    fn empty_and_non_finite_values_still_give_an_axis() {
         for values in [vec![], vec![f64::NAN], vec![3.0], vec![0.0, 0.0]] {
             let axis = Axis::over(values.into_iter(), 5, false);
             assert!(axis.from < axis.to && axis.ticks.len() >= 2, "{axis:?}");

@@ -1,9 +1,9 @@
-//! Line charts.
+//! Line charts as SVG.
 
 use super::axis::{Axis, power_of_ten};
 use std::fmt::Write;
 
-/// How a series is drawn. Lines differ by dash and not by colour alone.
+/// Style of a series. Lines differ by dash pattern, not by colour alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stroke {
     /// A line.
@@ -12,15 +12,15 @@ pub enum Stroke {
     Dashed,
     /// A dotted line.
     Dotted,
-    /// Dashes and dots in turn.
+    /// A line of alternating dashes and dots.
     DashDotted,
-    /// Long dashes.
+    /// A line of long dashes.
     LongDashed,
     /// Points only.
     Points,
-    /// A line that holds its value until the next point, with a mark at each.
+    /// A step line with a mark at each point.
     Steps,
-    /// The same, dashed.
+    /// A dashed step line with a mark at each point.
     DashedSteps,
     /// A line with a mark at each point.
     Marked,
@@ -29,9 +29,9 @@ pub enum Stroke {
 /// An area between two lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Band {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub label: String,
-    /// To the right, lower end, upper end.
+    /// x, lower y, upper y.
     pub points: Vec<(f64, f64, f64)>,
     /// Colour of the palette, 0 to 9.
     pub colour: usize,
@@ -40,24 +40,24 @@ pub struct Band {
 /// One line of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub label: String,
-    /// Its points; one that is not finite interrupts the line.
+    /// Points. A point that is not finite interrupts the line.
     pub points: Vec<(f64, f64)>,
     /// Colour of the palette, 0 to 9.
     pub colour: usize,
-    /// How it is drawn.
+    /// Style.
     pub stroke: Stroke,
 }
 
-/// A part of the x axis: from this phase line to the next.
+/// A named interval of the x axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
-    /// Where it begins.
+    /// Start.
     pub from: f64,
-    /// Where it ends.
+    /// End.
     pub to: f64,
-    /// Written above it, where there is room.
+    /// Name above the interval, if there is room.
     pub name: String,
     /// Whether it is shaded.
     pub shaded: bool,
@@ -66,43 +66,43 @@ pub struct Span {
 /// A chart of lines over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// What is to the right, with its unit.
+    /// Label of the x axis, with its unit.
     pub x_label: String,
-    /// What is up, with its unit.
+    /// Label of the y axis, with its unit.
     pub y_label: String,
     /// Areas behind the lines.
     pub bands: Vec<Band>,
     /// The lines.
     pub series: Vec<Series>,
-    /// Vertical lines where something begins: numbered above the axis, named in the legend.
+    /// Vertical lines, numbered above the chart and named in the legend.
     pub marks: Vec<(f64, String)>,
-    /// Parts of the x axis, with names above them.
+    /// Named intervals of the x axis.
     pub spans: Vec<Span>,
     /// Whether the x axis shows whole numbers only.
     pub whole_x: bool,
     /// Whether the y axis is logarithmic.
     pub log_y: bool,
-    /// The least range of the y axis, where charts are to be compared.
+    /// Minimum range of the y axis, for charts that are compared.
     pub y_range: Option<(f64, f64)>,
-    /// Where the ticks of the x axis are; empty: at round values.
+    /// Ticks of the x axis. Empty: round values.
     pub x_ticks: Vec<f64>,
 }
 
-/// Size of the drawing and of its margins, in its own units. The style sheet enlarges the text of a narrow drawing:
-/// the margins leave room for that.
+/// Size of the drawing and its margins. The margins leave room for the larger text that the style sheet sets in narrow
+/// drawings.
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 330.0;
 const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 60.0;
-/// What is kept free between the numbers of two marks.
+/// Least gap between the numbers of two marks.
 const MARK_GAP: f64 = 6.0;
-/// What a character of a name above the axis takes where the style sheet writes it largest.
+/// Width of a character of a name above the chart, at the largest text size.
 const NAME_CHARACTER: f64 = 16.0;
-/// What a logarithmic axis takes for nothing.
+/// Smallest value on a logarithmic axis.
 const SMALLEST: f64 = 1e-16;
 
 impl Chart {
@@ -145,7 +145,7 @@ impl Chart {
         let name = escape(&format!("{}: {} over {}", self.title, self.y_label, self.x_label));
         let body = self.body();
         let (x, y) = self.axes();
-        // Where the axes lie and what they go over, for whoever points at a line.
+        // Position and range of the axes, for the script that reads values under the pointer.
         let plot = format!(
             "data-right=\"{LEFT} {} {} {}\" data-up=\"{} {TOP} {} {}\" data-logarithmic=\"{}\"",
             WIDTH - RIGHT,
@@ -190,12 +190,12 @@ impl Chart {
         (x, y)
     }
 
-    /// Where a value stands on the y axis.
+    /// Position of a value on the y axis.
     fn height(&self, value: f64) -> f64 {
         if self.log_y { value.max(SMALLEST).log10() } else { value }
     }
 
-    /// The names of the lines that have a point to be seen, for a legend in HTML: class, label.
+    /// Class and label of each visible line, for a legend in HTML.
     pub fn legend(&self) -> Vec<(String, String)> {
         let seen = |s: &&Series| s.points.iter().any(|(x, y)| x.is_finite() && y.is_finite());
         let lines = self.series.iter().filter(seen);
@@ -242,7 +242,7 @@ impl Chart {
 }
 
 impl Chart {
-    /// Names would lie on the lines, which often begin where a mark is: in the drawing a mark has its number, above them.
+    /// Draws marks with numbers instead of names, because names would overlap the lines.
     fn draw_marks(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
         let bottom = HEIGHT - BOTTOM;
         let places: Vec<f64> = self.marks.iter().map(|(value, _)| px(*value)).collect();
@@ -274,7 +274,7 @@ impl Chart {
     }
 }
 
-/// The numbers of marks at these places: middle and text. Those that would touch are written as one, `2\u{2013}4`.
+/// Position and text of the numbers of marks. Numbers that would touch are merged, as in `2\u{2013}4`.
 fn numbers(places: &[f64]) -> Vec<(f64, String)> {
     let text = |from: usize, to: usize| {
         if from == to { format!("{}", from + 1) } else { format!("{}\u{2013}{}", from + 1, to + 1) }
@@ -284,7 +284,7 @@ fn numbers(places: &[f64]) -> Vec<(f64, String)> {
     let mut groups: Vec<(usize, usize)> = Vec::new();
     for mark in 0..places.len() {
         let mut group = (mark, mark);
-        // What became wider may touch the one before.
+        // A merged number is wider and may touch the previous one.
         while let Some(&(from, to)) = groups.last() {
             let free = middle(group.0, group.1) - half(group.0, group.1) - middle(from, to) - half(from, to);
             if free >= MARK_GAP {
@@ -299,7 +299,7 @@ fn numbers(places: &[f64]) -> Vec<(f64, String)> {
 }
 
 impl Stroke {
-    /// Dash patterns, so that the lines of a chart differ without colours; after five they repeat.
+    /// Dash patterns that distinguish lines without colours. They repeat after five.
     pub const APART: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
 
     fn class(self) -> &'static str {
@@ -364,7 +364,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_chart_is_one_element_and_text_cannot_leave_it() {
+    fn chart_is_one_element_and_escapes_text() {
         let chart = Chart::new("a<b>\"c\"", "x & y", "<script>")
             .with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)])
             .with("two", 1, Stroke::Steps, vec![(0.0, 2.0), (2.0, 1.0)]);
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chart_says_where_its_axes_lie() {
+    fn chart_has_position_and_range_of_its_axes() {
         let svg =
             Chart::new("", "time, s", "angle, °").with("one", 0, Stroke::Solid, vec![(2.0, 1.0), (4.0, 3.0)]).svg();
         for said in ["data-right=\"74 ", " 2 4\"", "data-logarithmic=\"false\"", "data-across=\"time, s\""] {
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn a_legend_names_what_is_seen() {
+    fn legend_names_visible_lines_only() {
         let chart = Chart::new("", "", "")
             .with("seen", 0, Stroke::Points, vec![(0.0, 1.0)])
             .with("empty", 1, Stroke::Steps, vec![])
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_is_numbered_in_the_drawing_and_named_in_the_legend() {
+    fn marks_are_numbered_in_the_chart_and_named_in_the_legend() {
         let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (9.0, 2.0)]);
         chart.marks = vec![(0.0, "tracking".to_owned()), (3.0, "cost".to_owned())];
         let svg = chart.svg();
@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn a_span_is_named_where_there_is_room() {
+    fn spans_are_named_if_there_is_room() {
         let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1.0), (100.0, 2.0)]);
         let span = |from, to, name: &str| Span { from, to, name: name.to_owned(), shaded: from == 0.0 };
         chart.spans = vec![span(0.0, 2.0, "DS2_R"), span(2.0, 30.0, "SS2_R")];
@@ -414,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn a_logarithmic_axis_has_powers_of_ten() {
+    fn logarithmic_axis_has_powers_of_ten() {
         let mut chart = Chart::new("", "", "").with("one", 0, Stroke::Solid, vec![(0.0, 1e-3), (1.0, 10.0)]);
         chart.log_y = true;
         let svg = chart.svg();
@@ -422,11 +422,11 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_near_marks_are_written_as_one_and_none_touch() {
+    fn numbers_of_near_marks_are_merged_and_never_touch() {
         let texts = |places: &[f64]| numbers(places).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
         assert_eq!(texts(&[74.0, 200.0, 300.0]), ["1", "2", "3"]);
         assert_eq!(texts(&[74.0, 76.0, 78.0, 300.0]), ["1\u{2013}3", "4"]);
-        // However near they are: what is written keeps its distance.
+        // Texts keep their distance however near the marks are.
         let many: Vec<f64> = (0..24).map(|i| 74.0 + 15.0 * f64::from(i) + f64::from(i * i % 7)).collect();
         let written = numbers(&many);
         let half = |text: &str| NAME_CHARACTER * text.chars().count() as f64 / 2.0;

@@ -1,26 +1,26 @@
-//! Tables as CSV: the one way in which the program writes such a file.
+//! CSV tables, safe for spreadsheets. No other module writes CSV.
 //!
-//! A spreadsheet takes a cell that begins with `=`, `+`, `-`, `@`, a tab or a line break for a formula. Text that does
-//! gets an apostrophe before it, which spreadsheets show as text. Numbers come in as numbers and stay as they are.
+//! A spreadsheet treats a cell that starts with `=`, `+`, `-`, `@`, a tab or a line break as a formula. Such text gets
+//! an apostrophe in front, which spreadsheets show as text. Numbers are not changed.
 
 use std::fmt::Write;
 
-/// Characters with which a formula begins, in their wide forms too.
+/// Characters that start a formula, including their full-width forms.
 const FORMULA: [char; 8] = ['=', '+', '-', '@', '\u{ff1d}', '\u{ff0b}', '\u{ff0d}', '\u{ff20}'];
 
-/// One cell, ready to be written.
+/// An escaped cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell(String);
 
 impl Cell {
-    /// A cell that holds nothing.
+    /// An empty cell.
     pub(crate) const EMPTY: Self = Self(String::new());
 
-    /// A text, which is no formula.
+    /// A text cell that is not a formula.
     fn text(text: &str) -> Self {
         let begins_formula = text.trim_start().starts_with(FORMULA) || text.starts_with(['\t', '\r', '\n']);
         let safe = if begins_formula { format!("'{text}") } else { text.to_owned() };
-        // Semicolons part cells where the comma is the decimal mark.
+        // Semicolons separate cells in locales with a decimal comma.
         if safe.contains([',', ';', '"', '\t', '\r', '\n']) {
             return Self(format!("\"{}\"", safe.replace('"', "\"\"")));
         }
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_is_no_formula_and_numbers_stay() {
+    fn text_is_never_a_formula_and_numbers_are_unchanged() {
         let mut table = CsvTable::new(["name", "value"]);
         for text in ["=HYPERLINK(\"http://x\";\"y\")", "+1+1", "-1", "@SUM(1)", "\tx", "\rx", " =1", "\u{ff1d}1"] {
             table.row(cells![text, -1.5_f64]);
@@ -120,7 +120,6 @@ mod tests {
         assert_eq!(table.into_text(), expected);
     }
 
-    /// Every other way to write CSV would be a way around the rule.
     #[test]
     fn no_other_module_writes_csv() {
         fn sources(folder: &std::path::Path, found: &mut Vec<std::path::PathBuf>) {

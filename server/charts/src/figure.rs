@@ -1,4 +1,4 @@
-//! A drawing that leaves the page: as SVG that needs nothing beside it, as PNG, as the numbers behind it.
+//! Figures for download: a drawing as self-contained SVG, as PNG, or its values as CSV.
 
 use super::chart::Chart;
 use super::gait_tiles;
@@ -11,51 +11,51 @@ use resvg::usvg::fontdb::Source;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Pixels of a PNG per unit of the drawing: 1280 across a chart.
+/// Pixels of a PNG per unit of the drawing, which gives 1280 for a chart.
 const SCALE: f32 = 2.0;
-/// No PNG has more pixels: of a large tree each unit gets fewer.
+/// Maximum number of pixels of a PNG. Large drawings get a smaller scale.
 const MOST_PIXELS: f32 = 1.2e7;
 
-/// A drawing with the name of its file.
+/// A drawing with a file name.
 #[derive(Debug, Clone)]
 pub struct Figure {
-    /// Name of the file without its ending: small letters, digits and hyphens.
+    /// File name without extension: lower-case letters, digits and hyphens.
     pub name: String,
-    /// What is drawn.
+    /// The drawing.
     pub drawing: Drawing,
 }
 
-/// What can be drawn.
+/// A kind of drawing.
 #[derive(Debug, Clone)]
 pub enum Drawing {
-    /// Lines over an axis.
+    /// A line chart.
     Chart(Chart),
-    /// A stride as a row of stick figures, under a title.
+    /// A stride as a row of stick figures, with a title.
     Tiles(String, Vec<StickFigure>),
-    /// A shaded table.
+    /// A heat map.
     Map(HeatMap),
     /// The warm-start tree.
     Tree(Tree),
 }
 
-/// Why there is no PNG.
+/// Why a PNG cannot be made.
 #[derive(Debug, Error)]
 pub enum PngError {
     /// The SVG cannot be read.
-    #[error("drawing a figure: {0}")]
+    #[error("Cannot draw a figure: {0}")]
     Svg(#[from] resvg::usvg::Error),
-    /// There are no pixels to draw on, or they cannot be written.
-    #[error("drawing a figure: {0}")]
+    /// The pixels cannot be allocated or encoded.
+    #[error("Cannot draw a figure: {0}")]
     Pixels(String),
 }
 
 impl Figure {
-    /// A chart; `group` tells charts of the same title apart.
+    /// A chart. `group` distinguishes charts with the same title.
     pub fn chart(group: &str, chart: Chart) -> Self {
         Self { name: file_name(group, &chart.title), drawing: Drawing::Chart(chart) }
     }
 
-    /// A shaded table; `group` tells maps of the same title apart.
+    /// A heat map. `group` distinguishes maps with the same title.
     pub fn map(group: &str, map: HeatMap) -> Self {
         Self { name: file_name(group, &map.title), drawing: Drawing::Map(map) }
     }
@@ -65,12 +65,12 @@ impl Figure {
         Self { name: file_name("", &tree.title), drawing: Drawing::Tree(tree) }
     }
 
-    /// The stride as a row of pictures.
+    /// The stride as a row of stick figures.
     pub fn tiles(title: &str, figures: Vec<StickFigure>) -> Self {
         Self { name: file_name("", title), drawing: Drawing::Tiles(title.to_owned(), figures) }
     }
 
-    /// What it shows.
+    /// The title.
     pub fn title(&self) -> &str {
         match &self.drawing {
             Drawing::Chart(chart) => &chart.title,
@@ -80,7 +80,7 @@ impl Figure {
         }
     }
 
-    /// As SVG with its own style, on white.
+    /// Self-contained SVG on a white background.
     pub fn svg(&self) -> String {
         match &self.drawing {
             Drawing::Chart(chart) => {
@@ -102,10 +102,10 @@ impl Figure {
         }
     }
 
-    /// As PNG. Text is set in DejaVu Sans, which the program carries: no font of the machine is used.
+    /// PNG, with text in the embedded font DejaVu Sans.
     ///
     /// # Errors
-    /// [`PngError`], for a fault of the program.
+    /// [`PngError`], which is a bug in the program.
     pub fn png(&self) -> Result<Vec<u8>, PngError> {
         let mut options = resvg::usvg::Options { font_family: "DejaVu Sans".to_owned(), ..Default::default() };
         options.fontdb_mut().load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
@@ -120,7 +120,7 @@ impl Figure {
         pixels.encode_png().map_err(|e| PngError::Pixels(e.to_string()))
     }
 
-    /// The numbers behind it: a row for each point of each line.
+    /// The values as CSV, with a row for each point of each line.
     pub fn csv(&self) -> String {
         let table = match &self.drawing {
             Drawing::Chart(chart) => chart_csv(chart),
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_stands_alone() {
+    fn figure_is_self_contained() {
         let svg = figure().svg();
         assert!(svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("fill=\"#ffffff\""));
         assert!(
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_stands_alone_and_gives_its_numbers() {
+    fn map_is_self_contained_and_has_csv() {
         let one = |value: f64| Cell { value, text: format!("{value:+.2}"), below: "± 0.10".to_owned(), framed: true };
         let map = HeatMap {
             title: "Utility".to_owned(),
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_tree_stands_alone_says_what_its_marks_mean_and_is_no_larger_than_a_png_may_be() {
+    fn large_tree_is_self_contained_with_a_legend_and_within_the_pixel_limit() {
         let node = |i: usize| Node {
             parent: i.checked_sub(1),
             label: format!("trial {}", i + 1),
@@ -257,12 +257,12 @@ mod tests {
     }
 
     #[test]
-    fn a_png_has_text_lines_and_a_white_ground() {
+    fn png_has_text_lines_and_a_white_background() {
         let png = figure().png().unwrap();
         let pixels = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
         let colour = |x, y| pixels.pixel(x, y).map(|p| (p.red(), p.green(), p.blue(), p.alpha()));
         assert_eq!(colour(1, 1), Some((255, 255, 255, 255)));
-        // The title stands alone above the drawing: what is not white there is text.
+        // Only the title is above the drawing, so dark pixels there are text.
         let dark = (0..pixels.width()).any(|x| (4..40).any(|y| colour(x, y).is_some_and(|(r, ..)| r < 100)));
         assert!(dark, "no title was drawn");
         let blue = |p: &resvg::tiny_skia::PremultipliedColorU8| (p.red(), p.green(), p.blue()) == (0x0a, 0x6f, 0x8a);
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn the_numbers_are_those_that_are_drawn() {
+    fn csv_has_the_drawn_values() {
         let expected = "line,\"cycle, %\",\"angle, °\"\nthis gait,0,1\nthis gait,2,3\ndeviation,0,0\ndeviation,0,2\n\
                         deviation,1,1\ndeviation,1,3\n";
         assert_eq!(figure().csv(), expected);

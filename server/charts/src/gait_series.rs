@@ -1,4 +1,4 @@
-//! A gait as one series of points over the stride, for tables and plots.
+//! A gait as one series of nodes over the stride, for tables and charts.
 
 use gait_optimizer::Gait;
 use gait_optimizer::gait::{Axis, FootPoint, Side};
@@ -19,7 +19,7 @@ pub const FORCE_NAMES: [&str; 8] = [
 pub const MUSCLES: [&str; 10] =
     ["HAM_L", "GLU_L", "HFL_L", "GAS_L", "VAS_L", "SOL_L", "TA_L", "HAM_R", "GLU_R", "HFL_R"];
 
-/// One node.
+/// A node of a gait.
 #[derive(Debug)]
 pub struct Point<'a> {
     /// Time since right heel strike, s.

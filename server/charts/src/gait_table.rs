@@ -1,4 +1,4 @@
-//! A gait as a table: one row per node.
+//! A gait as a CSV table with one row for each node.
 
 use crate::csv_table::{Cell, CsvTable, cells};
 use crate::gait_series::{FORCE_NAMES, MUSCLES, points};

@@ -1,23 +1,23 @@
-//! A stride as a row of stick figures: for paper, and for those who do not want things to move.
+//! A stride as a row of stick figures, in place of an animation.
 
 use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure};
 use std::fmt::Write;
 
-/// So many pictures of one stride.
+/// Number of stick figures of a stride.
 const TILES: usize = 9;
 const WIDTH: f64 = 104.0;
 const HEIGHT: f64 = 190.0;
 const GROUND: f64 = 164.0;
 /// Units of the drawing per metre.
 const SCALE: f64 = 86.0;
-/// The middle of the head, in trunks above the hip, and its radius, m: it is drawn, the model has none.
+/// Centre of the head, in trunk lengths above the hip, and its radius, m. The model has no head.
 const HEAD_AT: f64 = 1.18;
 const HEAD_M: f64 = 0.1;
 
 /// Width and height of the drawing.
 pub(super) const SIZE: (f64, f64) = (WIDTH * TILES as f64, HEIGHT);
 
-/// Figures at even times as one SVG element; each stands on its hip, with its percent of the cycle below.
+/// Figures at equal time steps as one SVG element. Each is centred on its hip, with the percentage of the cycle below.
 pub fn gait_tiles(figures: &[StickFigure]) -> String {
     let (width, body) = (SIZE.0, body(figures));
     let name = format!("The stride as {TILES} stick figures");

@@ -1,5 +1,5 @@
-//! A table of values over two quantities, shaded by value. Every cell says its value in figures: the shade helps to find
-//! a place and carries nothing alone.
+//! Heat maps: tables of values over two quantities, shaded by value. Every cell also has its value as text, so no
+//! information is in the shade alone.
 
 use super::chart::escape;
 use std::fmt::Write;
@@ -7,28 +7,28 @@ use std::fmt::Write;
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
-    /// What decides the shade.
+    /// Value that determines the shade.
     pub value: f64,
-    /// What is written in it.
+    /// Text of the cell.
     pub text: String,
-    /// What is written below that; may be empty.
+    /// Text below it; may be empty.
     pub below: String,
-    /// Whether it is framed.
+    /// Whether the cell has a frame.
     pub framed: bool,
 }
 
-/// A shaded table.
+/// A heat map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// What runs to the right, with its unit, and its levels.
+    /// Label of the columns, with its unit, and their values.
     pub columns: (String, Vec<f64>),
-    /// What runs downwards, with its unit, and its levels.
+    /// Label of the rows, with its unit, and their values.
     pub rows: (String, Vec<f64>),
-    /// For each row its cells.
+    /// Cells by row.
     pub cells: Vec<Vec<Cell>>,
-    /// The values of the lightest and of the darkest shade.
+    /// Values of the lightest and the darkest shade.
     pub range: (f64, f64),
 }
 
@@ -37,7 +37,7 @@ const LEFT: f64 = 74.0;
 const TOP: f64 = 34.0;
 const ROW: f64 = 52.0;
 const BOTTOM: f64 = 60.0;
-/// The darkest shade: text stays readable on it in light and in dark.
+/// The darkest shade, on which text is readable in the light and the dark scheme.
 const DARKEST: f64 = 0.5;
 
 impl HeatMap {
@@ -63,7 +63,7 @@ impl HeatMap {
         svg
     }
 
-    /// Where the cells end.
+    /// Bottom of the cells.
     fn bottom(&self) -> f64 {
         TOP + ROW * self.cells.len() as f64
     }
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_cell_says_its_value_and_equal_values_have_one_shade() {
+    fn cells_have_their_values_and_equal_values_share_a_shade() {
         let cell = |value: f64| Cell { value, text: format!("<{value}>"), below: String::new(), framed: value > 1.0 };
         let map = HeatMap {
             title: "t".to_owned(),

@@ -1,7 +1,7 @@
-//! Plots as SVG, drawn on the server: no script is needed to see them, and nothing comes from elsewhere.
+//! Charts as SVG, drawn on the server, without scripts and external resources.
 //!
-//! Colours, strokes and fonts are classes of the style sheet, so that one drawing serves light and dark. What leaves a
-//! page ([`Figure`]) takes its rules along.
+//! Colours, strokes and fonts are classes of the style sheet, so that one drawing fits the light and the dark scheme. A
+//! downloaded [`Figure`] contains the rules that it needs.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

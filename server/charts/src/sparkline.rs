@@ -1,4 +1,4 @@
-//! A line without axes, as large as a word.
+//! Sparklines: small lines without axes, within text.
 
 use super::axis::Axis;
 use std::fmt::Write;
@@ -7,7 +7,7 @@ const WIDTH: f64 = 96.0;
 const HEIGHT: f64 = 24.0;
 const MARGIN: f64 = 3.0;
 
-/// Values that hold until the next one, from 0 to `end`. No values make no line.
+/// A step line of values from 0 to `end`; `None` without values.
 pub fn sparkline(label: &str, points: &[(f64, f64)], end: f64) -> Option<String> {
     let (first, last) = (points.first()?, points.last()?);
     let x = Axis::over([first.0, end.max(last.0)].into_iter(), 2, true);
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_value_is_a_level_line_and_none_is_none() {
+    fn one_value_gives_a_level_line_and_no_value_none() {
         assert_eq!(sparkline("", &[], 5.0), None);
         let line = sparkline("a<b", &[(1.0, 0.3)], 5.0).unwrap_or_default();
         assert!(line.contains("a&lt;b") && !line.contains("NaN"), "{line}");

@@ -1,23 +1,23 @@
-//! What turns a drawing of a page into one that stands alone: size, white ground, title, legend, and the rules of the
-//! style sheet that concern drawings, in its light colours. One place has the colours: the style sheet.
+//! Makes a drawing self-contained: adds size, white background, title, legend, and the rules of the style sheet for
+//! drawings, in its light colours.
 
 use super::chart::escape;
 use std::collections::HashMap;
 use std::fmt::Write;
 
 const STYLE_SHEET: &str = include_str!("../../../web/static/gaitwright.css");
-/// Space above the drawing for its title, and to its left.
+/// Space above the drawing for the title, and to its left.
 const TITLE: f64 = 34.0;
 const MARGIN: f64 = 10.0;
-/// Height of a row of the legend, width of a key, and of a character as far as the legend needs to know it.
+/// Height of a row of the legend, width of a key, and estimated width of a character.
 const ROW: f64 = 22.0;
 const KEY: f64 = 34.0;
 const CHARACTER: f64 = 7.6;
 
-/// The drawing itself.
+/// The drawing.
 #[derive(Debug)]
 pub(super) struct Inside {
-    /// Class that the rules of the style sheet know it by.
+    /// Its class in the style sheet.
     pub(super) class: &'static str,
     /// Width and height.
     pub(super) size: (f64, f64),
@@ -25,7 +25,7 @@ pub(super) struct Inside {
     pub(super) body: String,
 }
 
-/// A whole SVG document.
+/// A complete SVG document.
 pub(super) fn svg(title: &str, inside: &Inside, legend: &[(String, String)]) -> String {
     let mut svg = String::with_capacity(inside.body.len() + 8 * 1024);
     // Writing to a String cannot fail.
@@ -45,14 +45,14 @@ fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, Strin
     )?;
     write!(svg, "<title>{0}</title><style>{1}</style>", escape(title), style())?;
     write!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/><g class=\"{}\">", inside.class)?;
-    // Before every rule: those of rows of pictures set text in the middle.
+    // Before the rules, because those of stick figures centre text.
     let heading =
         format!("text-anchor: start; font-size: 16px; fill: {}", light_values().get("--ink").unwrap_or(&"black"));
     write!(svg, "<text style=\"{heading}\" x=\"{MARGIN}\" y=\"23\">{}</text>", escape(title))?;
     write!(svg, "<g transform=\"translate({MARGIN} {TITLE})\">{}</g>", inside.body)?;
     for ((key, label), (x, row)) in legend.iter().zip(places) {
         let y = below + MARGIN + row * ROW;
-        // As in a page: `key c0 dashed`.
+        // As in pages: `key c0 dashed`.
         let class = key.trim_start_matches("key ");
         write!(svg, "<g transform=\"translate({x:.1} {y:.1})\">")?;
         if class.ends_with("points") {
@@ -69,7 +69,7 @@ fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, Strin
     write!(svg, "</g></svg>")
 }
 
-/// Where each entry of a legend begins, and in which row.
+/// Position of each entry of the legend.
 fn places(legend: &[(String, String)], width: f64) -> Vec<(f64, f64)> {
     let (mut x, mut row) = (MARGIN, 0.0);
     let place = |(_, label): &(String, String)| {
@@ -84,7 +84,7 @@ fn places(legend: &[(String, String)], width: f64) -> Vec<(f64, f64)> {
     legend.iter().map(place).collect()
 }
 
-/// The rules of drawings and colours, with the values of the light scheme in them.
+/// The style rules of drawings, with the colours of the light scheme.
 fn style() -> String {
     let values = light_values();
     let mut style = String::new();
@@ -98,7 +98,7 @@ fn style() -> String {
         }
         style.push('\n');
     }
-    // Renderers of SVG know the one spelling alone.
+    // SVG renderers accept only this spelling.
     style.replace("currentcolor", "currentColor")
 }
 
@@ -109,7 +109,7 @@ fn concerns_drawings(line: &str) -> bool {
     chart || line.starts_with(".chart.map ") || line.starts_with(".tiles ") || tree || palette
 }
 
-/// The first value of each name: those of the light scheme come first.
+/// The first value of each variable, which is that of the light scheme.
 fn light_values() -> HashMap<&'static str, &'static str> {
     let mut values = HashMap::new();
     for declaration in STYLE_SHEET.split([';', '{', '\n']) {
@@ -127,14 +127,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_style_has_the_light_colours_and_no_names() {
+    fn style_has_light_colours_and_no_variables() {
         let style = style();
         assert!(style.contains(".c0 { color: #0a6f8a; }") && style.contains(".chart .line { fill: none;"), "{style}");
         assert!(!style.contains("var(") && !style.contains("inherit") && !style.contains("#5cc3de"), "{style}");
     }
 
     #[test]
-    fn a_long_legend_goes_on_in_the_next_row() {
+    fn long_legend_wraps_to_the_next_row() {
         let label = "x".repeat(30);
         let legend: Vec<(String, String)> = (0..4).map(|_| ("key c0 solid".to_owned(), label.clone())).collect();
         let rows: Vec<f64> = places(&legend, 660.0).into_iter().map(|(_, row)| row).collect();

@@ -1,4 +1,4 @@
-//! A tree drawn from left to right: the warm-start tree.
+//! The warm-start tree, drawn from left to right.
 
 use super::chart::escape;
 use std::collections::BTreeSet;
@@ -7,36 +7,36 @@ use std::fmt::Write;
 /// One node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// Its place in the list of the one it grew out of: before its own.
+    /// Index of the parent, which is smaller than its own.
     pub parent: Option<usize>,
-    /// Its name.
+    /// Label.
     pub label: String,
-    /// Where it leads.
+    /// Link.
     pub link: String,
-    /// Class of its mark.
+    /// Class of the mark.
     pub class: &'static str,
 }
 
 const STEP: f64 = 96.0;
 const ROW: f64 = 26.0;
 const MARGIN: f64 = 18.0;
-/// From the middle of a mark to its name, and the width of a character of that, as far as a branch needs to know it.
+/// Distance from the centre of a mark to its label, and estimated width of a character.
 const LABEL: f64 = 10.0;
 const CHARACTER: f64 = 7.4;
-/// Width of what one mark means.
+/// Width of an entry of the legend.
 const LEGEND: f64 = 140.0;
 
 /// The warm-start tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree {
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// Parents before their children.
+    /// Nodes, parents before their children.
     pub nodes: Vec<Node>,
 }
 
 impl Tree {
-    /// As an SVG element for a page, whose nodes lead somewhere.
+    /// An SVG element for a page, with links.
     pub fn svg(&self) -> String {
         let (width, height) = self.size_of_nodes();
         let (title, mut svg) = (escape(&self.title), String::with_capacity(8 * 1024));
@@ -57,7 +57,7 @@ impl Tree {
         (width.max(MARGIN + LEGEND * self.classes().len() as f64), height + ROW)
     }
 
-    /// Its elements where nothing is beside it: no links, and below it what the marks mean.
+    /// The elements of a self-contained figure, with a legend instead of links.
     pub(super) fn body(&self) -> String {
         let mut svg = String::with_capacity(8 * 1024);
         // Writing to a String cannot fail.
@@ -70,7 +70,7 @@ impl Tree {
         svg
     }
 
-    /// The marks that are used.
+    /// The classes of marks in the tree.
     fn classes(&self) -> BTreeSet<&'static str> {
         self.nodes.iter().map(|node| node.class).collect()
     }
@@ -86,7 +86,7 @@ impl Tree {
         for (node, (x, y)) in self.nodes.iter().zip(&places) {
             let Some(parent) = node.parent else { continue };
             if let (Some((from_x, from_y)), Some(grown)) = (places.get(parent), self.nodes.get(parent)) {
-                // From the end of the parent's name, as far as there is room.
+                // Start at the end of the parent's label, if there is room.
                 let name = LABEL + CHARACTER * grown.label.chars().count() as f64;
                 let start = (from_x + name).min(x - LABEL);
                 let bend = f64::midpoint(start, *x);
@@ -111,7 +111,7 @@ fn mark(svg: &mut String, class: &str, label: &str, (x, y): (f64, f64)) -> std::
     write!(svg, "<text x=\"{}\" y=\"{}\">{}</text>", x + LABEL, y + 4.5, escape(label))
 }
 
-/// The first child continues the row of its parent, every other one begins a row below all that grew before.
+/// The positions of nodes. The first child continues the row of its parent; every other child starts a new row below.
 fn places(nodes: &[Node]) -> Vec<(f64, f64)> {
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     let mut open: Vec<usize> = Vec::new();
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_is_one_row_and_text_cannot_leave_it() {
+    fn chain_is_one_row_and_text_is_escaped() {
         let chain = nodes(&[None, Some(0), Some(1)]);
         assert_eq!(places(&chain).iter().map(|p| p.1).collect::<Vec<_>>(), [MARGIN; 3]);
         let chain = Tree { title: "\"".to_owned(), nodes: chain };

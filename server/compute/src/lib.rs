@@ -1,4 +1,4 @@
-//! Long computing: off the threads that answer requests, a bounded number at a time, never inside a connection.
+//! The thread pool for long computations, which must not run on request threads or while a database connection is held.
 //!
 //! Two types hold this. A function that computes for long takes an [`OnPool`], which only a thread of a [`Pool`] has.
 //! And `Store::compute` of the record borrows the store exclusively, while every connection borrows it shared: the
@@ -14,25 +14,25 @@ use std::sync::Arc;
 use thiserror::Error;
 use tokio::sync::{Semaphore, oneshot};
 
-/// Proof that the caller runs on a thread of a [`Pool`]: nothing else makes one.
+/// Proof that the caller runs on a thread of a [`Pool`]. Nothing else can create one.
 #[derive(Debug)]
 pub struct OnPool(());
 
-/// A long computation gave no answer.
+/// Why a computation gave no result.
 #[derive(Debug, Error)]
 pub enum ComputeError {
     /// It panicked.
-    #[error("a computation panicked")]
+    #[error("A computation panicked.")]
     Panicked,
-    /// There is no thread to be had.
-    #[error("no thread for a computation: {0}")]
+    /// No thread can be started.
+    #[error("Cannot start a thread for a computation: {0}.")]
     NoThread(#[from] std::io::Error),
     /// The service is shutting down.
-    #[error("a computation was not begun: the service is shutting down")]
+    #[error("The computation was not started because the service is shutting down.")]
     Closed,
 }
 
-/// Runs at most so many long computations at a time; others wait without holding a thread.
+/// Runs a limited number of long computations in parallel. Others wait without a thread.
 #[derive(Debug, Clone)]
 pub struct Pool {
     places: Arc<Semaphore>,
@@ -40,7 +40,7 @@ pub struct Pool {
 }
 
 impl Default for Pool {
-    /// One computation for each core, and two at least; they give way to the threads that answer.
+    /// One computation for each core, at least two, at lower priority than requests.
     fn default() -> Self {
         let size = std::thread::available_parallelism().map_or(2, |cores| cores.get().max(2));
         Self { stands_back: true, ..Self::new(size) }
@@ -48,15 +48,16 @@ impl Default for Pool {
 }
 
 impl Pool {
-    /// A pool of so many threads; at least one.
+    /// A pool of `size` threads (at least one).
     pub fn new(size: usize) -> Self {
         Self { places: Arc::new(Semaphore::new(size.max(1))), stands_back: false }
     }
 
-    /// Computes when a thread is free. Work that began goes on when the caller goes away, and keeps its place until it ends.
+    /// Computes as soon as a thread is free. Work that has started continues, and keeps its slot, even if the caller
+    /// goes away.
     ///
     /// # Errors
-    /// [`ComputeError`] when the work panics or the process ends.
+    /// [`ComputeError`] if the work panics or the process ends.
     pub async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce(&OnPool) -> T + Send + 'static,
@@ -69,7 +70,7 @@ impl Pool {
             if stands_back {
                 stand_back(COMPUTING);
             }
-            // Nobody listens any more where the caller went away.
+            // Fails only if the caller went away.
             let _ = tell.send(work(&OnPool(())));
         };
         std::thread::Builder::new().name("compute".to_owned()).stack_size(STACK_BYTES).spawn(work)?;
@@ -84,7 +85,7 @@ mod tests {
     use std::time::Duration;
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn no_more_computations_run_at_a_time_than_the_pool_has_threads() {
+    async fn pool_never_runs_more_computations_than_threads() {
         let pool = Pool::new(2);
         let (running, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
         let all = (0..8).map(|_| {
@@ -105,7 +106,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_panic_is_an_error_and_gives_its_thread_back() {
+    async fn panic_becomes_an_error_and_frees_the_thread() {
         let pool = Pool::new(1);
         assert!(matches!(pool.run(|_| panic!("as asked")).await, Err::<(), _>(ComputeError::Panicked)));
         assert_eq!(pool.run(|_| 1).await.unwrap(), 1);

@@ -1,4 +1,4 @@
-//! Threads that give way to others.
+//! Priorities of threads: requests before computations, solves, and certification.
 
 use std::io;
 use tokio::sync::oneshot;
@@ -16,14 +16,14 @@ pub const STACK_BYTES: usize = 16 << 20;
 pub fn stand_back(niceness: i32) {
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::setpriority_process(None, niceness) {
-        tracing::debug!(%error, niceness, "a thread keeps its priority");
+        tracing::debug!(%error, niceness, "cannot lower the priority of a thread");
     }
     #[cfg(not(target_os = "linux"))]
     let _ = niceness;
 }
 
-/// Does some work on a thread of its own that gives way to every solve. A panic is not reported; nobody waits for the
-/// thread when the receiver is dropped.
+/// Runs work on its own thread with lower priority than solves. A panic drops the sender. Dropping the receiver
+/// abandons the thread.
 ///
 /// # Errors
 /// When there is no thread to be had.
@@ -34,7 +34,7 @@ pub fn behind_solves<T: Send + 'static>(
     let (tell, told) = oneshot::channel();
     let work = move || {
         stand_back(AFTERWARDS);
-        // Nobody listens any more when the process is shutting down.
+        // Fails only if the receiver was dropped.
         let _ = tell.send(work());
     };
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES).spawn(work)?;

@@ -1,8 +1,8 @@
-//! The access log: who saw or exported data of subjects, and who was refused.
+//! The layer that writes the access log: views and exports of subjects' data, and refusals.
 //!
-//! Every route is logged that is not listed as one without data of subjects, so a new route is, too. Rows of views are
-//! gathered and written within a second, repeated ones once a minute with their number; an export is written before it is
-//! given out.
+//! It logs every route that is not listed as one without data of subjects, so a new route is logged by default. Views
+//! are collected and written within a second, and repeated views once a minute with their number. An export is written
+//! before the response is sent.
 
 use super::AppState;
 use super::client_address::ClientAddress;
@@ -54,31 +54,31 @@ pub const NO_SUBJECT_DATA: [&str; 28] = [
     "/api/v1/devices/{id}",
 ];
 
-/// Routes that give data out when they are posted to.
+/// POST routes that export data.
 const EXPORTS_BY_POST: [&str; 2] = ["/system/backup", "/api/v1/backups"];
 
-/// Parts of routes that stand for a secret.
+/// Path parameters that are secrets.
 const SECRETS: [&str; 2] = ["{token}", "{link}"];
 
-/// Rows are written at least this often.
+/// Longest time until a row is written.
 const WITHIN: Duration = Duration::from_secs(1);
-/// Repetitions of a request are one row in so long.
+/// Time within which repeated requests share a row.
 const REPEATED_WITHIN: Duration = Duration::from_mins(1);
-/// Rows written in one transaction: others wait for the writer no longer than these take.
+/// Number of rows per transaction, so that others do not wait long for the writer.
 const AT_ONCE: usize = 50;
-/// Rows that wait to be written; beyond, refusals of strangers are counted together.
+/// Number of unwritten rows beyond which refusals of unknown callers share a row.
 const MOST_WAITING: usize = 1000;
-/// Longest address that is kept.
+/// Maximum length of a logged address.
 const LONGEST_OBJECT: usize = 300;
 
-/// What is to be written.
+/// The rows that are not written yet.
 #[derive(Debug, Default)]
 pub struct AccessLog(Mutex<Waiting>);
 
 #[derive(Debug, Default)]
 struct Waiting {
     rows: HashMap<Access, Tally>,
-    /// When a row that may be repeated was written.
+    /// When each row was last written.
     written: HashMap<Access, Instant>,
     /// A task will write what waits.
     scheduled: bool,
@@ -86,7 +86,7 @@ struct Waiting {
 
 impl AccessLog {
     fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // What waits is whole between any two statements that hold the lock.
+        // The rows are consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -104,7 +104,7 @@ impl AccessLog {
         !std::mem::replace(&mut waiting.scheduled, true)
     }
 
-    /// The rows that are due; all of them, or those that were not written within the last minute.
+    /// Takes the rows that are due: all, or those that were not written within the last minute.
     fn due(&self, all: bool) -> Vec<(Access, Tally)> {
         let mut waiting = self.waiting();
         let Waiting { rows, written, .. } = &mut *waiting;
@@ -114,7 +114,7 @@ impl AccessLog {
         due
     }
 
-    /// Puts back what could not be written.
+    /// Puts back rows that could not be written.
     fn put_back(&self, rows: &[(Access, Tally)]) {
         let mut waiting = self.waiting();
         for (access, tally) in rows {
@@ -124,10 +124,10 @@ impl AccessLog {
         }
     }
 
-    /// Writes what is due, and what commands noted beside the record.
+    /// Writes the rows that are due, and those that commands noted next to the record.
     ///
     /// # Errors
-    /// What the database reports; nothing is lost then.
+    /// Errors of the database. No row is lost then.
     pub async fn write(&self, store: &Store, all: bool) -> Result<(), Error> {
         let due = self.due(all);
         for (done, rows) in due.chunks(AT_ONCE).enumerate() {
@@ -168,10 +168,10 @@ async fn keep_writing(app: AppState) {
     }
 }
 
-/// Drops rows that are older than so many days, and again every hour.
+/// Deletes rows older than `days` days, every hour.
 ///
 /// # Errors
-/// None: what fails is logged.
+/// None: failures are logged.
 pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Error> {
     const ROWS: u32 = 500;
     loop {
@@ -185,13 +185,13 @@ pub async fn keep_pruning(store: Store, days: u32, task: Task) -> Result<(), Err
         match pruned.await {
             Ok(rows) if rows >= u64::from(ROWS) => continue,
             Ok(_) => {}
-            Err(error) => tracing::warn!(%error, "the access log cannot be pruned"),
+            Err(error) => tracing::warn!(%error, "cannot prune the access log"),
         }
         tokio::time::sleep(Duration::from_hours(1)).await;
     }
 }
 
-/// Says who was answered.
+/// Adds the caller to the response, for [`note`].
 pub(super) async fn say_caller(request: Request, next: Next) -> Response {
     let caller = request.extensions().get::<Caller>().cloned();
     let mut answer = next.run(request).await;
@@ -201,7 +201,7 @@ pub(super) async fn say_caller(request: Request, next: Next) -> Response {
     answer
 }
 
-/// Notes what an answer shows, gives out or refuses. An export is given out only when its row is durable.
+/// Logs what a response shows, exports or refuses. An export is sent only after its row is durable.
 pub(super) async fn note(
     State(app): State<AppState>,
     parameters: Result<RawPathParams, axum::extract::rejection::RawPathParamsRejection>,
@@ -237,7 +237,7 @@ pub(super) async fn note(
     Ok(answer)
 }
 
-/// What an answer means; `None`: it shows nothing of a subject, or what it did is in the audit trail.
+/// The kind of access; `None` if the response has no data of a subject, or the audit trail has the entry.
 fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Option<Kind> {
     let status = answer.status();
     let signing_in = route.starts_with("/sign-in") && *method == Method::POST;
@@ -262,7 +262,7 @@ fn kind_of(route: &str, method: &Method, answer: &Response, known: bool) -> Opti
     Some(if file { Kind::Export } else { Kind::View })
 }
 
-/// The address that was asked for, cut to a length; the route in its place where a part of it is a secret.
+/// The requested address, truncated; the route instead if the address contains a secret.
 fn object(route: &str, path: &str, query: Option<&str>) -> String {
     if SECRETS.iter().any(|secret| route.contains(secret)) {
         return route.to_owned();

@@ -1,4 +1,5 @@
-//! What holds for every answer: it names its request, and one that is no success is a problem document or its page.
+//! The outermost layer: gives each request an identifier, and turns every failure into a problem document or an error
+//! page.
 
 use super::identify::AnsweredTo;
 use super::pages::error::{is_for_programs, shown};
@@ -14,8 +15,8 @@ use uuid::Uuid;
 
 static REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// Gives a request its identifier, for its log lines and its answer, and sees to it that whatever refuses or fails below,
-/// be it a time-out or a panic, is answered with a problem document.
+/// Gives a request its identifier, for log lines and the response, and answers every failure below, time-outs and
+/// panics included, with a problem document.
 pub(super) async fn complete(request: Request, next: Next) -> Response {
     let id = Uuid::now_v7().simple().to_string();
     let span = span_of(&request, &id);
@@ -27,15 +28,15 @@ pub(super) async fn complete(request: Request, next: Next) -> Response {
     answer
 }
 
-/// What log lines say of their request: its route and not its address, which holds the secret of a sign-in link or the
-/// token of a blind pair.
+/// The log span of a request. It has the route instead of the address, which may contain a sign-in secret or the token
+/// of a blind pair.
 fn span_of(request: &Request, id: &str) -> tracing::Span {
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str);
-    // Of the level of errors, so that no filter takes the identifier away from a line that it lets through.
+    // At error level, so that no filter removes the identifier from a log line.
     tracing::error_span!("request", id, method = %request.method(), route)
 }
 
-/// The answer; where it is a refusal or failure, with a problem document that has the identifier of the request.
+/// Adds a problem document with the request identifier to a failure.
 fn with_problem(mut answer: Response, id: &str, for_programs: bool) -> Response {
     let problem = match answer.extensions_mut().remove::<Problem>() {
         Some(problem) => problem,
@@ -48,12 +49,12 @@ fn with_problem(mut answer: Response, id: &str, for_programs: bool) -> Response 
     let (parts, body) = new.into_parts();
     *answer.body_mut() = body;
     answer.headers_mut().remove(header::CONTENT_LENGTH);
-    // What the refusal said beside its body, such as Allow or Retry-After, stays.
+    // Keep headers of the failure, such as Allow or Retry-After.
     answer.headers_mut().extend(parts.headers);
     answer
 }
 
-/// A success, or a form or figure that shows by itself why it was refused.
+/// Whether the response is a success, or a page or document that already shows the failure.
 fn speaks_for_itself(answer: &Response) -> bool {
     let status = answer.status();
     if !status.is_client_error() && !status.is_server_error() {
@@ -63,7 +64,7 @@ fn speaks_for_itself(answer: &Response) -> bool {
     [&b"text/html"[..], b"application/json"].iter().any(|known| kind.starts_with(known))
 }
 
-/// The answer to a request whose handler panicked.
+/// The response after a handler panicked.
 #[allow(clippy::needless_pass_by_value)] // as the layer calls it
 pub(super) fn after_panic(panic: Box<dyn Any + Send>) -> Response {
     let reason = panic
@@ -72,6 +73,6 @@ pub(super) fn after_panic(panic: Box<dyn Any + Send>) -> Response {
         .or_else(|| panic.downcast_ref::<&str>().copied())
         .unwrap_or("unknown");
     tracing::error!(reason, "a handler panicked");
-    let detail = "the failure was logged; look at the present state before you try again";
+    let detail = "The service failed and logged the error. Check the current state before you try again.";
     Problem::new(Kind::Internal, detail.to_owned()).into_response()
 }

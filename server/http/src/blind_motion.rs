@@ -1,5 +1,5 @@
-//! The motion of a gait as a rater sees it: every motion has as many figures, evenly over one stride, begins at the same
-//! place but at another instant of the stride in each pair, and says nothing of where it is from.
+//! Motions for raters, without anything that identifies a gait: a fixed number of figures over one stride, from the
+//! same position, starting at another phase in each pair.
 
 use gait_optimizer::Gait;
 use gait_optimizer::walking::stick_figure::{LegPoints, StickFigure, stick_figures};
@@ -7,31 +7,31 @@ use gaitwright_service::error::Error;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-/// Figures of one stride; the last one is the first of the next.
+/// Number of figures of a stride. The last one is the first of the next stride.
 const FIGURES: usize = 101;
 
 /// One figure: hip, shoulder, and knee, ankle, heel, toe of the left and the right leg; forward and up, m.
 #[derive(Debug, Serialize)]
 pub(crate) struct Figure([[f64; 2]; 10]);
 
-/// Where in the stride a pair begins, as a share of it: both of its motions, so that they can be compared in step. It differs
-/// from pair to pair, so that no motion has the bytes of an earlier one. Who looks at what moves can still know a gait again.
+/// The phase at which both motions of a pair start, as a fraction of the stride. It differs between pairs, so that no
+/// motion has the same bytes as an earlier one. A rater may still recognise a gait by its movement.
 pub(crate) fn phase(token: &str) -> f64 {
     let digest = Sha256::digest(token.as_bytes());
     let number = digest.iter().take(6).fold(0_u64, |number, byte| (number << 8) | u64::from(*byte));
     number as f64 / (1_u64 << 48) as f64
 }
 
-/// A gait as a rater sees it.
+/// The motion of a gait for a rater.
 pub(crate) fn blind_motion(gait: &Gait, phase: f64) -> Result<Vec<Figure>, Error> {
     Ok(blind_stride(gait, phase)?.iter().map(Figure::of).collect())
 }
 
-/// The same, for a drawing.
+/// The same, as stick figures.
 pub(crate) fn blind_stride(gait: &Gait, phase: f64) -> Result<Vec<StickFigure>, Error> {
     let figures = stick_figures(gait)?;
     let (Some(first), Some(last)) = (figures.first(), figures.last()) else {
-        return Err(Error::Internal("a gait without any point".to_owned()));
+        return Err(Error::Internal("a gait without any node".to_owned()));
     };
     let (stride_s, stride_m) = (last.time_s - first.time_s, last.hip[0] - first.hip[0]);
     let origin = between(&figures, first.time_s + stride_s * phase).hip[0];
@@ -57,7 +57,7 @@ pub(crate) fn blind_stride(gait: &Gait, phase: f64) -> Result<Vec<StickFigure>, 
     Ok((0..FIGURES).map(at).collect())
 }
 
-/// The figure at a time, between two of them.
+/// Interpolates the figure at a time.
 fn between(figures: &[StickFigure], time: f64) -> StickFigure {
     let after = figures.iter().position(|figure| figure.time_s >= time).unwrap_or(figures.len() - 1);
     let (a, b) = (&figures[after.saturating_sub(1)], &figures[after]);
@@ -86,7 +86,7 @@ impl Figure {
     }
 }
 
-/// More digits would be a fingerprint.
+/// Rounds to millimetres, because more digits would identify a gait.
 fn millimetres(metres: f64) -> f64 {
     (metres * 1000.0).round() / 1000.0
 }

@@ -1,4 +1,4 @@
-//! The address of the client. One function says it; sign-in limits, sessions and logs all ask here.
+//! The client address of a request, for sign-in limits, sessions and logs.
 
 use super::{AppState, forwarded};
 use crate::problem::Refusal;
@@ -11,7 +11,7 @@ use std::convert::Infallible;
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// A browser that was here through TLS comes through TLS for a year.
+/// Tells browsers to use TLS for a year.
 const ONLY_SECURELY: HeaderValue = HeaderValue::from_static("max-age=31536000");
 
 /// The address that a request comes from.
@@ -19,7 +19,7 @@ const ONLY_SECURELY: HeaderValue = HeaderValue::from_static("max-age=31536000");
 pub struct ClientAddress(IpAddr);
 
 impl ClientAddress {
-    /// An address; an IPv4 address that is written as IPv6 is the same client.
+    /// A client address. An IPv4-mapped IPv6 address equals its IPv4 address.
     pub fn new(address: IpAddr) -> Self {
         Self(address.to_canonical())
     }
@@ -29,8 +29,7 @@ impl ClientAddress {
         self.0
     }
 
-    /// The network that one client controls: an IPv4 address, or the /64 of an IPv6 address, in which a client takes a
-    /// new address whenever it wants.
+    /// The network that one client controls: an IPv4 address, or the /64 network of an IPv6 address.
     pub fn network(self) -> String {
         match self.0 {
             IpAddr::V4(address) => address.to_string(),
@@ -48,12 +47,12 @@ impl fmt::Display for ClientAddress {
     }
 }
 
-/// Whether the browser reaches the service through TLS, its own or that of a trusted proxy.
+/// Whether the browser uses TLS, with the service or a trusted proxy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Secure(pub(crate) bool);
 
 impl Secure {
-    /// The scheme of addresses that the browser can follow.
+    /// The scheme of the service's addresses for the browser.
     pub(crate) fn scheme(self) -> &'static str {
         if self.0 { "https" } else { "http" }
     }
@@ -67,7 +66,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Secure {
     }
 }
 
-/// The peer of the connection. A request without a connection (a test) comes from 0.0.0.0.
+/// The peer of the connection; 0.0.0.0 for a request without a connection, as in tests.
 fn client_address(extensions: &Extensions) -> ClientAddress {
     let peer = extensions.get::<ConnectInfo<SocketAddr>>().map(|ConnectInfo(peer)| peer.ip());
     ClientAddress::new(peer.unwrap_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED)))
@@ -81,7 +80,7 @@ pub(super) async fn note(State(app): State<AppState>, mut request: Request, next
     let believed = app.proxies.believe(peer.ip(), request.headers())?;
     let secure = Secure(believed.secure.unwrap_or(app.access.secure));
     forwarded::remove(request.headers_mut());
-    // With two Host headers, the request is refused as it is.
+    // A request with two Host headers is refused later.
     if let Some(host) = believed.host
         && request.headers().get_all(header::HOST).iter().count() < 2
     {

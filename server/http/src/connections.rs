@@ -1,5 +1,5 @@
-//! Connections: how many are held, in total and for one address, so that descriptors are left for the record and for
-//! whoever else calls. Above a limit the connection that has been quiet longest gives way to the new one.
+//! Limits open connections, in total and per address, so that file descriptors remain for the record and for other
+//! clients. Above a limit, a new connection replaces the one that has been idle longest.
 
 use super::client_address::ClientAddress;
 use super::forwarded::Proxies;
@@ -18,28 +18,28 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 
-/// A connection gives way only after so long without a byte.
+/// Idle time after which a connection can be replaced.
 const QUIET: Duration = Duration::from_millis(250);
-/// So often a full service looks for a connection that has become quiet.
+/// Interval of the search for an idle connection while the service is full.
 const LOOK: Duration = Duration::from_millis(50);
-/// The log says at most this often that a limit bites.
+/// Least time between two log lines about a limit.
 const SAY_EVERY: Duration = Duration::from_secs(10);
-/// Descriptors that are left for the record, its log, copies and files.
+/// File descriptors reserved for the record, backups and files.
 const RESERVED: u64 = 128;
-/// As many descriptors as the process asks for, if it may have them.
+/// File descriptors that the process requests.
 const WANTED: u64 = 65_536;
 
-/// How many connections are held.
+/// Limits of open connections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// In total.
     pub total: usize,
-    /// Of one address, or of one /64 network of IPv6; trusted proxies have no such limit.
+    /// Per IPv4 address or /64 network of IPv6. Trusted proxies are exempt.
     pub per_address: usize,
 }
 
 impl Limits {
-    /// These limits, as far as the descriptors of the process allow; it takes as many of them as it may have.
+    /// Raises the descriptor limit of the process, and lowers these limits to what it allows.
     #[must_use]
     pub fn within_descriptors(self) -> Self {
         let descriptors = descriptors();
@@ -53,7 +53,7 @@ fn descriptors() -> u64 {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
     let present = getrlimit(Resource::Nofile);
     let wanted = present.maximum.unwrap_or(WANTED).min(WANTED).max(present.current.unwrap_or(WANTED));
-    // Whoever may not raise the limit lives with it.
+    // If the limit cannot be raised, the current one applies.
     let _ = setrlimit(Resource::Nofile, Rlimit { current: Some(wanted), maximum: present.maximum });
     getrlimit(Resource::Nofile).current.unwrap_or(WANTED)
 }
@@ -63,7 +63,7 @@ fn descriptors() -> u64 {
     2 * RESERVED
 }
 
-/// Whoever is at the other end of a connection.
+/// The remote end of a connection.
 #[derive(Debug, Clone)]
 pub struct Peer(SocketAddr);
 
@@ -78,7 +78,7 @@ impl Connected<Peer> for SocketAddr {
     }
 }
 
-/// A listener that holds no more connections than its limits say.
+/// A listener that enforces the limits.
 #[derive(Debug)]
 pub struct LimitedListener {
     listener: TcpListener,
@@ -87,10 +87,10 @@ pub struct LimitedListener {
 }
 
 impl LimitedListener {
-    /// Over a listener that does not block.
+    /// Wraps a non-blocking listener.
     ///
     /// # Errors
-    /// When the runtime cannot listen.
+    /// If the runtime cannot use the listener.
     pub fn new(listener: std::net::TcpListener, limits: Limits, proxies: Proxies) -> io::Result<Self> {
         let connections = Arc::new(Connections::new(limits));
         Ok(Self { listener: TcpListener::from_std(listener)?, connections, proxies })
@@ -120,11 +120,11 @@ impl AddrListener<Held, Peer> for LimitedListener {
     }
 }
 
-/// The connections that are held.
+/// The open connections.
 #[derive(Debug)]
 struct Connections {
     limits: Limits,
-    /// A permit goes with a descriptor: it comes back when the connection is really closed.
+    /// Permits for descriptors. A connection returns its permit when it is closed.
     room: Arc<Semaphore>,
     begun: Instant,
     held: Mutex<Table>,
@@ -135,21 +135,21 @@ struct Table {
     next: u64,
     by_number: HashMap<u64, Arc<Connection>>,
     by_network: HashMap<String, usize>,
-    /// Not logged yet: connections closed, connections refused.
+    /// Closed and refused connections that are not logged yet.
     untold: (u64, u64),
     told_at: Option<Instant>,
 }
 
-/// What is known of one connection.
+/// The state of a connection.
 #[derive(Debug)]
 struct Connection {
-    /// Of whom; `None`: of a trusted proxy.
+    /// Network of the client; `None` for a trusted proxy.
     network: Option<String>,
-    /// Milliseconds after the service began, of the last byte in either direction.
+    /// Time of the last byte in either direction, in milliseconds since the start.
     active_at: AtomicU64,
-    /// It has said something.
+    /// Whether the client has sent a byte.
     heard: AtomicBool,
-    /// It has to go.
+    /// Cancelled when the connection must close.
     closing: CancellationToken,
 }
 
@@ -160,7 +160,7 @@ impl Connections {
     }
 
     fn table(&self) -> MutexGuard<'_, Table> {
-        // The table is whole between any two statements that hold the lock.
+        // The table is consistent between statements, so a poisoned lock is usable.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -168,7 +168,7 @@ impl Connections {
         u64::try_from(self.begun.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// Holds a connection; `None`: its address has as many as it may, and all of them are busy.
+    /// Accepts a connection; `None` if its address is at its limit and all its connections are busy.
     async fn hold(self: &Arc<Self>, stream: TcpStream, network: Option<String>) -> Option<Held> {
         if !self.make_room_for(network.as_deref()) {
             return None;
@@ -185,7 +185,8 @@ impl Connections {
         Some(Held { stream, closed, number, connection, connections: Arc::clone(self), _permit: permit })
     }
 
-    /// Whether one more connection of a network may be held, be it in place of its quietest one.
+    /// Makes room for a connection of a network, if necessary by closing its longest idle one. Returns whether there is
+    /// room.
     fn make_room_for(&self, network: Option<&str>) -> bool {
         let Some(network) = network else { return true };
         let mut table = self.table();
@@ -198,7 +199,7 @@ impl Connections {
         made
     }
 
-    /// Room for one descriptor more.
+    /// Waits for a permit.
     async fn permit(&self) -> Option<OwnedSemaphorePermit> {
         loop {
             if let Ok(permit) = Arc::clone(&self.room).try_acquire_owned() {
@@ -217,7 +218,7 @@ impl Connections {
         self.tell(&mut table);
     }
 
-    /// Closes the connection that has been quiet longest among some; those that never said anything come first.
+    /// Closes the longest idle connection among some. Connections that never sent a byte come first.
     fn close_quietest(&self, table: &mut Table, among: impl Fn(&Connection) -> bool) -> bool {
         let now = self.milliseconds();
         let quiet_since = |connection: &Connection| connection.active_at.load(Ordering::Relaxed);
@@ -242,7 +243,7 @@ impl Connections {
         }
         let Limits { total, per_address } = self.limits;
         let held = table.by_number.len();
-        tracing::warn!(held, closed, refused, total, per_address, "too many connections: quiet ones are closed");
+        tracing::warn!(held, closed, refused, total, per_address, "too many connections; closing idle ones");
         (table.untold, table.told_at) = ((0, 0), Some(Instant::now()));
     }
 }
@@ -269,7 +270,7 @@ impl Table {
     }
 }
 
-/// A connection that is counted for as long as it is open.
+/// An open connection that counts towards the limits.
 #[derive(Debug)]
 pub struct Held {
     stream: TcpStream,
@@ -290,7 +291,7 @@ impl Drop for Held {
     fn drop(&mut self) {
         let mut table = self.connections.table();
         table.by_number.remove(&self.number);
-        // Whatever was told to close left the count of its network then.
+        // A connection that was told to close no longer counts for its network.
         if !self.connection.closing.is_cancelled() {
             table.leave(self.connection.network.as_deref());
         }

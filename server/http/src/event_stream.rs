@@ -1,8 +1,8 @@
-//! Event streams: the one way to answer with what goes on after the request was answered.
+//! Server-sent event streams, whose listeners are authorised again while the stream runs.
 //!
-//! Whoever listens is asked for again while the stream runs: before an event is sent, and every second when none is. A
-//! stream ends when its session or token has ended, when its user was disabled, lost the right or reaches the study no
-//! more, and when the subject of the study withdrew consent.
+//! Each stream checks its listener before every event, and every second without events. It ends when the session or
+//! token expires, when the user is disabled or loses the right or the access to the study, and when the subject
+//! withdraws consent.
 
 use super::AppState;
 use super::identify::Credential;
@@ -22,16 +22,16 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-/// How often a silent stream asks whether its listener still may listen.
+/// Interval of checks while there are no events.
 const ASKS_EVERY: Duration = Duration::from_secs(1);
-/// Events that follow each other within this time are sent after one question.
+/// Time for which a check is valid.
 const HOLDS_FOR: Duration = Duration::from_millis(100);
-/// Events that wait for a slow listener.
+/// Length of the queue for a slow listener.
 const AHEAD: usize = 16;
-/// A proxy closes what is silent for long.
+/// Interval of keep-alive comments, because proxies close silent connections.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-/// Whoever listens to a study, with the right `P`: in place of [`Shown`] in a handler that streams.
+/// A listener to a study with the right `P`. Handlers of streams take it instead of [`Shown`].
 pub(crate) struct Listening<P> {
     app: AppState,
     credential: Credential,
@@ -57,7 +57,7 @@ impl<P: Permission> Listening<P> {
         self.study
     }
 
-    /// Answers with the events that `produce` sends, as long as the listener may listen.
+    /// Responds with the events that `produce` sends, as long as the listener is authorised.
     pub(crate) fn stream<F>(self, produce: impl FnOnce(Sender<P>) -> F) -> Response
     where
         F: Future<Output = Result<(), Gone>> + Send + 'static,
@@ -70,7 +70,7 @@ impl<P: Permission> Listening<P> {
             tokio::select! {
                 () = stopping.cancelled() => {}
                 () = self.until_gone() => {}
-                // Ends when the listener goes away, which is the normal end.
+                // The normal end: the listener went away.
                 _ = produced => {}
             }
         });
@@ -85,7 +85,7 @@ impl<P: Permission> Listening<P> {
     async fn until_gone(&self) {
         let mut pulse = self.app.scheduler.pulse();
         loop {
-            // Either there was a change of the record, or a session may have ended by itself.
+            // Wakes on a change of the record, or after the interval, because sessions expire without a change.
             let _ = tokio::time::timeout(ASKS_EVERY, pulse.changed()).await;
             if !self.may_listen().await {
                 return;
@@ -93,7 +93,7 @@ impl<P: Permission> Listening<P> {
         }
     }
 
-    /// Whether the listener still has the right and the study may still be shown. When that cannot be found out, not.
+    /// Whether the listener still has the right and the study may be shown. An error counts as no.
     async fn may_listen(&self) -> bool {
         let Ok(Some(caller)) = self.credential.caller(&self.app).await else { return false };
         let Ok(mut reader) = self.app.read().await else { return false };
@@ -103,14 +103,14 @@ impl<P: Permission> Listening<P> {
     }
 }
 
-/// The listener went away, or may not listen any more.
+/// The listener went away, or lost its authorisation.
 pub(crate) struct Gone;
 
 /// Sends events to a listener.
 pub(crate) struct Sender<P> {
     listening: Listening<P>,
     events: mpsc::Sender<Event>,
-    /// When the listener was last found to be allowed to listen.
+    /// Time of the last successful check.
     asked: Option<Instant>,
 }
 

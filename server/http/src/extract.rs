@@ -1,4 +1,4 @@
-//! Extractors whose refusals are problem documents.
+//! Extractors for JSON bodies, query strings and forms, whose errors are problem documents.
 
 use super::{BODY_LIMIT_BYTES, RECORDING_LIMIT_BYTES};
 use crate::problem::Refusal;
@@ -9,28 +9,28 @@ use gaitwright_service::document;
 use gaitwright_service::error::Error;
 use serde::de::DeserializeOwned;
 
-/// Reads a JSON body, naming the field that cannot be read.
+/// Reads a JSON body. Errors name the field.
 pub(crate) fn body<T: DeserializeOwned>(headers: &HeaderMap, bytes: &[u8]) -> Result<T, Error> {
-    // No body is an empty document: what may be left out, may all be left out.
+    // An absent body counts as an empty document.
     let absent = bytes.is_empty();
     let bytes = if absent { b"{}" } else { bytes };
     let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("");
     if !absent && !kind.split(';').next().is_some_and(|kind| kind.trim().eq_ignore_ascii_case("application/json")) {
-        return Err(Error::UnsupportedMediaType(format!("content type {kind:?}: this needs application/json")));
+        return Err(Error::UnsupportedMediaType(format!("The Content-Type is {kind:?}; it must be application/json.")));
     }
     document::read(bytes)
 }
 
-/// A body that could not be taken in.
+/// The error for a body that cannot be received.
 pub(crate) fn unreadable(status: StatusCode, reason: &str) -> Error {
     if status == StatusCode::PAYLOAD_TOO_LARGE {
         Error::TooLarge(format!(
-            "the body is larger than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} where a recording is uploaded)"
+            "The body has more than {BODY_LIMIT_BYTES} bytes ({RECORDING_LIMIT_BYTES} for uploads of measurement files)."
         ))
     } else if status == StatusCode::UNSUPPORTED_MEDIA_TYPE {
         Error::UnsupportedMediaType(reason.to_owned())
     } else {
-        Error::Malformed(format!("the body cannot be read: {reason}"))
+        Error::Malformed(format!("The body cannot be read: {reason}"))
     }
 }
 

@@ -1,7 +1,7 @@
-//! What a reverse proxy says of the request that it forwards: who sent it, by which scheme, to which host.
+//! Headers of reverse proxies: client address, scheme and host of a forwarded request.
 //!
-//! It is believed from the networks that the administrator names, and in the one kind of header that the administrator
-//! names: a proxy replaces the header that it knows and passes the other kind on as the client wrote it.
+//! They are trusted only from the configured networks, and only in the configured kind of header. A proxy overwrites
+//! the kind that it knows, but passes the other kind on as the client wrote it.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use gaitwright_service::error::Error;
@@ -13,7 +13,7 @@ const FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 const PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
 const HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
 
-/// An address, or all addresses that begin with the same bits.
+/// An address, or a network in CIDR notation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Network {
     address: IpAddr,
@@ -36,8 +36,8 @@ impl Network {
     }
 }
 
-/// What is accepted as a [`Network`].
-pub const NETWORKS: &str = "addresses and networks such as 127.0.0.1, 10.1.0.0/16, fd00::/8; commas between";
+/// The accepted texts of a [`Network`].
+pub const NETWORKS: &str = "comma-separated addresses and networks such as 127.0.0.1, 10.1.0.0/16, fd00::/8";
 
 impl FromStr for Network {
     type Err = &'static str;
@@ -51,7 +51,7 @@ impl FromStr for Network {
     }
 }
 
-/// Which headers the proxies write.
+/// The kind of headers that the proxies write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ProxyHeaders {
     /// `X-Forwarded-For`, `-Proto` and `-Host`.
@@ -61,25 +61,25 @@ pub enum ProxyHeaders {
     Forwarded,
 }
 
-/// The reverse proxies that are believed.
+/// The trusted reverse proxies.
 #[derive(Debug, Clone, Default)]
 pub struct Proxies {
     trusted: Arc<[Network]>,
     headers: ProxyHeaders,
 }
 
-/// What is believed of a request.
+/// The origin of a request according to trusted proxies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Believed {
-    /// Who sent it.
+    /// Address of the client.
     pub(super) client: IpAddr,
-    /// Whether it came through TLS; `None`: the proxy does not say.
+    /// Whether the client used TLS; `None` if the proxy does not say.
     pub(super) secure: Option<bool>,
-    /// The host that it was sent to; `None`: the proxy does not say.
+    /// The requested host; `None` if the proxy does not say.
     pub(super) host: Option<HeaderValue>,
 }
 
-/// One step of the way of a request, as a proxy wrote it down: the peer it heard from, the scheme and host it was asked by.
+/// One hop of a request, as a proxy recorded it: peer, scheme and host.
 #[derive(Debug, Default, Clone)]
 struct Hop {
     from: Option<String>,
@@ -88,25 +88,25 @@ struct Hop {
 }
 
 impl Proxies {
-    /// Proxies in these networks, which write these headers.
+    /// Trusts proxies in these networks, which write this kind of headers.
     pub fn new(trusted: &[Network], headers: ProxyHeaders) -> Self {
         Self { trusted: trusted.into(), headers }
     }
 
-    /// Whether there are any.
+    /// Whether any proxy is trusted.
     pub fn are_any(&self) -> bool {
         !self.trusted.is_empty()
     }
 
-    /// Whether an address is that of a proxy.
+    /// Whether an address is that of a trusted proxy.
     pub fn trust(&self, address: IpAddr) -> bool {
         self.trusted.iter().any(|network| network.holds(address))
     }
 
-    /// What is believed of a request that came from `peer`.
+    /// The origin of a request that came from `peer`.
     ///
     /// # Errors
-    /// [`Error::Malformed`] when a trusted proxy sends what cannot be read.
+    /// [`Error::Malformed`] if the headers of a trusted proxy are malformed.
     pub(super) fn believe(&self, peer: IpAddr, headers: &HeaderMap) -> Result<Believed, Error> {
         let mut believed = Believed { client: peer.to_canonical(), secure: None, host: None };
         if !self.trust(peer) {
@@ -116,7 +116,7 @@ impl Proxies {
             ProxyHeaders::XForwarded => x_forwarded(headers)?,
             ProxyHeaders::Forwarded => forwarded(headers)?,
         };
-        // The nearest proxy wrote the last hop. Each hop that came from another trusted proxy makes the one before count.
+        // The nearest proxy wrote the last hop. A hop from another trusted proxy makes the hop before it valid.
         for hop in hops.iter().rev() {
             if !self.trust(believed.client) {
                 break;
@@ -142,7 +142,7 @@ impl Proxies {
     }
 }
 
-/// Takes away what proxies write: nothing behind this module reads it.
+/// Removes the headers of proxies, so that no later code reads them.
 pub(super) fn remove(headers: &mut HeaderMap) {
     for name in [FOR, PROTO, HOST, header::FORWARDED] {
         headers.remove(name);
@@ -150,10 +150,10 @@ pub(super) fn remove(headers: &mut HeaderMap) {
 }
 
 fn unreadable(what: &str, value: &str) -> Error {
-    Error::Malformed(format!("the header of the proxy cannot be read: {what} is {value:?}"))
+    Error::Malformed(format!("A header of the reverse proxy is malformed: {what} is {value:?}."))
 }
 
-/// The parts of all lines of a header, commas between them.
+/// The comma-separated parts of all lines of a header.
 fn parts(headers: &HeaderMap, name: &HeaderName) -> Result<Vec<String>, Error> {
     let mut parts = Vec::new();
     for line in headers.get_all(name) {
@@ -163,8 +163,8 @@ fn parts(headers: &HeaderMap, name: &HeaderName) -> Result<Vec<String>, Error> {
     Ok(parts)
 }
 
-/// The hops of `X-Forwarded-*`. Schemes and hosts belong to the hops one by one if there are as many of them; otherwise the
-/// nearest proxy wrote the last one.
+/// The hops of `X-Forwarded-*`. Schemes and hosts match the hops one by one if their numbers are equal. Otherwise only
+/// the last one counts, which the nearest proxy wrote.
 fn x_forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
     let (from, protos, hosts) = (parts(headers, &FOR)?, parts(headers, &PROTO)?, parts(headers, &HOST)?);
     let hops = from.len().max(1);
@@ -199,7 +199,7 @@ fn forwarded(headers: &HeaderMap) -> Result<Vec<Hop>, Error> {
     Ok(hops)
 }
 
-/// Splits where the separator is not in quotes.
+/// Splits at separators outside quotes.
 fn split(text: &str, separator: char) -> Vec<&str> {
     let mut quoted = false;
     text.split(|c| {
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn networks_hold_their_addresses_and_no_others() {
+    fn networks_contain_their_addresses_and_no_others() {
         let network = |text: &str| text.parse::<Network>();
         for (text, inside, outside) in [
             ("10.1.0.0/16", "10.1.255.7", "10.2.0.1"),
@@ -262,14 +262,14 @@ mod tests {
         let x = ProxyHeaders::XForwarded;
         assert_eq!(believed("127.0.0.1", x, &lines), ("192.0.2.9".into(), Some(true), "gait.example".into()));
         assert_eq!(believed("192.0.2.7", x, &lines), ("192.0.2.7".into(), None, String::new()));
-        // The other kind of header is what the client wrote.
+        // The client wrote the other kind of header.
         assert_eq!(believed("127.0.0.1", ProxyHeaders::Forwarded, &lines), ("127.0.0.1".into(), None, String::new()));
         let other = [("forwarded", "for=192.0.2.9;proto=https")];
         assert_eq!(believed("127.0.0.1", x, &other), ("127.0.0.1".into(), None, String::new()));
     }
 
     #[test]
-    fn a_client_cannot_put_hops_before_its_own() {
+    fn clients_cannot_forge_hops() {
         let x = ProxyHeaders::XForwarded;
         let forged = [
             ("x-forwarded-for", "127.0.0.1, 10.1.0.9"),
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_trusted_proxy_garbles_is_refused() {
+    fn malformed_headers_of_trusted_proxies_are_refused() {
         for lines in [[("x-forwarded-for", "somebody")], [("x-forwarded-proto", "gopher")]] {
             let refused = proxies(ProxyHeaders::XForwarded).believe("127.0.0.1".parse().unwrap(), &headers(&lines));
             assert!(refused.is_err(), "{lines:?}");

@@ -1,7 +1,7 @@
-//! The names that the service answers to.
+//! Checks the Host header, against DNS rebinding.
 //!
-//! A page of another site whose name suddenly means this machine (DNS rebinding) is of the same origin for a browser;
-//! only the name in the request tells it apart.
+//! A page of another site whose name is made to resolve to this machine has the same origin for a browser. Only the
+//! name in the request reveals it.
 
 use crate::problem::Refusal;
 use axum::extract::{Request, State};
@@ -12,7 +12,7 @@ use gaitwright_service::error::Error;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 
-/// The names that the service answers to.
+/// The host names of the service.
 #[derive(Debug, Clone)]
 pub struct Hosts {
     listen: IpAddr,
@@ -20,13 +20,13 @@ pub struct Hosts {
 }
 
 impl Hosts {
-    /// The address that is listened to, and names that point at it.
+    /// The listening address, and names that resolve to it.
     pub fn new(listen: SocketAddr, names: &[String]) -> Self {
         Self { listen: listen.ip(), names: names.iter().map(|name| name.to_ascii_lowercase()).collect() }
     }
 
-    /// Whether a Host header (`name`, `name:port`, `[v6]:port`) means this service. The port does not matter: it may be
-    /// mapped.
+    /// Whether a Host header (`name`, `name:port`, `[v6]:port`) names this service. The port is ignored, because it may
+    /// be mapped.
     fn answers_to(&self, host: &str) -> bool {
         if let Some(address) = address_in(host) {
             let here = self.listen.is_loopback() && address.is_loopback();
@@ -53,21 +53,23 @@ pub(super) async fn check(State(hosts): State<Hosts>, request: Request, next: Ne
     }
 }
 
-/// The one name in a request. HTTP/1.1 demands exactly one Host header: with two, or with another name in the request
-/// line, a proxy and this service could mean different ones. HTTP/1.0 knows requests without a name.
+/// The host of a request. HTTP/1.1 requires exactly one Host header: with two, or with another host in the request
+/// line, a proxy and this service could choose different ones. HTTP/1.0 allows requests without a host.
 fn named(request: &Request) -> Result<Option<&str>, Error> {
-    let malformed = |reason: &str| Err(Error::Malformed(format!("Host header: {reason}")));
+    let malformed = |reason: &str| Err(Error::Malformed(format!("The Host header {reason}.")));
     let mut all = request.headers().get_all(header::HOST).iter();
     let (first, second) = (all.next(), all.next());
     if second.is_some() {
-        return malformed("given more than once; exactly one is accepted");
+        return malformed("occurs more than once");
     }
     let Some(first) = first else {
-        return if request.version() < Version::HTTP_11 { Ok(None) } else { malformed("it must be there") };
+        return if request.version() < Version::HTTP_11 { Ok(None) } else { malformed("is missing") };
     };
-    let Ok(host) = first.to_str() else { return malformed("it has characters that no name has") };
+    let Ok(host) = first.to_str() else { return malformed("contains characters that no host name has") };
     match request.uri().authority() {
-        Some(other) if !other.as_str().eq_ignore_ascii_case(host) => malformed("the request line names another host"),
+        Some(other) if !other.as_str().eq_ignore_ascii_case(host) => {
+            malformed("differs from the host in the request line")
+        }
         _ => Ok(Some(host)),
     }
 }
@@ -77,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_service_answers_to_its_address_to_localhost_and_to_names_it_was_given() {
+    fn service_accepts_its_address_localhost_and_configured_names() {
         let hosts = |listen: &str| Hosts::new(listen.parse().unwrap(), &["Gait.Clinic.example".to_owned()]);
         let here = hosts("127.0.0.1:8080");
         for host in ["127.0.0.1:8080", "127.0.0.1", "localhost:9999", "LOCALHOST", "[::1]:8080", "gait.clinic.example"]

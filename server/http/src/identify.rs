@@ -1,4 +1,4 @@
-//! Finds out who makes a request, once, before any handler: a token, a session, or nobody.
+//! Authentication: finds the caller of a request from its token or session cookie, before any handler.
 
 use super::AppState;
 use crate::problem::Refusal;
@@ -14,12 +14,12 @@ use gaitwright_store::{Instant, commit};
 /// Name of the session cookie.
 const COOKIE: &str = "gaitwright_session";
 
-/// Name of the cookie that stays when a session ends. It lets nobody in: back-off tells by it a browser in which a user
-/// has signed in before from others in the same network.
+/// Name of the cookie that outlives a session. It grants no access: the sign-in back-off uses it to recognise a browser
+/// in which the user signed in earlier.
 const BROWSER: &str = "gaitwright_browser";
 const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
 
-/// Whose answer this is, for the pages that errors become.
+/// The role of the caller, for error pages.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AnsweredTo(pub(super) Option<Role>);
 
@@ -53,7 +53,7 @@ async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Optio
     }
     match credential.recognise(app).await? {
         (Recognised::Known { caller, seen }, now) => {
-            // What a page asks for by itself keeps nobody signed in.
+            // Automatic requests of a page do not keep a session alive.
             if let Some(session) = seen.filter(|_| !path.ends_with("/live") && !path.ends_with("/events")) {
                 let mut writer = app.write().await?;
                 sign_in::seen(&mut writer, session, now).await?;
@@ -69,12 +69,14 @@ async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Optio
         (Recognised::Nobody, _) => {}
     }
     match credential {
-        Credential::Token(_) => Err(Error::NotSignedIn("this token is unknown, has ended or was revoked".to_owned())),
+        Credential::Token(_) => Err(Error::NotSignedIn(
+            "The token is unknown, expired or revoked. Ask an administrator for a new one.".to_owned(),
+        )),
         Credential::Session(_) | Credential::None => Ok(app.access.open.then(Caller::without_sign_in)),
     }
 }
 
-/// What a request says of who sends it.
+/// The credential of a request.
 #[derive(Clone)]
 pub(super) enum Credential {
     Token(String),
@@ -90,7 +92,7 @@ impl Credential {
         Ok(session_of(headers).map_or(Self::None, |session| Self::Session(session.to_owned())))
     }
 
-    /// Whose it is, and at what instant that was decided. Writes nothing.
+    /// Looks up the credential. Returns the result and the time of the decision, and writes nothing.
     async fn recognise(&self, app: &AppState) -> Result<(Recognised, Instant), Error> {
         let mut reader = app.read().await?;
         let now = app.access.clock.now(&mut reader).await?;
@@ -102,7 +104,7 @@ impl Credential {
         Ok((found, now))
     }
 
-    /// Who it still is, for what goes on after its request was answered.
+    /// Looks up the caller again, for streams that outlive their request.
     pub(super) async fn caller(&self, app: &AppState) -> Result<Option<Caller>, Error> {
         Ok(match self.recognise(app).await?.0 {
             Recognised::Known { caller, .. } => Some(caller),
@@ -119,7 +121,7 @@ fn bearer(headers: &HeaderMap) -> Result<Option<&str>, Error> {
     let token = value.to_str().ok().and_then(|text| text.split_once(' '));
     match token {
         Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => Ok(Some(token.trim())),
-        _ => Err(Error::NotSignedIn("Authorization: a bearer token is expected".to_owned())),
+        _ => Err(Error::NotSignedIn("The Authorization header must be Bearer TOKEN.".to_owned())),
     }
 }
 
@@ -128,7 +130,7 @@ pub(super) fn session_of(headers: &HeaderMap) -> Option<&str> {
     cookie_in(headers, COOKIE)
 }
 
-/// The secret that stays in a browser in which somebody has signed in.
+/// The secret that identifies a browser after sign-out.
 pub(super) fn browser_of(headers: &HeaderMap) -> Option<&str> {
     cookie_in(headers, BROWSER)
 }
@@ -139,7 +141,8 @@ fn cookie_in<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
     pairs.find_map(|(name, value)| (name == wanted && !value.is_empty()).then_some(value))
 }
 
-/// The header that gives a browser its session, or takes it away. Scripts cannot read it, other sites cannot use it.
+/// The Set-Cookie header that sets or clears the session. Scripts cannot read the cookie, and other sites cannot use
+/// it.
 pub(super) fn cookie(session: Option<&str>, secure: bool) -> Result<HeaderValue, Error> {
     let secure = if secure { "; Secure" } else { "" };
     let text = match session {
@@ -149,7 +152,7 @@ pub(super) fn cookie(session: Option<&str>, secure: bool) -> Result<HeaderValue,
     HeaderValue::from_str(&text).map_err(|e| Error::Internal(e.to_string()))
 }
 
-/// The header that gives a browser what it is known by when its session has ended.
+/// The Set-Cookie header that identifies a browser after sign-out.
 pub(super) fn browser_cookie(browser: &str, secure: bool) -> Result<HeaderValue, Error> {
     let secure = if secure { "; Secure" } else { "" };
     let text = format!("{BROWSER}={browser}; Path=/; HttpOnly; SameSite=Lax; Max-Age={BROWSER_SECONDS}{secure}");

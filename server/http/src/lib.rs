@@ -1,4 +1,4 @@
-//! The HTTP face: REST under `/api/v1`, pages for people, static files.
+//! The HTTP interface: REST under `/api/v1`, pages, static files.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -40,5 +40,5 @@ pub use state::{Access, AppState};
 
 /// Largest request body.
 const BODY_LIMIT_BYTES: usize = 1 << 20;
-/// The same where a recording is uploaded: minutes of motion capture as text.
+/// The same for uploads of measurement files.
 const RECORDING_LIMIT_BYTES: usize = 16 << 20;

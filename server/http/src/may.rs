@@ -1,4 +1,4 @@
-//! Authorisation as a handler's argument: a handler that does not ask for a right does not learn who calls it.
+//! Authorisation as a handler's argument: a handler gets its caller only together with a right.
 
 use crate::pages::error::{PageError, is_for_programs};
 use crate::problem::Refusal;
@@ -11,15 +11,15 @@ use gaitwright_service::error::Error;
 use std::convert::Infallible;
 use std::marker::PhantomData;
 
-/// The caller, who has the right `P`.
+/// A caller with the right `P`.
 #[derive(Debug)]
 pub(crate) struct May<P> {
-    /// Who calls.
+    /// The caller.
     pub(crate) caller: Caller,
     right: PhantomData<P>,
 }
 
-/// The refusal: a problem document for programs, a page for people.
+/// A refusal: a problem document for programs, a page for people.
 #[derive(Debug)]
 pub(crate) struct Refused {
     error: Error,
@@ -29,7 +29,7 @@ pub(crate) struct Refused {
 impl Refused {
     /// The refusal of this request.
     pub(crate) fn of(parts: &Parts, error: Error) -> Self {
-        // Nested routers see the rest of the path alone.
+        // Nested routers see only the rest of the path.
         let whole = parts.extensions.get::<OriginalUri>().map_or(&parts.uri, |original| &original.0);
         Self { error, for_program: is_for_programs(whole.path()) }
     }
@@ -41,12 +41,12 @@ impl IntoResponse for Refused {
     }
 }
 
-/// The caller in a request, if the right is there.
+/// The caller of a request, if it has the right.
 pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller, Error> {
-    let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("sign in first".to_owned()))?;
+    let caller = extensions.get::<Caller>().ok_or_else(|| Error::NotSignedIn("Sign in first.".to_owned()))?;
     match P::NEEDED {
         Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
-            "this needs the right {:?}, which {} does not have",
+            "This needs the right {:?}, which {} does not have. Ask an administrator.",
             needed.as_str(),
             caller.name
         ))),

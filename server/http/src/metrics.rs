@@ -1,4 +1,4 @@
-//! Figures for Prometheus: what is in the record, and what was asked of the service.
+//! Prometheus metrics: totals of the record, and counts and durations of requests.
 
 use super::AppState;
 use super::may::May;
@@ -14,7 +14,7 @@ use std::fmt::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Upper ends of the buckets, s.
+/// Upper bounds of the histogram buckets, s.
 const BUCKETS: [f64; 8] = [0.001, 0.005, 0.025, 0.1, 0.25, 1.0, 5.0, 30.0];
 
 /// Requests by method, route and status class.
@@ -40,12 +40,12 @@ impl Requests {
     }
 
     fn map(&self) -> MutexGuard<'_, BTreeMap<(String, String, u16), Timed>> {
-        // The map is whole between any two statements that hold the lock.
+        // The map is consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Counts and times a request by its route, not by its address: addresses are without number.
+/// Counts and times a request by its route. Addresses would give unlimited labels.
 pub(super) async fn count(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
     let method = named(request.method()).to_owned();
@@ -55,7 +55,7 @@ pub(super) async fn count(State(app): State<AppState>, request: Request, next: N
     answer
 }
 
-/// Methods are without number, too: anybody may invent one.
+/// The label of a method. Unknown methods share one, because clients can invent any number.
 fn named(method: &Method) -> &str {
     let known = [Method::GET, Method::HEAD, Method::POST, Method::PUT, Method::PATCH, Method::DELETE, Method::OPTIONS];
     if known.contains(method) { method.as_str() } else { "other" }
@@ -76,10 +76,14 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Result<Res
         }
     }
     for (name, meaning, value) in [
-        ("gaitwright_workers", "Solves that can run at the same time", app.scheduler.workers() as f64),
-        ("gaitwright_solves_running", "Solves that run in this process", app.scheduler.board().running() as f64),
+        ("gaitwright_workers", "Number of solves that can run in parallel", app.scheduler.workers() as f64),
+        (
+            "gaitwright_solves_running",
+            "Number of solves running in this process",
+            app.scheduler.board().running() as f64,
+        ),
         ("gaitwright_database_bytes", "Size of the record", totals.bytes as f64),
-        ("gaitwright_oldest_queued_seconds", "How long the oldest solve has waited", totals.oldest_queued_seconds),
+        ("gaitwright_oldest_queued_seconds", "Waiting time of the oldest queued solve", totals.oldest_queued_seconds),
     ] {
         line(&mut text, format_args!("# HELP {name} {meaning}\n# TYPE {name} gauge\n{name} {value}"));
     }
@@ -89,7 +93,7 @@ pub(super) async fn get(_: May<Read>, State(app): State<AppState>) -> Result<Res
 
 fn requests(text: &mut String, requests: &Requests) {
     let name = "gaitwright_request_seconds";
-    line(text, format_args!("# HELP {name} Requests by route\n# TYPE {name} histogram"));
+    line(text, format_args!("# HELP {name} Duration of requests by route\n# TYPE {name} histogram"));
     for ((method, route, status), timed) in requests.map().iter() {
         let labels = format!("method=\"{method}\",route=\"{route}\",status=\"{status}\"");
         for (end, within) in BUCKETS.iter().zip(timed.within) {

@@ -21,7 +21,7 @@ pub(crate) fn csv_answer(name: &str, table: CsvTable) -> Response {
     csv_file(name, table.into_text())
 }
 
-/// A CSV file that a browser saves under `name`.
+/// A response with CSV text, which a browser saves as `name`.
 pub(crate) fn csv_file(name: &str, text: String) -> Response {
     let headers = [
         (header::CONTENT_TYPE, "text/csv; charset=utf-8".to_owned()),

@@ -1,4 +1,4 @@
-//! Requests that may be repeated: with an Idempotency-Key, the effect happens once and the answer stays the same.
+//! Idempotent requests: with an Idempotency-Key, a repeated request has one effect and the same response.
 
 use super::AppState;
 use super::extract::{body, unreadable};
@@ -20,12 +20,12 @@ use std::marker::PhantomData;
 static IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 static REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 
-/// A request that changes something, by somebody who has the right `P`: who sends it, its key and its fingerprint.
+/// A changing request by a caller with the right `P`: caller, key and fingerprint.
 #[derive(Debug)]
 pub(crate) struct Once<P> {
-    /// Who sends it.
+    /// The actor for the audit trail.
     pub(crate) actor: Actor,
-    /// The same, with what it may do.
+    /// The caller.
     pub(crate) caller: Caller,
     key: Option<String>,
     request: String,
@@ -37,7 +37,7 @@ pub(crate) struct Once<P> {
 pub(crate) struct OnceWith<P, T>(pub(crate) Once<P>, pub(crate) T);
 
 impl<P: Permission> Once<P> {
-    /// Begins the transaction of the effect. `Err` of the inner result: the answer that was given before.
+    /// Begins the transaction of the effect. The inner `Err` is the stored response of an earlier request with the key.
     pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<LentWriter<'a>, Response>, Error> {
         let mut writer = app.write().await?;
         let Some(key) = &self.key else { return Ok(Ok(writer)) };
@@ -48,11 +48,13 @@ impl<P: Permission> Once<P> {
                 answer.headers_mut().insert(REPLAYED.clone(), HeaderValue::from_static("true"));
                 Ok(Err(answer))
             }
-            Some(_) => Err(Error::conflict("this Idempotency-Key was used for another request: take a new one")),
+            Some(_) => {
+                Err(Error::conflict("This Idempotency-Key was already used for another request. Use a new key."))
+            }
         }
     }
 
-    /// The answer that was given to this key before, if there is one.
+    /// The stored response of an earlier request with the key, if any.
     pub(crate) async fn answered_before(&self, app: &AppState) -> Result<Option<Response>, Error> {
         if self.key.is_none() {
             return Ok(None);
@@ -60,10 +62,10 @@ impl<P: Permission> Once<P> {
         Ok(self.begin(app).await?.err())
     }
 
-    /// Begins the transaction of an effect whose answer holds a secret: nothing of it may be kept for repetition.
+    /// Begins the transaction of an effect whose response contains a secret, and therefore must not be stored.
     pub(crate) async fn begin_secret<'a>(&self, app: &'a AppState) -> Result<LentWriter<'a>, Error> {
         if self.key.is_some() {
-            let reason = "Idempotency-Key: the answer holds a secret that is shown once; send this without a key";
+            let reason = "This request does not accept an Idempotency-Key, because its response contains a secret that is shown once.";
             return Err(Error::Malformed(reason.to_owned()));
         }
         Ok(app.write().await?)
@@ -81,9 +83,11 @@ impl<P: Permission> Once<P> {
         let body = serde_json::to_string(body).map_err(|e| Error::Internal(e.to_string()))?;
         let kept = Kept { request: self.request.clone(), status: status.as_u16(), location, body };
         if let Some(key) = &self.key {
-            // Two requests with one key at the same time, of a handler that looks for its answer before it begins.
+            // Two concurrent requests with the same key can both have found no stored response.
             idempotency::keep(&mut writer, &self.actor, key, &kept).await.on_constraint(KEY_UNIQUE, || {
-                Error::conflict("a request with this Idempotency-Key has just been answered; send it again")
+                Error::conflict(
+                    "Another request with this Idempotency-Key was answered at the same time. Send the request again.",
+                )
             })?;
         }
         commit(writer).await?;

@@ -1,4 +1,4 @@
-//! The description of the REST interface (OpenAPI 3.1), made from the handlers.
+//! Generates the OpenAPI 3.1 description of the REST interface from the handlers.
 //!
 //! What holds for every operation is added here, so that no handler can forget it: the problem documents, the
 //! Idempotency-Key of every change whose answer holds no secret, the rules of values, the ways to say who calls.
@@ -26,7 +26,7 @@ use utoipa_axum::router::OpenApiRouter;
 )]
 struct Described;
 
-/// Marks an operation whose answer holds a secret, which is not kept: it takes no Idempotency-Key.
+/// Marks an operation whose response contains a secret. It takes no Idempotency-Key.
 const SHOWN_ONCE: &str = "x-shown-once";
 
 /// The description of every route below `/api/v1`.
@@ -35,9 +35,9 @@ pub fn document() -> OpenApi {
         OpenApiRouter::with_openapi(Described::openapi()).nest("/api/v1", api::routes()).split_for_parts();
     let components = document.components.get_or_insert_default();
     components.schemas.insert(Problem::name().into_owned(), Problem::schema());
-    let token = Http::builder().scheme(HttpAuthScheme::Bearer).description(Some("A token made by an administrator"));
+    let token = Http::builder().scheme(HttpAuthScheme::Bearer).description(Some("Token created by an administrator"));
     components.security_schemes.insert("token".to_owned(), SecurityScheme::Http(token.build()).into());
-    let cookie = ApiKeyValue::with_description("gaitwright_session", "The session of a person who signed in");
+    let cookie = ApiKeyValue::with_description("gaitwright_session", "Session of a signed-in user");
     components.security_schemes.insert("session".to_owned(), SecurityScheme::ApiKey(ApiKey::Cookie(cookie)).into());
     for (path, item) in &mut document.paths.paths {
         let has_parameters = path.contains('{');
@@ -96,7 +96,7 @@ fn complete(operation: &mut Operation, changes: bool, names_something: bool) {
     if changes {
         problems.push(("412", "It was changed since it was read"));
         problems.push(("413", "The body is too large"));
-        problems.push(("415", "The media type of the body is not accepted"));
+        problems.push(("415", "Unsupported media type"));
     }
     if changes || operation.parameters.is_some() {
         problems.push(("422", "A field is not acceptable"));

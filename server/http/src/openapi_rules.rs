@@ -1,8 +1,8 @@
-//! What the description says of values beyond their types: ranges, lengths, patterns, words.
+//! Adds ranges, lengths, patterns and allowed words to the schemas of the description.
 //!
-//! Whatever fits the description is accepted, unless the state of the record is against it. Names and notes have the same
-//! rules wherever they come in, so they are stated here once. The settings of solver and learner are asked for theirs: their
-//! own checks say which range a value is out of.
+//! A value that matches the description is accepted, unless the state of the record forbids it. Names and notes follow
+//! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
+//! of their own checks.
 
 use gait_learner::LearnerSettings;
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
@@ -14,11 +14,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
-/// Characters that neither print nor part lines, and those that turn text around.
+/// Control characters other than tab and line breaks, and characters that change the direction of text.
 const UNPRINTABLE: &str =
     r"\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069";
 
-/// Words of people that are no note: `name` is a component and its field.
+/// Names: component, field and maximum length.
 const NAMES: [(&str, &str, u32); 11] = [
     ("NewUser", "name", 80),
     ("NewToken", "name", 80),
@@ -65,7 +65,7 @@ pub(super) fn state(document: &mut Value) {
         for component in ["NewSubject", "NewSession"] {
             add(schemas, component, "notes", &json!({ "pattern": optional }));
         }
-        // A code of the site: no address, no date, no long number.
+        // A code of the site, without addresses, dates and long numbers.
         let pseudonym = r"^(?!(.*[0-9]){6})[A-Za-z0-9_.:/#+()\-][A-Za-z0-9 _.:/#+()\-]*$";
         add(schemas, "NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
         add(schemas, "NewToken", "scopes", &json!({ "items": { "enum": ["read", "run", "answer", "rate"] } }));
@@ -260,7 +260,8 @@ fn number(meaning: &str, minimum: f64, maximum: f64, kind: &Value) -> Value {
     json!({ "type": kind, "description": meaning, "minimum": minimum, "maximum": maximum })
 }
 
-/// The schema of settings: the shape of their defaults, with what their own checks say when a value is far out of range.
+/// The schema of settings: the shape of their defaults, with what their own checks say when a value is far out of
+/// range.
 fn settings<T>(default: T, check: impl Fn(&T) -> Option<Error>) -> Value
 where
     T: Serialize + DeserializeOwned,
@@ -302,7 +303,7 @@ fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> O
             json!({ "type": "array", "items": item.unwrap_or_else(|| json!({})) })
         }
         Value::Null => {
-            // Settings that are nothing by default are numbers: a fraction is read or refused by its range, or it is none.
+            // Settings that are null by default are numbers, and integers if a fraction is refused without a range.
             let fraction = with(json!(0.5));
             let is_fraction = fraction.as_ref().is_none_or(|refused| range_in(refused).is_some());
             let mut schema = number_shape(is_fraction, with);
@@ -312,7 +313,7 @@ fn shape(whole: &Value, place: &str, part: &Value, refusal: &dyn Fn(&Value) -> O
     }
 }
 
-/// The schema of a number; `with` tells why a value in its place is refused.
+/// The schema of a number; `with` returns the error for a value in its place.
 fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Value {
     let mut schema = json!({ "type": if is_fraction { "number" } else { "integer" } });
     for far in [json!(1_000_000_000_u32), json!(-1_000_000_000_i64)] {
@@ -326,7 +327,7 @@ fn number_shape(is_fraction: bool, with: impl Fn(Value) -> Option<Error>) -> Val
     schema
 }
 
-/// `0.1 to 5` of a refused field, or `between 0.1 and 5` of a setting of the learner.
+/// The range in an error: `0.1 to 5` of a field, or `between 0.1 and 5` of a learner setting.
 fn range_in(error: &Error) -> Option<(f64, f64)> {
     if let Error::Invalid(field) | Error::Unreadable(field) = error {
         let (least, most) = field.allowed.as_deref()?.split_once(" to ")?;
@@ -338,7 +339,7 @@ fn range_in(error: &Error) -> Option<(f64, f64)> {
     Some((least.trim().parse().ok()?, most.parse().ok()?))
 }
 
-/// The words that a refused field accepts: `a, b, c`, or `a or b`.
+/// The allowed words in an error: `a, b, c` or `a or b`.
 fn words_in(error: &Error) -> Vec<String> {
     let (Error::Invalid(field) | Error::Unreadable(field)) = error else { return Vec::new() };
     let allowed = field.allowed.as_deref().unwrap_or_default().trim_start_matches("one of ");

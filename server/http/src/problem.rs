@@ -1,4 +1,4 @@
-//! Problem documents (RFC 9457): the one table from errors to answers.
+//! Problem documents (RFC 9457): maps each error to its HTTP response.
 
 use super::problem_kinds::Kind;
 use axum::Json;
@@ -21,25 +21,25 @@ pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 /// A problem document.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub(super) struct Problem {
-    /// What kind of problem: stable, for programs. The address serves a page that explains the kind.
+    /// Kind of problem, stable across versions. The address serves a page that explains the kind.
     #[serde(rename = "type")]
     pub(super) kind: &'static str,
-    /// The kind in words.
+    /// Name of the kind.
     pub(super) title: &'static str,
     /// The HTTP status.
     pub(super) status: u16,
-    /// This occurrence in words.
+    /// What went wrong in this request.
     pub(super) detail: String,
-    /// The field that was refused.
+    /// Name of the field that was refused.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) field: Option<String>,
-    /// The value that was given.
+    /// Value that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) value: Option<Value>,
-    /// What would have been accepted.
+    /// Values that are accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) allowed: Option<String>,
-    /// The request, as in the `X-Request-Id` header and in the log.
+    /// Identifier of the request, as in the `X-Request-Id` header and the log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) request_id: Option<String>,
 }
@@ -53,7 +53,7 @@ impl Problem {
         Self { kind, title, status, detail, field, value, allowed, request_id }
     }
 
-    /// What an answer says that has no more than a status.
+    /// The default detail for a status.
     pub(super) fn of_status(status: StatusCode) -> Self {
         let kind = Kind::of_status(status);
         Self { status: status.as_u16(), ..Self::new(kind, kind.entry().meaning.to_owned()) }
@@ -93,7 +93,7 @@ impl From<&Error> for Problem {
                 Self::new(Kind::RecordVanished, Kind::RecordVanished.entry().meaning.to_owned())
             }
             Error::Store(_) | Error::Dispatch(_) | Error::Output(_) | Error::Internal(_) => {
-                Self::new(Kind::Internal, "the failure was logged; nothing was changed".to_owned())
+                Self::new(Kind::Internal, "The service failed and logged the error. Nothing was changed.".to_owned())
             }
         }
     }
@@ -102,7 +102,7 @@ impl From<&Error> for Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let mut answer = (self.status(), [(header::CONTENT_TYPE, PROBLEM_JSON)], Json(&self)).into_response();
-        // For `answers::complete`, which adds the request id and makes a page of it where people ask.
+        // `answers::complete` adds the request id, and renders a page for browsers.
         answer.extensions_mut().insert(self);
         answer
     }

@@ -1,8 +1,8 @@
-//! The kinds of problems: one table for the answers, the description and the pages that explain them.
+//! The kinds of problems: status, title, meaning and remedy of each.
 
 use axum::http::StatusCode;
 
-/// A kind of problem. Its address is the `type` of a problem document and serves a page that explains it.
+/// A kind of problem. Its address is the `type` of a problem document, and serves a page that explains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// 400.
@@ -41,18 +41,18 @@ pub(super) enum Kind {
     RecordVanished,
 }
 
-/// What is known of a kind.
+/// The description of a kind.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     /// Its address.
     pub(super) uri: &'static str,
-    /// The HTTP status of most of its answers.
+    /// The usual HTTP status.
     pub(super) status: StatusCode,
-    /// The kind in words.
+    /// The name for people.
     pub(super) title: &'static str,
     /// What happened.
     pub(super) meaning: &'static str,
-    /// What the sender of the request can do.
+    /// How the caller can solve the problem.
     pub(super) remedy: &'static str,
 }
 
@@ -88,152 +88,150 @@ impl Kind {
         Self::RecordVanished,
     ];
 
-    /// What is known of it.
+    /// Its description.
     pub(super) const fn entry(self) -> Entry {
         match self {
             Self::Malformed => entry(
                 "/problems/malformed",
                 StatusCode::BAD_REQUEST,
                 "The request cannot be read",
-                "The body is not JSON, a field has the wrong type, or a header or parameter cannot be read. Nothing was \
-                 changed.",
-                "Correct the part that the detail names and send the request again.",
+                "The body is not JSON, a field has the wrong type, or a header or parameter is malformed. Nothing was changed.",
+                "Correct the part that the detail names, then send the request again.",
             ),
             Self::NotSignedIn => entry(
                 "/problems/not-signed-in",
                 StatusCode::UNAUTHORIZED,
                 "Sign in first",
-                "The request has no session or token, or the session or token has ended.",
+                "The request has no session or token, or the session or token has expired.",
                 "Sign in again, or ask an administrator for a new token and send it as Authorization: Bearer TOKEN.",
             ),
             Self::Forbidden => entry(
                 "/problems/forbidden",
                 StatusCode::FORBIDDEN,
                 "Not allowed",
-                "The caller does not have the right that this needs, or the request comes from another site or for \
-                 another host name.",
-                "Ask an administrator for the right. If the detail names a host, add it with the setting host_names.",
+                "The caller lacks the required right, or the request comes from another site or names an unknown host.",
+                "Ask an administrator for the right. If the detail names a host, add it to the setting host_names.",
             ),
             Self::NotFound => entry(
                 "/problems/not-found",
                 StatusCode::NOT_FOUND,
                 "Not found",
-                "The address, or something that the request names by its identifier, does not exist here.",
+                "The address does not exist, or the request names something that does not exist or that the caller cannot \
+                 access.",
                 "Check the address and the identifiers.",
             ),
             Self::MethodNotAllowed => entry(
                 "/problems/method-not-allowed",
                 StatusCode::METHOD_NOT_ALLOWED,
-                "Not possible with this method",
+                "Method not allowed",
                 "The address exists, but does not accept this HTTP method.",
                 "Use one of the methods in the Allow header.",
             ),
             Self::Conflict => entry(
                 "/problems/conflict",
                 StatusCode::CONFLICT,
-                "Not possible in the present state",
-                "The request is well formed but does not fit the state of the record: the study has ended, the name is \
-                 taken, the subject withdrew consent. Nothing was changed.",
-                "Read the detail, look at the present state, and decide again.",
+                "Conflict with the current state",
+                "The request is valid, but the current state does not allow it: for example, the study has ended, the name is \
+                 taken, or the subject withdrew consent. Nothing was changed.",
+                "Read the detail and the current state, then decide again.",
             ),
             Self::Changed => entry(
                 "/problems/changed",
                 StatusCode::PRECONDITION_FAILED,
-                "It was changed since it was read",
-                "The If-Match header names a revision that is no longer the present one. Nothing was changed.",
-                "Read it again and repeat the change with its new ETag.",
+                "Changed by someone else",
+                "The If-Match header names an old revision. Nothing was changed.",
+                "Read the resource again, then repeat the change with its new ETag.",
             ),
             Self::TooLarge => entry(
                 "/problems/too-large",
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "The request is too large",
-                "The body is longer than this address accepts. Nothing was changed.",
-                "Send less; the detail has the limit.",
+                "The body exceeds the limit of this address. Nothing was changed.",
+                "Send a smaller body. The detail names the limit.",
             ),
             Self::UnsupportedMediaType => entry(
                 "/problems/unsupported-media-type",
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
-                "Media type not accepted",
-                "The Content-Type of the body is not the one that this address reads. Nothing was changed.",
-                "Send the body as application/json, or as the description of the operation says.",
+                "Unsupported media type",
+                "This address does not accept the Content-Type of the body. Nothing was changed.",
+                "Send the body as application/json, or in the media type that the description of the operation names.",
             ),
             Self::InvalidField => entry(
                 "/problems/invalid-field",
                 StatusCode::UNPROCESSABLE_ENTITY,
-                "A field is not acceptable",
-                "A field can be read, but its value is out of range or contradicts another one. Nothing was changed.",
-                "The members field, value and allowed say what was given and what is accepted.",
+                "Invalid field",
+                "The value of a field is out of range or contradicts another field. Nothing was changed.",
+                "Correct the field. The members field, value and allowed name it, its value and the accepted values.",
             ),
             Self::Learner => entry(
                 "/problems/learner",
                 StatusCode::UNPROCESSABLE_ENTITY,
-                "The learner cannot work with this",
-                "The settings or answers of the study are such that the preference learner has no solution.",
+                "The learner failed",
+                "The learner finds no solution for the settings and answers of the study.",
                 "Change the learner setting that the detail names.",
             ),
             Self::TooManyAttempts => entry(
                 "/problems/too-many-attempts",
                 StatusCode::TOO_MANY_REQUESTS,
                 "Too many attempts",
-                "Signing in failed too often.",
-                "Wait as many seconds as the Retry-After header says.",
+                "Too many sign-in attempts failed.",
+                "Wait for the number of seconds in the Retry-After header.",
             ),
             Self::Internal => entry(
                 "/problems/internal",
                 StatusCode::INTERNAL_SERVER_ERROR,
-                "The program failed",
-                "A fault of the program or the machine. The log has the reason under the request id of the answer.",
-                "Tell whoever runs the service the request id.",
+                "Internal error",
+                "The program or the machine failed. The log has the cause, under the request id of this response.",
+                "Give the request id to the administrator.",
             ),
             Self::TimedOut => entry(
                 "/problems/timed-out",
                 StatusCode::SERVICE_UNAVAILABLE,
-                "The answer took too long",
-                "The service gave the request up. A change that it asked for may have happened.",
-                "Look at the present state, then try again; with the same Idempotency-Key a change happens once.",
+                "The request timed out",
+                "The service stopped waiting for the request. A change may still have been made.",
+                "Check the current state, then try again. With the same Idempotency-Key, a change is made only once.",
             ),
             Self::NotReady => entry(
                 "/problems/not-ready",
                 StatusCode::SERVICE_UNAVAILABLE,
                 "The service is not ready",
-                "The record takes no changes, a task of the service is down, or the service is stopping. Nothing was \
-                 changed.",
-                "The detail has the reason. Tell whoever runs the service, and try again later.",
+                "The record cannot be written, a background task has failed, or the service is stopping. Nothing was changed.",
+                "Give the detail to the administrator, and try again later.",
             ),
             Self::StorageFull => entry(
                 "/problems/storage-full",
                 StatusCode::INSUFFICIENT_STORAGE,
                 "The disk is full",
-                "The disk of the record has no room for the change, or too little for what it would begin. Nothing was \
+                "The disk of the record has too little space for the change, or for the work that it would start. Nothing was \
                  changed.",
-                "Make room on the disk and send the request again. The service goes on by itself.",
+                "Free some space, then send the request again. The service does not need a restart.",
             ),
             Self::RecordVanished => entry(
                 "/problems/record-vanished",
                 StatusCode::SERVICE_UNAVAILABLE,
-                "The record takes no changes",
-                "The database file or its write-ahead log was deleted, replaced or cut while the service ran. No change is \
-                 accepted, so that none is lost.",
-                "Tell whoever runs the service: stop it, run `gaitwright audit verify`, and put a copy in place if the record \
-                 is not whole.",
+                "The record accepts no changes",
+                "The database file or its write-ahead log was deleted, replaced or truncated while the service was running. \
+                 The service refuses changes, because they could be lost.",
+                "Tell the administrator to stop the service, run `gaitwright audit verify`, and restore a backup if it reports \
+                 damage.",
             ),
         }
     }
 
-    /// The kind of an answer of which only the status is known.
+    /// The kind of a response that has only a status.
     pub(super) fn of_status(status: StatusCode) -> Self {
         let known = Self::ALL.into_iter().find(|kind| kind.entry().status == status);
         known.unwrap_or(if status.is_server_error() { Self::Internal } else { Self::Malformed })
     }
 
-    /// The kind at an address below `/problems/`.
+    /// The kind with this address below `/problems/`.
     pub(super) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.entry().name() == name)
     }
 }
 
 impl Entry {
-    /// The last part of the address.
+    /// The last segment of the address.
     pub(super) fn name(&self) -> &'static str {
         self.uri.trim_start_matches("/problems/")
     }

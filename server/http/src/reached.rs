@@ -1,7 +1,7 @@
-//! Identifiers that a request names.
+//! Identifiers in requests, checked for access.
 //!
-//! A handler gets one only when its caller has the right that the handler asks for, and reaches the study that the
-//! identifier belongs to. Whatever is not reached is answered as if it did not exist.
+//! A handler gets an identifier only if its caller has the required right and can access the study that the identifier
+//! belongs to. An inaccessible object gets the same response as one that does not exist.
 
 use super::AppState;
 use super::may::{Refused, permitted};
@@ -19,12 +19,12 @@ use std::fmt::Display;
 use std::marker::PhantomData;
 use std::str::FromStr;
 
-/// What an identifier can be of.
+/// An identifier whose study can be found.
 pub(crate) trait Located: Copy + Display + FromStr<Err: Display> + Send + Sync {
-    /// What it is called where it does not exist.
+    /// The kind of object, for errors.
     const WHAT: &'static str;
 
-    /// The study that it belongs to; none: the whole service shares it.
+    /// The study that the object belongs to; `None` if it is shared by all studies.
     fn study(self, db: &mut Connection) -> impl Future<Output = StoreResult<Option<StudyId>>> + Send;
 }
 
@@ -75,7 +75,7 @@ shared!(UserId, "user");
 shared!(TokenId, "token");
 shared!(SessionId, "session");
 
-/// The study of something that a caller reaches.
+/// The study of an object, if the caller can access it.
 async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result<Option<StudyId>, Error> {
     let study = id.study(db).await?;
     if let Some(study) = study
@@ -99,35 +99,35 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
     }
 }
 
-/// The identifier in the path and its study.
+/// Reads the identifier in the path and finds its study.
 pub(super) async fn in_path<T: Located, P: Permission>(
     parts: &mut Parts,
     app: &AppState,
 ) -> Result<(T, Option<StudyId>), Error> {
-    // The right comes first: the refusal is the same whether the thing exists or not.
+    // Check the right first, so that the refusal does not depend on whether the object exists.
     let reach = permitted::<P>(&parts.extensions)?.reach();
     let named = RawPathParams::from_request_parts(parts, app).await.map_err(|e| Error::Malformed(e.body_text()))?;
     let text = named.iter().find(|(name, _)| *name == "id").map_or("", |(_, text)| text);
-    let unknown = || Error::NotFound { what: "an identifier like".to_owned(), id: text.to_owned() };
+    let unknown = || Error::NotFound { what: "object with the identifier".to_owned(), id: text.to_owned() };
     let id: T = text.parse().map_err(|_| unknown())?;
     let study = located(&mut *app.read().await?, reach, id).await?;
     Ok((id, study))
 }
 
-/// An identifier in the query or in a form. It is of no use before [`Named::reached`].
+/// An identifier in a query or form, usable only through [`Named::reached`].
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct Named<T>(T);
 
 impl<T: Located> Named<T> {
-    /// The identifier, where the caller reaches what it names.
+    /// The identifier, if the caller can access its object.
     pub(crate) async fn reached(self, db: &mut Connection, reach: Reach) -> Result<T, Error> {
         located(db, reach, self.0).await?;
         Ok(self.0)
     }
 }
 
-/// The identifier, if there is one, where the caller reaches what it names.
+/// The optional identifier, if the caller can access its object.
 pub(crate) async fn reached<T: Located>(
     db: &mut Connection,
     reach: Reach,

@@ -1,5 +1,4 @@
-//! Entity tags of what changes in place: a change that names the revision it was made from is refused when another
-//! one came in between.
+//! Entity tags and If-Match: refuses a change that was based on an old revision.
 
 use crate::problem::Refusal;
 use axum::extract::FromRequestParts;
@@ -12,21 +11,22 @@ use utoipa::openapi::Required;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{ObjectBuilder, Type};
 
-/// The revisions that a change may be made from; without the header, any.
+/// The If-Match header. Without it, any revision matches.
 #[derive(Debug)]
 pub(crate) struct IfMatch(Option<String>);
 
 impl IfMatch {
-    /// Refuses when the present revision is another one.
+    /// Refuses the change if the current revision does not match.
     pub(crate) fn check(self, present: i64) -> Result<(), Error> {
         let Some(named) = self.0 else { return Ok(()) };
         let tag = format!("\"{present}\"");
-        // A weak tag never matches: it does not say that nothing changed.
+        // A weak tag never matches, because it does not guarantee equality.
         if named.split(',').map(str::trim).any(|one| one == "*" || one == tag) {
             return Ok(());
         }
-        let reason =
-            format!("If-Match names revision {named}, the present one is {tag}: read it again and decide anew");
+        let reason = format!(
+            "If-Match is {named}, but the current revision is {tag}. Read the current state, then decide again."
+        );
         Err(Error::Changed(reason))
     }
 }
@@ -48,7 +48,7 @@ impl IntoParams for IfMatch {
                 .name("If-Match")
                 .parameter_in(ParameterIn::Header)
                 .required(Required::False)
-                .description(Some("The entity tag that the change was made from"))
+                .description(Some("Entity tag of the revision that the change is based on"))
                 .schema(Some(text))
                 .build(),
         ]

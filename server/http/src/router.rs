@@ -1,4 +1,4 @@
-//! The table of contents of the HTTP face.
+//! The router: all routes, and the layers around them.
 
 use super::{
     AppState, BODY_LIMIT_BYTES, access_log, answers, api, client_address, host, identify, metrics, openapi, pages,
@@ -18,7 +18,7 @@ use tower_http::timeout::TimeoutLayer;
 use tower_http::trace::TraceLayer;
 use utoipa_axum::router::OpenApiRouter;
 
-/// Everything comes from this origin; no inline scripts, no inline styles, no frames.
+/// Allows content from this origin only, without inline scripts, inline styles and frames.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
                                        form-action 'self'; frame-ancestors 'none'";
 
@@ -38,8 +38,7 @@ pub fn router(state: AppState) -> Router {
     with_layers(routes, state)
 }
 
-/// Routes within everything that holds for all of them: who calls, which names and origins are answered, time-outs,
-/// problem documents, security headers.
+/// Adds the common layers: authentication, checks of host and origin, time-outs, problem documents, security headers.
 pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
     let header = |name: HeaderName, value: &'static str| {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))

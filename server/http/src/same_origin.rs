@@ -1,8 +1,7 @@
-//! Changes come from our own pages or from programs, never from another site in the same browser.
+//! Protection against cross-site request forgery: refuses changes that pages of another origin send.
 //!
-//! Browsers say with every request where it comes from (`Sec-Fetch-Site`, `Origin`), and a page cannot make them lie;
-//! that, and a session cookie with `SameSite`, is the protection against forged requests. It covers every form and
-//! every REST call alike, so none can forget a hidden field.
+//! Browsers state the origin of every request (`Sec-Fetch-Site`, `Origin`), and pages cannot forge it. Together with a
+//! `SameSite` cookie this covers every form and REST call, so no form needs a hidden field.
 
 use super::client_address::Secure;
 use super::identify::session_of;
@@ -23,7 +22,7 @@ pub(super) async fn check(request: Request, next: Next) -> Result<Response, Refu
     Ok(next.run(request).await)
 }
 
-/// Browsers say where a request comes from; programs do not, and need not.
+/// Whether the request comes from our own page or from a program, which states no origin.
 fn is_ours(headers: &HeaderMap, secure: Secure) -> bool {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     match text(&header::HeaderName::from_static("sec-fetch-site")) {
@@ -32,7 +31,7 @@ fn is_ours(headers: &HeaderMap, secure: Secure) -> bool {
         None => match (text(&header::ORIGIN), text(&header::HOST)) {
             (Some(origin), Some(host)) => origin.split_once("://") == Some((secure.scheme(), host)),
             (Some(_), None) => false,
-            // A browser that says nothing of the origin, but is signed in, cannot be told from a forged form.
+            // Without an origin, a request of a signed-in browser could be forged.
             (None, _) => session_of(headers).is_none(),
         },
     }

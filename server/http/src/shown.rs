@@ -1,4 +1,4 @@
-//! What may be shown of studies: nothing that was computed or said of a subject who withdrew.
+//! Identifiers of objects that may be shown: their subject has not withdrawn consent.
 
 use super::AppState;
 use super::may::Refused;
@@ -10,8 +10,8 @@ use gaitwright_service::error::Error;
 use gaitwright_store::consents;
 use std::marker::PhantomData;
 
-/// An [`Id`](super::reached::Id) of something whose subject did not withdraw. A handler that gives out figures asks for
-/// this one in place of it.
+/// An [`Id`](super::reached::Id) of an object whose subject has not withdrawn consent. Handlers that show data take
+/// this instead.
 #[derive(Debug)]
 pub(crate) struct Shown<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 

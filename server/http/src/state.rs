@@ -1,4 +1,4 @@
-//! What every handler can reach.
+//! The state that all handlers share.
 
 use super::access_log::AccessLog;
 use super::forwarded::Proxies;
@@ -15,52 +15,52 @@ use gaitwright_store::{Instant, LentWriter, Reader, Store, StoreResult, clock};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A session ends after a day's work.
+/// Default lifetime of a session: a working day.
 const DEFAULT_LIFETIME_SECONDS: f64 = 12.0 * 3600.0;
 
-/// What every handler can reach.
+/// The state that all handlers share.
 #[derive(Debug, Clone)]
 pub struct AppState {
     /// Runs the studies.
     pub scheduler: Scheduler,
-    /// How people and programs say who they are.
+    /// Sign-in and sessions.
     pub access: Arc<Access>,
-    /// What was asked of the service so far.
+    /// Counts of requests.
     pub requests: Arc<Requests>,
-    /// What the learner believes of the studies that were looked at.
+    /// Cached posteriors of studies.
     pub beliefs: Arc<Beliefs>,
-    /// The names that the service answers to.
+    /// The host names of the service.
     pub hosts: Hosts,
-    /// The reverse proxies that are believed.
+    /// The trusted reverse proxies.
     pub proxies: Proxies,
-    /// An answer that takes longer is given up; streams have begun by then.
+    /// Time limit of a response. Streams have started by then.
     pub slowest_answer: Duration,
-    /// The record, with the pool for what requests compute.
+    /// The record, with the thread pool for requests.
     store: Store,
 }
 
-/// An answer that takes longer is given up.
+/// Default time limit of a response.
 const SLOWEST_ANSWER: Duration = Duration::from_mins(1);
 
-/// How people and programs say who they are.
+/// Sign-in and sessions.
 #[derive(Debug)]
 pub struct Access {
-    /// Nobody needs to sign in, and whoever is there may do everything.
+    /// Whether sign-in is off, which gives every caller all rights.
     pub open: bool,
-    /// When sessions end by themselves.
+    /// When sessions expire.
     pub limits: Limits,
-    /// Who saw what, before it is written.
+    /// Rows of the access log that are not written yet.
     pub log: AccessLog,
-    /// Browsers reach the service through TLS.
+    /// Whether browsers use TLS.
     pub secure: bool,
-    /// Says when something has ended.
+    /// The clock of expiry.
     pub clock: Clock,
-    /// Passwords that are compared.
+    /// Queues of password checks.
     pub turns: Turns,
 }
 
 impl Access {
-    /// Everybody signs in; a session without a sign of life for so long has ended.
+    /// Requires sign-in. Sessions expire after this idle time.
     pub fn by_sign_in(idle_seconds: f64) -> Self {
         let limits = Limits { idle_seconds, lifetime_seconds: DEFAULT_LIFETIME_SECONDS };
         Self {
@@ -73,14 +73,14 @@ impl Access {
         }
     }
 
-    /// Nobody signs in: for one person on one machine.
+    /// Requires no sign-in, for one person on one machine.
     pub fn without_sign_in() -> Self {
         Self { open: true, ..Self::by_sign_in(3600.0) }
     }
 }
 
 impl AppState {
-    /// A service over a scheduler.
+    /// Creates the state of a service.
     pub fn new(scheduler: Scheduler, access: Arc<Access>, hosts: Hosts) -> Self {
         let beliefs = Arc::clone(scheduler.beliefs());
         let store = scheduler.store().with_own_pool();
@@ -93,7 +93,7 @@ impl AppState {
         &self.store
     }
 
-    /// The record, to be computed with as well: no connection of it is held meanwhile.
+    /// The record for computing, during which no connection can be held.
     pub fn store_mut(&mut self) -> &mut Store {
         &mut self.store
     }
@@ -101,7 +101,7 @@ impl AppState {
     /// A connection to read with.
     ///
     /// # Errors
-    /// When none can be had.
+    /// If no connection is available.
     pub async fn read(&self) -> StoreResult<Reader<'_>> {
         self.store.read().await
     }
@@ -109,15 +109,15 @@ impl AppState {
     /// A write transaction.
     ///
     /// # Errors
-    /// When none can be begun.
+    /// If no transaction can be started.
     pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
         self.store.write().await
     }
 
-    /// Computes off the threads that answer, while no connection is held.
+    /// Computes on the thread pool, while no connection is held.
     ///
     /// # Errors
-    /// When the work panics.
+    /// If the work panics.
     pub async fn compute<T: Send + 'static>(
         &mut self,
         work: impl FnOnce(&OnPool) -> T + Send + 'static,
@@ -125,10 +125,10 @@ impl AppState {
         self.store.compute(work).await
     }
 
-    /// A write transaction that decides about access, and the instant that it decides at, which the record keeps.
+    /// A write transaction for decisions about access, and the time of the decision, which is recorded.
     ///
     /// # Errors
-    /// When none can be begun.
+    /// If no transaction can be started.
     pub async fn write_access(&self) -> Result<(LentWriter<'_>, Instant), Error> {
         let mut writer = self.write().await?;
         let now = self.access.clock.now(&mut writer).await?;

@@ -1,4 +1,4 @@
-//! Styles, scripts and images, embedded into the binary.
+//! Serves styles, scripts and images, which are embedded in the binary.
 
 use crate::problem::Refusal;
 use axum::extract::Path;

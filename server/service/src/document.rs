@@ -1,7 +1,7 @@
-//! JSON documents from outside.
+//! Reads JSON documents strictly, with errors that name field, value, position and what is allowed.
 //!
-//! Derived readers also take an array for an object, field by field in the order of the program text. A document that
-//! says `["S9", 1.7, 65]` where it should name its fields is more likely a mistake, so here it is one.
+//! Derived deserialisers also accept an array in place of an object, such as `["S9", 1.7, 65]`. That is more likely a
+//! mistake, so it is refused here.
 
 use crate::error::{Error, FieldError};
 use serde::de::value::{MapDeserializer, SeqDeserializer};
@@ -13,20 +13,20 @@ use serde_json::Value;
 use serde_path_to_error::{Path, Segment};
 use std::fmt;
 
-/// What a structure is read from.
+/// What a structure must be.
 const OBJECT: &str = "an object with named fields";
 
-/// So many characters of a value are repeated to whoever sent it.
+/// Maximum length of a value in an error, characters.
 const SHOWN_VALUE: usize = 80;
 
-/// Reads a document, naming the field that cannot be read.
+/// Reads a document.
 ///
 /// # Errors
 /// [`Error::Unreadable`] with the field, [`Error::Malformed`] where there is none.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|e| unreadable(e, bytes))?;
-    reader.end().map_err(|e| Error::Malformed(format!("something follows the JSON document: {e}")))?;
+    reader.end().map_err(|e| Error::Malformed(format!("There is text after the JSON document: {e}")))?;
     let parsed: Value = serde_json::from_slice(bytes).map_err(|e| Error::Malformed(e.to_string()))?;
     serde_path_to_error::deserialize::<_, T>(Named(&parsed)).map_err(|e| unreadable(e, bytes))?;
     Ok(value)
@@ -41,14 +41,14 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
     let place = place(&inner, &path, bytes);
     if !inner.is_data() {
         let known = written != "." && path.iter().all(|segment| !matches!(segment, Segment::Unknown));
-        let within = if known { format!("field {written}: ") } else { String::new() };
-        return Error::Malformed(format!("{within}not JSON: {message}{place}"));
+        let within = if known { format!("The field {written} is not JSON") } else { "The text is not JSON".to_owned() };
+        return Error::Malformed(format!("{within}: {message}{place}."));
     }
     let missing = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
     let twice = message.strip_prefix("duplicate field `").and_then(|rest| rest.split('`').next());
     let field = match (written.as_str(), missing.or(twice)) {
         (".", None) => {
-            return Error::Malformed(format!("the whole document is not {}{place}", expected(message)));
+            return Error::Malformed(format!("The document is not {}{place}.", expected(message)));
         }
         (".", Some(name)) => name.to_owned(),
         (_, Some(name)) => format!("{written}.{name}"),
@@ -56,20 +56,23 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
     };
     let value = if missing.is_some() { Value::Null } else { value_at(bytes, &path) };
     let allowed = match (missing, twice) {
-        (Some(_), _) => "it must be there".to_owned(),
-        (_, Some(_)) => "it may be there once".to_owned(),
+        (Some(_), _) => "present".to_owned(),
+        (_, Some(_)) => "present only once".to_owned(),
         _ => expected(message),
     };
     let said = match (missing, twice) {
-        (Some(_), _) => format!("field {field} is missing{place}"),
-        (_, Some(_)) => format!("field {field} is there twice{place}"),
-        _ if message.starts_with("unknown field") => format!("field {field} is not known{place}; known: {allowed}"),
-        _ => format!("field {field}: {} is not accepted{place}; allowed: {allowed}", shortened(&value)),
+        (Some(_), _) => format!("The field {field} is missing{place}."),
+        (_, Some(_)) => format!("The field {field} occurs twice{place}."),
+        _ if message.starts_with("unknown field") => {
+            format!("The field {field} is unknown{place}. Known fields: {}.", allowed.trim_start_matches("one of "))
+        }
+        _ => format!("The field {field} is {}{place}; it must be {allowed}.", shortened(&value)),
     };
     Error::Unreadable(Box::new(FieldError { message: said, field, value: Some(value), allowed: Some(allowed) }))
 }
 
-/// Line and column in words. An error of the second reading, which reads values, has none: that of the field is looked for.
+/// Line and column in words. The second pass, which reads values, has no position, so the position of the field is
+/// searched.
 fn place(error: &serde_json::Error, path: &Path, bytes: &[u8]) -> String {
     let segments: Vec<&Segment> = path.iter().collect();
     let found = Place(&segments).deserialize(&mut serde_json::Deserializer::from_slice(bytes)).err();
@@ -81,7 +84,7 @@ fn place(error: &serde_json::Error, path: &Path, bytes: &[u8]) -> String {
     format!(" (line {line}, column {column})")
 }
 
-/// Ends with an error where the value at a path begins.
+/// A reader that stops with an error at the value of a path, to find its position.
 struct Place<'a>(&'a [&'a Segment]);
 
 impl<'de> DeserializeSeed<'de> for Place<'_> {
@@ -118,7 +121,7 @@ impl<'de> Visitor<'de> for Place<'_> {
     }
 }
 
-/// A value as it may be repeated in a sentence.
+/// A value, shortened for an error.
 fn shortened(value: &Value) -> String {
     let whole = value.to_string();
     match whole.char_indices().nth(SHOWN_VALUE) {
@@ -137,22 +140,22 @@ fn value_at(bytes: &[u8], path: &Path) -> Value {
     inside.cloned().unwrap_or_default()
 }
 
-/// What would have been read, in words that are not those of the program text.
+/// The expected type in plain words.
 fn expected(message: &str) -> String {
     let Some((_, expected)) = message.split_once("expected ") else { return message.to_owned() };
     match expected {
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number of at least 0".to_owned(),
         "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
         "f32" | "f64" => "a number".to_owned(),
         "a boolean" => "true or false".to_owned(),
-        "a string" => "a text".to_owned(),
+        "a string" => "a string".to_owned(),
         "a sequence" => "a list".to_owned(),
         other if other.starts_with("struct ") => OBJECT.to_owned(),
         other => other.replace('`', ""),
     }
 }
 
-/// A value whose structures are objects with named fields.
+/// A deserialiser that accepts only objects with named fields for structures.
 #[derive(Clone, Copy)]
 struct Named<'de>(&'de Value);
 
@@ -233,17 +236,17 @@ mod tests {
     }
 
     #[test]
-    fn fields_have_names() {
+    fn arrays_are_refused_in_place_of_objects() {
         for (text, place) in [
-            ("[]", "the whole document is not an object with named fields"),
+            ("[]", "The document is not an object with named fields."),
             (
                 r#"{"mesh": [3, 3, 4, 4]}"#,
-                "field mesh: [3,3,4,4] is not accepted (line 1, column 9); allowed: an object with named fields",
+                "The field mesh is [3,3,4,4] (line 1, column 9); it must be an object with named fields.",
             ),
             (
                 "{\n\"limits\": {\"friction\": 0.5, \"duration_min_s\": [0.1, 0.1, 0.1, 0.1]}}",
-                "field limits.duration_min_s: [0.1,0.1,0.1,0.1] is not accepted (line 2, column 46); allowed: an object with \
-                 named fields",
+                "The field limits.duration_min_s is [0.1,0.1,0.1,0.1] (line 2, column 46); it must be an object with \
+                 named fields.",
             ),
         ] {
             assert_eq!(refusal::<GaitSettings>(text), place);
@@ -251,9 +254,9 @@ mod tests {
     }
 
     #[test]
-    fn a_field_that_cannot_be_read_is_named_with_its_value_and_what_would_be() {
+    fn errors_have_field_value_and_allowed_values() {
         for (text, field, value, allowed) in [
-            (r#"{"mesh": {"ds2": "x"}}"#, "mesh.ds2", json!("x"), "a whole number, 0 or more"),
+            (r#"{"mesh": {"ds2": "x"}}"#, "mesh.ds2", json!("x"), "a whole number of at least 0"),
             (r#"{"limits": {"friction": [1]}}"#, "limits.friction", json!([1]), "a number"),
             (r#"{"limits": 3}"#, "limits", json!(3), "an object with named fields"),
         ] {
@@ -270,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_document_says_is_read() {
+    fn valid_documents_are_read() {
         let settings: GaitSettings =
             read(br#"{"mesh": {"ds2": 3, "ds3": 3, "ss2": 4, "ss1": 4}, "limits": {"friction": 0.5}}"#).unwrap();
         assert_eq!((settings.mesh.ds2, settings.limits.friction), (3, 0.5));
@@ -281,29 +284,32 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_with_value_place_and_what_is_allowed() {
+    fn error_messages_name_value_position_and_allowed_values() {
         for (text, told) in [
             (
                 r#"{"mesh": {"ds2": "x"}}"#,
-                "field mesh.ds2: \"x\" is not accepted (line 1, column 20); allowed: a whole number, 0 or more",
+                "The field mesh.ds2 is \"x\" (line 1, column 20); it must be a whole number of at least 0.",
             ),
-            (r#"{"limits": {"friction": NaN}}"#, "field limits.friction: not JSON: expected value (line 1, column 25)"),
+            (
+                r#"{"limits": {"friction": NaN}}"#,
+                "The field limits.friction is not JSON: expected value (line 1, column 25).",
+            ),
             (
                 r#"{"limits": {"friction": 1e999}}"#,
-                "field limits.friction: not JSON: number out of range (line 1, column 29)",
+                "The field limits.friction is not JSON: number out of range (line 1, column 29).",
             ),
-            ("{} {}", "something follows the JSON document: trailing characters at line 1 column 4"),
-            ("{", "not JSON: EOF while parsing an object (line 1, column 1)"),
-            (r#"{"mesh": {"ds2": 3, "ds2": 4}}"#, "field mesh.ds2 is there twice (line 1, column 25)"),
+            ("{} {}", "There is text after the JSON document: trailing characters at line 1 column 4"),
+            ("{", "The text is not JSON: EOF while parsing an object (line 1, column 1)."),
+            (r#"{"mesh": {"ds2": 3, "ds2": 4}}"#, "The field mesh.ds2 occurs twice (line 1, column 25)."),
             (
                 r#"{"limits": {"duration_min_s": {"ds2": 0.03}}}"#,
-                "field limits.duration_min_s.ds3 is missing (line 1, column 43)",
+                "The field limits.duration_min_s.ds3 is missing (line 1, column 43).",
             ),
         ] {
             assert_eq!(refusal::<GaitSettings>(text), told);
         }
         let unknown = refusal::<GaitSettings>(r#"{"mash": 1}"#);
-        assert!(unknown.starts_with("field mash is not known (line 1, column 7); known: one of mesh, "), "{unknown}");
+        assert!(unknown.starts_with("The field mash is unknown (line 1, column 7). Known fields: mesh, "), "{unknown}");
         let long = refusal::<GaitSettings>(&format!(r#"{{"limits": {{"friction": "{}"}}}}"#, "ä".repeat(1000)));
         assert!(long.chars().count() < 200, "{long}");
     }

@@ -1,4 +1,4 @@
-//! What can go wrong in the service. Says nothing of HTTP: one table in `http::problem` does.
+//! The errors of the service. `http::problem` maps them to HTTP responses.
 
 use crate::studies::lifecycle::NotPossible;
 use crate::workers::DispatchError;
@@ -9,24 +9,24 @@ use gaitwright_store::StoreError;
 use serde_json::Value;
 use thiserror::Error;
 
-/// One field that was refused.
+/// A field of a request that was refused.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldError {
-    /// Its name, as in the request (`height_m`).
+    /// The name of the field, as in the request (`height_m`).
     pub field: String,
-    /// What was given; none: it is a file.
+    /// The value that was given; `None` for a file.
     pub value: Option<Value>,
-    /// What would have been accepted, in words or as a range; none: the sentence says what is wrong with a file.
+    /// The accepted values, in words or as a range; `None` for a file, whose fault `message` describes.
     pub allowed: Option<String>,
-    /// The whole sentence.
+    /// The whole sentence for people.
     pub message: String,
 }
 
 impl FieldError {
-    /// A field, its value and what would have been accepted.
+    /// Refuses a value. `allowed` completes the sentence "it must be ...".
     pub fn new(field: &str, value: impl Into<Value>, allowed: &str) -> Self {
         let value = value.into();
-        let message = format!("{field}: {value} is not accepted; allowed: {allowed}");
+        let message = format!("{field} is {value}; it must be {}.", allowed.trim_end_matches('.'));
         Self { field: field.to_owned(), value: Some(value), allowed: Some(allowed.to_owned()), message }
     }
 }
@@ -46,13 +46,13 @@ impl From<ModelError> for FieldError {
     }
 }
 
-/// What can go wrong in the service.
+/// An error of the service.
 #[derive(Debug, Error)]
 pub enum Error {
-    /// What was asked for does not exist.
-    #[error("{what} {id} does not exist")]
+    /// Something that the request names does not exist, or the caller has no access to it.
+    #[error("There is no {what} {id}.")]
     NotFound {
-        /// What.
+        /// The kind of thing.
         what: String,
         /// Its identifier, as given.
         id: String,
@@ -66,75 +66,75 @@ pub enum Error {
     /// The body is of a media type that is not accepted.
     #[error("{0}")]
     UnsupportedMediaType(String),
-    /// The request can be read, but a field is not acceptable.
+    /// A field of the request has a value that is not accepted.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),
-    /// Nobody signed in, or not in a way that is accepted.
+    /// The request has no valid credential.
     #[error("{0}")]
     NotSignedIn(String),
-    /// Too many attempts; to be tried again after so many seconds.
-    #[error("too many attempts: try again in {0} s")]
+    /// Too many failed attempts; the caller has to wait for this many seconds.
+    #[error("Too many attempts. Try again in {0} s.")]
     TooManyAttempts(u64),
-    /// The thing was changed since it was read.
+    /// The resource has changed since the caller read it.
     #[error("{0}")]
     Changed(String),
-    /// The body is larger than is accepted.
+    /// The body exceeds the size limit.
     #[error("{0}")]
     TooLarge(String),
-    /// The address exists, but not with this method.
-    #[error("{method} is not possible at {path}")]
+    /// The address does not accept this method.
+    #[error("{path} does not accept the method {method}.")]
     MethodNotAllowed {
         /// The method.
         method: String,
         /// The address.
         path: String,
     },
-    /// The request comes from where it may not come from.
+    /// The caller lacks a right, or the request comes from another origin.
     #[error("{0}")]
     Forbidden(String),
-    /// The request does not fit the present state.
+    /// The current state does not allow the request.
     #[error("{0}")]
     Conflict(String),
-    /// The learner refused.
-    #[error("learner: {0}")]
+    /// The learner cannot work with the settings or answers of a study.
+    #[error("The learner failed: {0}")]
     Learner(LearnerError),
-    /// Service and workers cannot speak to each other.
+    /// The service and its workers cannot communicate.
     #[error(transparent)]
     Dispatch(#[from] DispatchError),
-    /// The record.
+    /// The record failed.
     #[error(transparent)]
     Store(StoreError),
-    /// What a command has to say cannot be written.
-    #[error("cannot write to stdout: {0}")]
+    /// A command cannot write its output.
+    #[error("Cannot write to standard output: {0}")]
     Output(std::io::Error),
-    /// The disk has no room for it.
+    /// The disk is full.
     #[error("{0}")]
     StorageFull(String),
-    /// The service cannot do its work now.
+    /// The service is temporarily unable to handle the request.
     #[error("{0}")]
     NotReady(String),
-    /// A fault of the program.
-    #[error("internal: {0}")]
+    /// A bug in the program.
+    #[error("Internal error: {0}")]
     Internal(String),
 }
 
 impl Error {
-    /// A request that does not fit the present state.
+    /// A request that the current state does not allow.
     pub fn conflict(reason: impl Into<String>) -> Self {
         Self::Conflict(reason.into())
     }
 
-    /// A field that is not acceptable.
+    /// A field whose value is not accepted. `allowed` completes the sentence "it must be ...".
     pub fn invalid(field: &str, value: impl Into<Value>, allowed: &str) -> Self {
         Self::Invalid(Box::new(FieldError::new(field, value, allowed)))
     }
 
-    /// Whether record, disk or broker are at fault: what was tried may be tried again.
+    /// Whether the record, the disk or the broker failed, so that a retry may succeed.
     pub fn is_of_machine(&self) -> bool {
         matches!(self, Self::Store(_) | Self::Dispatch(_) | Self::StorageFull(_) | Self::NotReady(_))
     }
 
-    /// Whether the request is at fault, and not the program or the machine.
+    /// Whether the request caused the error, rather than the program or the machine.
     pub fn is_input(&self) -> bool {
         !matches!(
             self,
@@ -155,10 +155,10 @@ impl From<StoreError> for Error {
             withdrawn if withdrawn.is_withdrawal() => Self::Conflict(StoreError::Withdrawn.to_string()),
             full if full.is_full() => Self::StorageFull(match full {
                 StoreError::NearlyFull { .. } => full.to_string(),
-                _ => "the disk of the record is full: the change did not happen; make room and try again".to_owned(),
+                _ => "The disk of the record is full. Nothing was changed. Free some space and try again.".to_owned(),
             }),
             closed if closed.is_unwritable() => {
-                Self::NotReady(format!("the record takes no changes, and this one did not happen: {closed}"))
+                Self::NotReady(format!("The record cannot be written. Nothing was changed. {closed}"))
             }
             other => Self::Store(other),
         }

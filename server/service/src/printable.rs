@@ -1,14 +1,14 @@
-//! What people write: names of users, tokens, authors, studies; notes and reasons.
+//! Checks of the text that people type: names, notes and reasons.
 
 use crate::error::Error;
 
-/// Characters that turn the text around them: a name with them reads as another one.
+/// Characters that change the direction of text, so that one name can look like another.
 const TURNING: [char; 12] = [
     '\u{061c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
     '\u{2067}', '\u{2068}', '\u{2069}',
 ];
 
-/// The name without spaces around it.
+/// The name, trimmed.
 ///
 /// # Errors
 /// [`Error::Invalid`] for nothing, for more than `longest` characters, and for characters that do not print.
@@ -21,23 +21,29 @@ pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, E
     Ok(trimmed)
 }
 
-/// A note: of more than one line, or nothing.
+/// Checks a note, which may be empty or have several lines.
 ///
 /// # Errors
-/// [`Error::Invalid`] for more than `longest` characters, and for characters that neither print nor part lines.
+/// [`Error::Invalid`] for more than `longest` characters, or a control character other than tab and line breaks.
 pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error> {
     let length = text.chars().count();
     if length > longest {
-        return Err(Error::invalid(field, length, &format!("at most {longest} characters")));
+        return Err(Error::invalid(
+            field,
+            format!("{length} characters long"),
+            &format!("at most {longest} characters long"),
+        ));
     }
     let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
     match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {
-        Some(c) => Err(Error::invalid(field, c.escape_unicode().to_string(), "characters that print, and line breaks")),
+        Some(c) => {
+            Err(Error::invalid(field, c.escape_unicode().to_string(), "text of printable characters and line breaks"))
+        }
         None => Ok(()),
     }
 }
 
-/// Why something is done: a note that is not empty, without the space around it. `what` follows the allowed range.
+/// A reason: a note that is not empty, trimmed. `what` is appended to the allowed range in the error.
 ///
 /// # Errors
 /// As [`note`].
@@ -76,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn what_prints_is_a_name() {
+    fn names_are_trimmed_and_printable() {
         assert_eq!(name("name", " Dr. Ünal-Řehoř ", 80).unwrap(), "Dr. Ünal-Řehoř");
         for bad in ["", "  ", "a\0b", "a\nb", "a\u{202e}b", &"x".repeat(81)] {
             let refusal = name("name", bad, 80).unwrap_err().to_string();

@@ -1,5 +1,5 @@
-//! Tasks that the service needs as long as it runs. One that fails or panics is begun again, after longer and longer pauses,
-//! and the service says that it is not ready while one is down or fails often.
+//! Supervision of background tasks: restarts a task that fails or panics, after growing pauses. The service is not
+//! ready while a task is down or fails often.
 
 use crate::error::Error;
 use std::collections::{BTreeMap, VecDeque};
@@ -9,29 +9,29 @@ use tokio::task::JoinError;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::AbortOnDropHandle;
 
-/// Pause before a task is begun again; twice as long after each failure that follows soon.
+/// Pause before the first restart. It doubles with each failure that follows soon.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest of these pauses.
 const LONGEST_PAUSE: Duration = Duration::from_secs(10);
-/// A task that fails so often within [`RECENTLY`] is reported even while it runs.
+/// Number of failures within [`RECENTLY`] from which a running task is reported too.
 const OFTEN: usize = 5;
-/// See [`OFTEN`].
+/// The time window of [`OFTEN`].
 const RECENTLY: Duration = Duration::from_mins(1);
 
-/// How the tasks of the service are.
+/// The states of the background tasks.
 #[derive(Debug, Clone, Default)]
 pub struct Tasks(Arc<Mutex<BTreeMap<&'static str, State>>>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Why it is down; none: it runs.
+    /// Why the task is down; `None` while it runs.
     down: Option<String>,
-    /// The last failures, the newest last, with the reason of that.
+    /// Times of the last failures, and the reason of the newest.
     failures: VecDeque<Instant>,
     reason: String,
 }
 
-/// A running task, to say that it works.
+/// A handle with which a running task reports that it works.
 #[derive(Debug, Clone)]
 pub struct Task {
     name: &'static str,
@@ -39,14 +39,14 @@ pub struct Task {
 }
 
 impl Task {
-    /// The task works: what it failed for before is over.
+    /// Reports that the task works, which clears its last failure.
     pub fn works(&self) {
         self.tasks.all().entry(self.name).or_default().down = None;
     }
 }
 
 impl Tasks {
-    /// Keeps a task running until `stop`. It runs as a task of its own, so that a panic ends nothing else.
+    /// Keeps a task running until `stop`. It runs as its own Tokio task, so that a panic cannot stop others.
     pub async fn keep<F>(&self, name: &'static str, stop: &CancellationToken, begin: impl Fn(Task) -> F)
     where
         F: Future<Output = Result<(), Error>> + Send + 'static,
@@ -62,7 +62,7 @@ impl Tasks {
                 Ok(Some(Err(error))) => error.to_string(),
                 Err(error) => words_of(error),
             };
-            tracing::error!(task = name, reason, "a task of the service failed; it is begun again");
+            tracing::error!(task = name, reason, "a background task failed; restarting it");
             self.failed(name, reason);
             if begun.elapsed() > RECENTLY {
                 pause = FIRST_PAUSE;
@@ -74,14 +74,14 @@ impl Tasks {
         }
     }
 
-    /// Which task is down or fails often, and why; none: all work.
+    /// Which task is down or fails often, and why; `None` if all work.
     pub fn trouble(&self) -> Option<String> {
         self.all().iter().find_map(|(name, state)| {
             let recent = state.failures.iter().filter(|at| at.elapsed() < RECENTLY).count();
             match &state.down {
                 Some(reason) => Some(format!("{name} is down: {reason}")),
                 None if recent >= OFTEN => {
-                    Some(format!("{name} failed {recent} times within a minute, the last time: {}", state.reason))
+                    Some(format!("{name} failed {recent} times within a minute; last reason: {}", state.reason))
                 }
                 None => None,
             }
@@ -100,7 +100,7 @@ impl Tasks {
     }
 
     fn all(&self) -> MutexGuard<'_, BTreeMap<&'static str, State>> {
-        // The map is whole between any two statements that hold the lock.
+        // The map is consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_task_that_panics_or_fails_is_reported_and_begun_again() {
+    async fn failed_task_is_reported_and_restarted() {
         let (tasks, stop, begun) = (Tasks::default(), CancellationToken::new(), Arc::new(AtomicUsize::new(0)));
         let kept = tokio::spawn({
             let (tasks, stop, begun) = (tasks.clone(), stop.clone(), Arc::clone(&begun));
@@ -160,12 +160,12 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_task_that_fails_again_and_again_is_reported_while_it_runs() {
+    async fn repeatedly_failing_task_is_reported_while_it_runs() {
         let (tasks, task) = (Tasks::default(), "planning");
         for _ in 0..OFTEN {
             tasks.failed(task, "refused".to_owned());
             Task { name: task, tasks: tasks.clone() }.works();
         }
-        assert_eq!(tasks.trouble().as_deref(), Some("planning failed 5 times within a minute, the last time: refused"));
+        assert_eq!(tasks.trouble().as_deref(), Some("planning failed 5 times within a minute; last reason: refused"));
     }
 }

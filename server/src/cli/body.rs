@@ -1,11 +1,11 @@
-//! Flags that say who walks and in which variant.
+//! Flags for the subject and the variant.
 
 use super::numbers::subject;
 use clap::{Args, ValueEnum};
 use gait_optimizer::Subject;
 use gaitwright_service::error::Error;
 
-/// Who walks: one of the paper's subjects, or a height and a mass.
+/// The subject: one of the paper's, or a height and a mass.
 #[derive(Debug, Clone, Args)]
 pub(super) struct Body {
     /// Subject of the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg). Default: 1.
@@ -29,12 +29,12 @@ impl Body {
     }
 }
 
-/// On or off.
+/// A switch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Switch {
-    /// Yes.
+    /// On.
     On,
-    /// No.
+    /// Off.
     Off,
 }
 

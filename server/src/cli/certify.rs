@@ -1,4 +1,4 @@
-//! `gaitwright certify`: an independent certification of a gait.
+//! `gaitwright certify`: certifies a gait independently of the optimiser.
 
 use super::gait_file::read_gait;
 use super::output::data;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct Certify {
-    /// A file of `solve --out`, or a gait as the service gives it.
+    /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
     /// Print the certificate as one JSON object.
@@ -19,7 +19,7 @@ pub(super) struct Certify {
 }
 
 impl Certify {
-    /// A gait that does not pass is an answer, not an error.
+    /// Certifies the gait. A failed certificate is a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let gait = read_gait(&self.gait)?;
         let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
@@ -32,7 +32,7 @@ impl Certify {
     }
 }
 
-/// The whole certificate as text.
+/// The certificate as text.
 pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
     lines.extend(certificate.objections.iter().map(|objection| format!("  objection: {objection}")));

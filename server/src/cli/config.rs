@@ -1,4 +1,5 @@
-//! Configuration of the service: flags, then environment, then file, then defaults; each value knows where it is from.
+//! Settings of the service: flags override the environment, which overrides the settings file, which overrides
+//! defaults. Each value has its origin.
 
 use super::numbers::workers;
 use super::output::data;
@@ -15,100 +16,92 @@ use std::str::FromStr;
 use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
-/// The file that is read when none is named.
+/// The settings file that is read by default.
 const DEFAULT_FILE: &str = "gaitwright.toml";
 
-/// What can be set: name in the file, default, meaning. Flag and environment follow from the name.
+/// Every setting: name in the file, default, meaning. Flag and environment variable derive from the name.
 const KNOWN: &[(&str, &str, &str)] = &[
-    ("listen", "127.0.0.1:8080", "where to listen"),
-    ("database", "gaitwright.db", "the SQLite file"),
-    ("anchor", "", "a second file for the newest hashes of the record, best on another disk; one is always beside it"),
-    ("backup_folder", "", "where the service copies the record by itself, best on another disk; empty: nowhere"),
-    ("backup_hours", "24", "a copy every so many hours; with backup_folder"),
-    ("backup_keep", "14", "how many of these copies are kept; with backup_folder"),
-    (
-        "host_names",
-        "",
-        "names under which browsers reach the service, besides its address and localhost; commas between",
-    ),
-    ("workers", "cores", "how many solves at the same time; with nats, over all its workers together"),
-    ("nats", "", "NATS broker whose workers solve, nats://HOST:PORT; empty: this process solves itself"),
-    ("nats_queue", "gaitwright", "name of this service on the broker; its workers need the same name"),
-    ("sign_in", "true", "whether people and programs say who they are; false on this machine only"),
-    ("idle_minutes", "60", "a session without a sign of life for so long ends"),
-    ("session_hours", "12", "a session ends so long after signing in, used or not"),
-    ("tls_certificate", "", "PEM file with the certificate chain; with tls_key, the service speaks HTTPS"),
+    ("listen", "127.0.0.1:8080", "address and port to listen on"),
+    ("database", "gaitwright.db", "SQLite file"),
+    ("anchor", "", "second anchor file, best on another disk; the first one is next to the database"),
+    ("backup_folder", "", "folder for scheduled backups, best on another disk; empty: no backups"),
+    ("backup_hours", "24", "hours between scheduled backups"),
+    ("backup_keep", "14", "number of scheduled backups to keep"),
+    ("host_names", "", "comma-separated host names of the service, besides its address and localhost"),
+    ("workers", "cores", "number of solves that run in parallel; with nats, the total of all workers"),
+    ("nats", "", "NATS broker for remote workers, nats://HOST:PORT; empty: solve in this process"),
+    ("nats_queue", "gaitwright", "name of this service on the broker; its workers must use the same name"),
+    ("sign_in", "true", "whether users and programs must sign in; false only on a loopback address"),
+    ("idle_minutes", "60", "minutes without a request after which a session ends"),
+    ("session_hours", "12", "hours after which a session ends in any case"),
+    ("tls_certificate", "", "PEM file with the certificate chain; enables HTTPS, with tls_key"),
     ("tls_key", "", "PEM file with the private key"),
-    (
-        "trusted_proxies",
-        "",
-        "addresses and networks of reverse proxies that are believed about client, scheme and host; commas between",
-    ),
+    ("trusted_proxies", "", "comma-separated addresses and networks of reverse proxies whose headers are trusted"),
     (
         "proxy_headers",
         "x-forwarded",
-        "what these proxies write: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
+        "headers of these proxies: x-forwarded (X-Forwarded-For, -Proto, -Host) or forwarded",
     ),
-    ("connections", "1000", "most connections at the same time, as far as there are descriptors"),
-    ("connections_per_address", "100", "most connections of one address; trusted proxies have no such limit"),
-    ("access_log_days", "0", "rows of the access log that are older are dropped; 0: all are kept"),
-    ("reserve_mb", "500", "free space in MB below which no study or solve is begun, so that answers still fit"),
-    ("log", "warn,gaitwright=info", "what is logged, as RUST_LOG"),
-    ("log_format", "text", "text or json"),
+    ("connections", "1000", "maximum number of open connections, if the system has enough file descriptors"),
+    ("connections_per_address", "100", "maximum number of connections from one address; trusted proxies are exempt"),
+    ("access_log_days", "0", "days for which rows of the access log are kept; 0: forever"),
+    ("reserve_mb", "500", "free disk space, MB, below which no new study or solve starts"),
+    ("log", "warn,gaitwright=info", "log filter, as in RUST_LOG"),
+    ("log_format", "text", "log format: text or json"),
 ];
 
-/// Flags that say where settings come from.
+/// Flags of `serve` and `config show`.
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct Flags {
-    /// Settings file (TOML); default: gaitwright.toml, if it is there.
+    /// TOML settings file (default: gaitwright.toml, if it exists).
     #[arg(long, env = "GAITWRIGHT_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Where to listen; default 127.0.0.1:8080.
+    /// Address and port to listen on (default: 127.0.0.1:8080).
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<String>,
-    /// The SQLite file, made if it does not exist; default gaitwright.db.
+    /// SQLite file, created if missing (default: gaitwright.db).
     #[arg(long, value_name = "FILE")]
     database: Option<String>,
-    /// A second file for the newest hashes of the record, best on another disk than the one that is kept beside it.
+    /// Second anchor file for the newest hashes of the record, best on another disk.
     #[arg(long, value_name = "FILE")]
     anchor: Option<String>,
-    /// Where the service copies the record by itself, best on another disk; default: nowhere.
+    /// Folder for scheduled backups, best on another disk (default: no backups).
     #[arg(long, value_name = "FOLDER")]
     backup_folder: Option<String>,
-    /// A copy every so many hours; default 24.
+    /// Hours between scheduled backups (default: 24).
     #[arg(long, value_name = "HOURS")]
     backup_hours: Option<String>,
-    /// How many of these copies are kept; default 14.
+    /// Number of scheduled backups to keep (default: 14).
     #[arg(long, value_name = "NUMBER")]
     backup_keep: Option<String>,
-    /// A name under which browsers reach the service, besides its address and localhost; may be given several times.
+    /// Host name of the service, besides its address and localhost; can be repeated.
     #[arg(long, value_delimiter = ',', value_name = "NAME")]
     host_name: Vec<String>,
-    /// How many solves at the same time; default: the number of cores.
+    /// Number of solves that run in parallel (default: number of cores).
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
-    /// NATS broker whose workers solve (`gaitwright worker`); default: this process solves itself.
+    /// NATS broker for remote workers, see `gaitwright worker` (default: solve in this process).
     #[arg(long, value_name = "URL")]
     nats: Option<String>,
-    /// Name of this service on the broker; default gaitwright.
+    /// Name of this service on the broker (default: gaitwright).
     #[arg(long, value_name = "NAME")]
     nats_queue: Option<String>,
-    /// Ask nobody to sign in: for one person on this machine.
+    /// Do not require users to sign in. Only on a loopback address.
     #[arg(long)]
     no_sign_in: bool,
-    /// A session without a sign of life for so long ends; default 60.
+    /// Minutes without a request after which a session ends (default: 60).
     #[arg(long, value_name = "MINUTES")]
     idle_minutes: Option<String>,
-    /// A session ends so long after signing in, used or not; default 12.
+    /// Hours after which a session ends in any case (default: 12).
     #[arg(long, value_name = "HOURS")]
     session_hours: Option<String>,
-    /// Address or network of a reverse proxy that is believed about client, scheme and host; may be given several times.
+    /// Address or network of a reverse proxy whose headers are trusted; can be repeated.
     #[arg(long, value_delimiter = ',', value_name = "ADDRESS[/BITS]")]
     trusted_proxy: Vec<String>,
-    /// What trusted proxies write: x-forwarded (default) or forwarded.
+    /// Headers of trusted proxies: x-forwarded or forwarded (default: x-forwarded).
     #[arg(long, value_name = "KIND")]
     proxy_headers: Option<String>,
-    /// PEM file with the certificate chain; with --tls-key, the service speaks HTTPS.
+    /// PEM file with the certificate chain; enables HTTPS, with --tls-key.
     #[arg(long, value_name = "FILE")]
     tls_certificate: Option<String>,
     /// PEM file with the private key.
@@ -116,7 +109,7 @@ pub(super) struct Flags {
     tls_key: Option<String>,
 }
 
-/// Where a value comes from.
+/// The origin of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Origin {
     Flag,
@@ -180,7 +173,7 @@ impl Settings {
         self.text(name).parse().map_err(|_| self.refused(name, allowed))
     }
 
-    /// The refusal of a setting, naming where it comes from.
+    /// The error for a setting, with its origin.
     pub(super) fn refused(&self, name: &str, allowed: &str) -> Error {
         let origin = self.0.get(name).map_or(&Origin::Default, |(_, origin)| origin);
         Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
@@ -194,12 +187,12 @@ impl Settings {
         PathBuf::from(self.text("database"))
     }
 
-    /// The second anchor.
+    /// The second anchor file.
     pub(super) fn anchor(&self) -> Option<PathBuf> {
         Some(self.text("anchor")).filter(|path| !path.is_empty()).map(PathBuf::from)
     }
 
-    /// Where the service copies the record by itself; `None`: nowhere.
+    /// Scheduled backups, if any.
     pub(super) fn backups(&self) -> Result<Option<BackupPlan>, Error> {
         let hours: u64 = self.parsed("backup_hours", "1 to 8760")?;
         let keep: usize = self.parsed("backup_keep", "1 to 10000")?;
@@ -229,7 +222,7 @@ impl Settings {
         }
     }
 
-    /// The broker and the name of the service there; `None`: no broker.
+    /// The broker and the name of the service on it, if any.
     pub(super) fn nats(&self) -> Result<Option<(&str, &str)>, Error> {
         let queue = self.text("nats_queue");
         queue_name(queue).map_err(|_| self.refused("nats_queue", QUEUE_NAMES))?;
@@ -245,7 +238,7 @@ impl Settings {
         self.parsed("sign_in", "true, false")
     }
 
-    /// When sessions end by themselves.
+    /// When sessions expire.
     pub(super) fn session_limits(&self) -> Result<SessionLimits, Error> {
         let idle_seconds = 60.0 * self.within("idle_minutes", 1.0, 1440.0)?;
         Ok(SessionLimits { idle_seconds, lifetime_seconds: 3600.0 * self.within("session_hours", 1.0, 720.0)? })
@@ -257,7 +250,7 @@ impl Settings {
         if (least..=most).contains(&number) { Ok(number) } else { Err(self.refused(name, &allowed)) }
     }
 
-    /// The reverse proxies that are believed.
+    /// The trusted reverse proxies.
     pub(super) fn proxies(&self) -> Result<Proxies, Error> {
         let names = self.text("trusted_proxies").split(',').map(str::trim).filter(|name| !name.is_empty());
         let trusted: Result<Vec<Network>, _> = names.map(str::parse).collect();
@@ -269,14 +262,14 @@ impl Settings {
         Ok(Proxies::new(&trusted.map_err(|_| self.refused("trusted_proxies", NETWORKS))?, headers))
     }
 
-    /// Rows of the access log that are older are dropped; `None`: all are kept.
+    /// Days for which the access log is kept; `None`: forever.
     pub(super) fn access_log_days(&self) -> Result<Option<u32>, Error> {
         let allowed = "0 to 36500";
         let days: u32 = self.parsed("access_log_days", allowed)?;
         if days <= 36_500 { Ok((days > 0).then_some(days)) } else { Err(self.refused("access_log_days", allowed)) }
     }
 
-    /// How many connections are held.
+    /// Limits of open connections.
     pub(super) fn connections(&self) -> Result<Limits, Error> {
         let number = |name: &str| {
             let allowed = "1 to 60000";
@@ -305,7 +298,7 @@ impl Settings {
         }
     }
 
-    /// What is logged, and whether as JSON.
+    /// The log filter, and whether the log is JSON.
     pub(super) fn log(&self) -> Result<(EnvFilter, bool), Error> {
         let allowed = "targets and levels such as warn,gaitwright=info";
         let filter = EnvFilter::try_new(self.text("log")).map_err(|_| self.refused("log", allowed))?;
@@ -342,10 +335,10 @@ impl Flags {
     }
 }
 
-/// Names that NATS takes for a stream and as the first part of a subject.
-const QUEUE_NAMES: &str = "1 to 60 letters, digits, - and _";
+/// Names that NATS accepts for a stream and as the first part of a subject.
+const QUEUE_NAMES: &str = "1 to 60 letters, digits, - or _";
 
-/// A name of a service on a broker.
+/// Parses the name of a service on a broker.
 pub(super) fn queue_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if (1..=60).contains(&text.len()) && text.chars().all(known) {
@@ -355,8 +348,8 @@ pub(super) fn queue_name(text: &str) -> Result<String, String> {
     }
 }
 
-/// Variables of the environment that look like settings of this program and are none. They are named and not refused:
-/// where services of other machines are announced in the environment, as in Kubernetes, some of them begin like ours.
+/// Environment variables that look like settings of this program but are not. They get a warning, not an error:
+/// Kubernetes announces services in variables that may start with our prefix.
 pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
     let is_known = |name: &str| name == "CONFIG" || KNOWN.iter().any(|(known, ..)| known.to_uppercase() == *name);
     let mut unknown: Vec<String> =
@@ -365,7 +358,7 @@ pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<Stri
     unknown
 }
 
-/// An address as it may be shown: whoever is named in it, without the password.
+/// The address without the user and password in it.
 fn without_password(text: &str) -> String {
     let Some((scheme, rest)) = text.split_once("://") else { return text.to_owned() };
     match rest.rsplit_once('@') {
@@ -375,7 +368,7 @@ fn without_password(text: &str) -> String {
 }
 
 fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))
+    std::fs::read_to_string(path).map_err(|e| Error::Malformed(format!("Cannot read {}: {e}.", path.display())))
 }
 
 fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>, Error> {
@@ -385,14 +378,14 @@ fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>, Error> {
     for (name, value) in table {
         if !KNOWN.iter().any(|(known, ..)| *known == name) {
             let known = KNOWN.iter().map(|(known, ..)| *known).collect::<Vec<_>>().join(", ");
-            return Err(malformed(format!("{name} is not a setting; known: {known}")));
+            return Err(malformed(format!("{name} is not a setting. Settings: {known}.")));
         }
         let value = match value {
             toml::Value::String(text) => text,
             toml::Value::Integer(number) => number.to_string(),
             toml::Value::Float(number) => number.to_string(),
             toml::Value::Boolean(flag) => flag.to_string(),
-            _ => return Err(malformed(format!("{name}: a text, a number or true/false is expected"))),
+            _ => return Err(malformed(format!("{name} must be a string, a number or true/false."))),
         };
         values.insert(name, value);
     }
@@ -457,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_with_its_origin() {
+    fn invalid_values_are_refused_with_their_origin() {
         let settings_of = settings(&Flags::default(), &[("GAITWRIGHT_WORKERS", "0")]).unwrap();
         let refused = settings_of.workers().unwrap_err().to_string();
         assert!(refused.contains("GAITWRIGHT_WORKERS") && refused.contains("1 to 64"), "{refused}");
@@ -481,7 +474,7 @@ mod tests {
     }
 
     #[test]
-    fn logs_are_refused_that_would_never_be_written() {
+    fn invalid_log_settings_are_refused() {
         let with =
             |name, value| settings(&Flags::default(), &[(name, value)]).unwrap().log().map_err(|e| e.to_string());
         assert!(with("GAITWRIGHT_LOG_FORMAT", "json").unwrap().1);
@@ -492,7 +485,7 @@ mod tests {
     }
 
     #[test]
-    fn variables_that_only_look_like_settings_are_found() {
+    fn unknown_environment_variables_are_found() {
         let names = ["GAITWRIGHT_WORKER", "GAITWRIGHT_WORKERS", "GAITWRIGHT_CONFIG", "HOME"];
         assert_eq!(unknown_variables(names.into_iter().map(str::to_owned)), ["GAITWRIGHT_WORKER"]);
     }
@@ -507,7 +500,7 @@ mod tests {
     }
 
     #[test]
-    fn a_password_in_an_address_is_not_shown() {
+    fn passwords_in_addresses_are_hidden() {
         assert_eq!(without_password("nats://lab:s3@cret@broker:4222"), "nats://...@broker:4222");
         assert_eq!(without_password("nats://broker:4222"), "nats://broker:4222");
         assert_eq!(without_password("warn,gaitwright=info"), "warn,gaitwright=info");

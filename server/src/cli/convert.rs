@@ -1,4 +1,5 @@
-//! `gaitwright convert`: a gait for other programs. Controller files come from the record alone, which knows safety reports.
+//! `gaitwright convert`: converts a gait for other programs. Not to controller files: only the record knows safety
+//! reports.
 
 use super::gait_file::read_gait;
 use super::out_file::OutFile;
@@ -11,12 +12,12 @@ use gaitwright_charts::gait_table::gait_csv;
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
-/// What a gait is converted to.
+/// A target format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// Table of the nodes (CSV): angles, velocities, torques, forces, activations in SI units.
+    /// Table of the nodes (CSV) with angles, velocities, torques, forces and activations in SI units.
     Csv,
-    /// OpenSim motion file (.mot), degrees, OpenSim's signs.
+    /// OpenSim motion file (.mot) in degrees, with OpenSim's signs.
     Mot,
     /// The stride as a row of stick figures (SVG).
     Tiles,
@@ -24,16 +25,16 @@ enum Form {
 
 #[derive(Debug, Args)]
 pub(super) struct Convert {
-    /// A file of `solve --out`, or a gait as the service gives it.
+    /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
-    /// What to convert to.
+    /// Target format.
     #[arg(long, value_enum)]
     to: Form,
-    /// Samples per second of `mot`, 10 to 5000.
+    /// Sampling rate of `mot`, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", allow_negative_numbers = true)]
     rate_hz: f64,
-    /// Where to write it; default: stdout.
+    /// Output file (default: standard output).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! `gaitwright emg`: muscle activity over the gait cycle from a recording, without the service.
+//! `gaitwright emg`: processes EMG recordings to muscle activity over the gait cycle.
 
 use super::choices::{EMG_FORMATS, one_of};
 use super::out_file::OutFile;
@@ -14,60 +14,61 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct Emg {
-    /// The recording: CSV or OpenSim file with a column per channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R).
+    /// EMG recording: CSV or OpenSim file with a column for each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R).
     #[arg(value_name = "FILE")]
     recording: PathBuf,
-    /// Normal walking, which the recording is measured by; default: the recording is normal walking itself.
+    /// EMG recording of normal walking, for normalisation and EMG RMSE (default: the recording itself).
     #[arg(long, value_name = "FILE")]
     normal: Option<PathBuf>,
-    /// Form of both files.
+    /// Format of both files.
     #[arg(long, value_parser = one_of::<FileForm>(EMG_FORMATS), default_value = "csv")]
     form: FileForm,
-    /// Samples per second, 100 to 20000, of a CSV file without a column time_s.
+    /// Sampling rate of a CSV file without a column time_s, 100 to 20000.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate_hz: Option<f64>,
-    /// Columns of the channels where they have other names, as in TA_L=EMG2,BF_L=EMG3; others are left out.
+    /// Columns of the channels, as in TA_L=EMG2,BF_L=EMG3; other channels are ignored (default: columns named like
+    /// channels).
     #[arg(long, value_name = "CHANNEL=COLUMN,...", value_delimiter = ',', value_parser = channel)]
     channels: Vec<(String, String)>,
-    /// Column of both files that tells right heel strikes: a switch under the heel, or the force under the foot.
+    /// Column of both files for right heel strikes: a switch under the heel, or the vertical force under the foot.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
     heel_strike_column: Option<String>,
-    /// The foot is on the ground where that column is above this.
+    /// Value of that column above which the foot is on the ground.
     #[arg(long, value_name = "NUMBER", default_value = "0.5", allow_negative_numbers = true)]
     heel_strike_threshold: f64,
-    /// Right heel strikes of the recording, s, as in 0.41,1.52,2.63.
+    /// Times of right heel strikes in the recording, as in 0.41,1.52,2.63.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]
     heel_strikes_s: Vec<f64>,
-    /// Right heel strikes of normal walking, s.
+    /// Times of right heel strikes in the recording of normal walking.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", allow_negative_numbers = true)]
     normal_heel_strikes_s: Vec<f64>,
     #[command(flatten)]
     filters: Filters,
-    /// Print everything as one JSON object.
+    /// Print the results as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Where the mean cycles go: percent, then mean and standard deviation of each channel, in shares of the peak of
-    /// normal walking.
+    /// Output file for the mean cycles: percent, then mean and standard deviation of each channel, relative to the peak
+    /// of normal walking.
     #[arg(long, value_name = "FILE.csv")]
     cycles: Option<PathBuf>,
-    /// Where the envelopes go: time, then each channel in the unit of the recording.
+    /// Output file for the envelopes: time, then each channel in the unit of the recording.
     #[arg(long, value_name = "FILE.csv")]
     envelopes: Option<PathBuf>,
 }
 
-/// The filters of the chain.
+/// Filter settings.
 #[derive(Debug, Args)]
 struct Filters {
-    /// Lower edge of the band-pass, Hz; default: 20.
+    /// Lower cut-off frequency of the band-pass filter (default: 20).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     band_low_hz: Option<f64>,
-    /// Upper edge of the band-pass, Hz; below half the sampling rate; default: 450.
+    /// Upper cut-off frequency of the band-pass filter, below half the sampling rate (default: 450).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     band_high_hz: Option<f64>,
-    /// Edge of the low-pass that makes the envelope, Hz; default: 6.
+    /// Cut-off frequency of the low-pass filter for the envelope (default: 6).
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     envelope_hz: Option<f64>,
-    /// Order of both filters: 2, 4, 6 or 8; default: 4.
+    /// Order of both filters: 2, 4, 6 or 8 (default: 4).
     #[arg(long, value_name = "NUMBER")]
     order: Option<usize>,
 }
@@ -85,11 +86,11 @@ impl Filters {
 }
 
 fn channel(text: &str) -> Result<(String, String), String> {
-    let (channel, column) = text.split_once('=').ok_or("expected CHANNEL=COLUMN, as in TA_L=EMG2")?;
+    let (channel, column) = text.split_once('=').ok_or("write CHANNEL=COLUMN, as in TA_L=EMG2")?;
     Ok((channel.trim().to_owned(), column.trim().to_owned()))
 }
 
-/// What was found, and how.
+/// The results and the settings of the filters.
 #[derive(Serialize)]
 struct Found {
     settings: EmgSettings,
@@ -108,7 +109,7 @@ impl Emg {
             Some(path) => {
                 let (normal, strikes) = self.read(path, &self.normal_heel_strikes_s)?;
                 if normal == recording {
-                    let allowed = "another recording than the one that is measured by it: no two walks are alike";
+                    let allowed = "a different recording than the one that is compared with it";
                     return Err(Error::invalid("normal", path.display().to_string(), allowed));
                 }
                 Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?
@@ -151,8 +152,8 @@ impl Emg {
 fn for_people(found: &Found) -> String {
     let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = found.settings;
     let mut lines = vec![format!(
-        "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; in shares of the \
-         peak of normal walking"
+        "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; relative to the \
+        peak of normal walking"
     )];
     let Activity { channels, averages, emg_rmse } = &found.activity;
     for (place, (channel, average)) in channels.iter().zip(averages).enumerate() {
@@ -161,7 +162,7 @@ fn for_people(found: &Found) -> String {
         let (name, peak, strides) = (&channel.channel, channel.peak(), channel.strides);
         lines.push(format!("{name}: average {average:.4}, peak {peak:.4}{distance} ({strides} strides)"));
     }
-    lines.extend(emg_rmse.as_ref().map(|rmse| format!("EMG RMSE in all: {:.4}", rmse.total)));
+    lines.extend(emg_rmse.as_ref().map(|rmse| format!("total EMG RMSE: {:.4}", rmse.total)));
     lines.extend(emg_rmse.iter().flat_map(|rmse| rmse.remarks.iter().cloned()));
     lines.join("\n")
 }

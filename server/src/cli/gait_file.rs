@@ -1,4 +1,4 @@
-//! Files that hold a gait: what `solve --out` wrote, or the gait alone, as the service gives it.
+//! Reads a gait from a file of `solve --out`, or from a gait file of the service.
 
 use super::problem::read;
 use gait_optimizer::{Gait, SolveOutcome};
@@ -7,7 +7,7 @@ use gaitwright_service::error::Error;
 use serde_json::Value;
 use std::path::Path;
 
-/// The gait of a file.
+/// Reads the gait.
 ///
 /// # Errors
 /// [`Error::Malformed`] with the file's name and the reason.
@@ -21,5 +21,5 @@ pub(super) fn read_gait(path: &Path) -> Result<Gait, Error> {
             document::read(bytes)
         }
     });
-    gait.map_err(|e| Error::Malformed(format!("{}: not a gait: {e}", path.display())))
+    gait.map_err(|e| Error::Malformed(format!("{} is not a gait file: {e}", path.display())))
 }

@@ -1,14 +1,15 @@
-//! Which gait a gait came from. Studies name the trial that a trial started from; a file of `solve --out` names the gaits
-//! before its own, so that the basin of the first cold start is known however many warm starts later.
+//! The lineage of a gait: the gaits from which it was computed by warm starts, back to the basin of the first cold
+//! start. Files of `solve --out` contain it.
 
 use gait_optimizer::{SolveOutcome, SolveReport, StartedFrom, WarmStart};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// Digits of an identifier: enough for a name, which is all that it is.
+/// Number of digits of an identifier.
 const DIGITS: usize = 16;
 
-/// A gait by where its solve ended: the same point has the same identifier, in files of any version.
+/// The identifier of a gait, derived from the point where its solve ended. It does not depend on the version of the
+/// file.
 pub(super) fn identifier(end: &WarmStart) -> String {
     let mut hash = Sha256::new();
     for value in &end.point.x {
@@ -19,15 +20,15 @@ pub(super) fn identifier(end: &WarmStart) -> String {
     digits
 }
 
-/// A gait that another one came from.
+/// A gait from which another one was computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Ancestor {
     /// Its identifier.
     pub(super) id: String,
-    /// Its basin, as the solve that found it numbers them.
+    /// Its basin, as numbered by the solve that found it.
     #[serde(default)]
     pub(super) basin: Option<usize>,
-    /// Its objective, under the bounds of its own solve.
+    /// Its objective, with the bounds of its own solve.
     #[serde(default)]
     pub(super) objective: Option<f64>,
     /// Its Gait RMSE, rad.
@@ -36,7 +37,7 @@ pub(super) struct Ancestor {
 }
 
 impl Ancestor {
-    /// In words: `gait 0123456789abcdef (basin 2, objective 0.06341, Gait RMSE 1.0938 rad)`.
+    /// As text: `gait 0123456789abcdef (basin 2, objective 0.06341, Gait RMSE 1.0938 rad)`.
     pub(super) fn in_words(&self) -> String {
         let known = [
             self.basin.map(|basin| format!("basin {basin}")),
@@ -48,21 +49,21 @@ impl Ancestor {
     }
 }
 
-/// The gait of a solve, and those it came from.
+/// The gait of a solve and its ancestors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Lineage {
-    /// Identifier of the answer.
+    /// Identifier of the gait.
     pub(super) id: String,
-    /// Its basin, as this solve numbers them; none where the solve did not converge.
+    /// Its basin, as numbered by this solve; `None` if the solve did not converge.
     pub(super) basin: Option<usize>,
-    /// What it came from by warm starts, the nearest first; empty after a cold start, also one that a failed warm start was
-    /// followed by.
+    /// Its ancestors by warm starts, the nearest first. Empty after a cold start, also if that followed a failed warm
+    /// start.
     #[serde(default)]
     pub(super) ancestors: Vec<Ancestor>,
 }
 
 impl Lineage {
-    /// That of an outcome; `start` is what its solve was given to start from.
+    /// The lineage of an outcome; `start` is the warm start that was given to the solve.
     pub(super) fn of(outcome: &SolveOutcome, start: Option<&Start>) -> Self {
         let ancestors = match outcome.report.started_from {
             StartedFrom::Warm => {
@@ -74,33 +75,33 @@ impl Lineage {
     }
 }
 
-/// A warm start, and the gait that it is.
+/// A warm start and its gait.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
     pub(super) point: WarmStart,
     pub(super) gait: Ancestor,
-    /// What that gait came from, the nearest first.
+    /// The ancestors of that gait, the nearest first.
     before: Vec<Ancestor>,
 }
 
 impl Start {
-    /// A point of which nothing else is known.
+    /// A point without further information.
     pub(super) fn unknown(point: WarmStart) -> Self {
         let gait = Ancestor { id: identifier(&point), basin: None, objective: None, gait_rmse_rad: None };
         Self { point, gait, before: Vec::new() }
     }
 
-    /// The answer of a solve; `said` is the lineage in its file.
+    /// The gait of an outcome; `said` is the lineage in its file.
     pub(super) fn answer(outcome: SolveOutcome, said: Option<Lineage>) -> Self {
         let report = &outcome.report;
         let figures = (basin_of_answer(report), report.objective, report.gait_rmse_rad);
         let mut start = Self::cold(outcome.warm_start, figures);
-        // What is said of another gait is not said of this one.
+        // Ignore the lineage of a different gait.
         start.before = said.filter(|said| said.id == start.gait.id).map_or_else(Vec::new, |said| said.ancestors);
         start
     }
 
-    /// A gait with basin, objective and Gait RMSE that a cold start found.
+    /// A gait that a cold start found, with basin, objective and Gait RMSE.
     pub(super) fn cold(point: WarmStart, (basin, objective, rmse): (Option<usize>, f64, f64)) -> Self {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         let (objective, gait_rmse_rad) = (finite(objective), finite(rmse));
@@ -109,7 +110,7 @@ impl Start {
     }
 }
 
-/// The basin of the answer of a solve.
+/// The basin of the gait of a solve.
 pub(super) fn basin_of_answer(report: &SolveReport) -> Option<usize> {
     report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.basin)
 }
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gait_is_known_by_its_point() {
+    fn identifier_depends_on_the_point_alone() {
         let id = identifier(&end(&[0.5, -1.0]));
         assert_eq!(id.len(), DIGITS);
         assert_eq!(identifier(&end(&[0.5, -1.0])), id);
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ancestor_says_what_is_known_of_it() {
+    fn ancestor_text_has_all_known_values() {
         let start = Start::cold(end(&[0.5]), (Some(2), 0.063_41, f64::NAN));
         let id = &start.gait.id;
         assert_eq!(start.gait.in_words(), format!("gait {id} (basin 2, objective 0.06341)"));

@@ -1,11 +1,11 @@
-//! Logs: to stderr. `RUST_LOG` or the setting `log` decides how much, `log_format` how.
+//! Starts logging to stderr, with the filter from `RUST_LOG` or the setting `log`.
 
 use super::output::tell;
 use gaitwright_service::error::Error;
 use std::io::IsTerminal;
 use tracing_subscriber::EnvFilter;
 
-/// Begins to log.
+/// Starts logging.
 ///
 /// # Errors
 /// [`Error::Invalid`] when `RUST_LOG` cannot be read.
@@ -16,17 +16,17 @@ pub(super) fn start(filter: EnvFilter, json: bool) -> Result<(), Error> {
         })?,
         Err(_) => filter,
     };
-    // A file or a pipe gets no colours; https://no-color.org lets people do without them, too.
+    // No colours in files and pipes, nor with NO_COLOR (https://no-color.org).
     let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_ansi(colours)
-        // It would be said on stderr, which cannot be written then.
+        // Such an error would go to stderr, which cannot be written then.
         .log_internal_errors(false);
     let started = if json { builder.json().try_init() } else { builder.with_target(false).try_init() };
     if let Err(error) = started {
-        tell(&format!("gaitwright: no logs: {error}"));
+        tell(&format!("gaitwright: cannot start logging: {error}"));
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! The command line. Data goes to stdout, progress and logs to stderr.
+//! The command line: parses arguments, runs a command, sets the exit code. Data goes to stdout, messages and logs to
+//! stderr.
 
 mod body;
 mod certify;
@@ -33,20 +34,20 @@ use gaitwright_service::error::Error;
 use output::{data, tell};
 use std::process::ExitCode;
 
-/// Exit code when the input is at fault, as with every usage error.
+/// Exit code for invalid input, as for every usage error.
 const INPUT_FAULT: u8 = 2;
 
-/// Exit code after Ctrl-C or SIGTERM, as shells expect it.
+/// Exit code after Ctrl-C or SIGTERM, as in shells.
 const INTERRUPTED: u8 = 130;
 
-/// How a command came to its end.
+/// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ended {
-    /// It did what it was asked.
+    /// It succeeded.
     Done,
-    /// A person stopped it before that.
+    /// A person stopped it.
     Interrupted,
-    /// It came to an end, but part of it failed for reasons of the program or the machine.
+    /// Part of it failed because of the program or the machine.
     Failed,
 }
 
@@ -62,45 +63,45 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Serve the pages and the REST interface, and run the studies of a database.
+    /// Run the service: pages, REST interface and the studies of a database.
     Serve(serve::Serve),
-    /// Solve what a service hands out through a NATS broker.
+    /// Run solves for a service on another machine, through a NATS broker.
     Worker(worker::Worker),
-    /// Tune a gait unattended: propose, optimise, compare by Gait RMSE, repeat.
+    /// Run an unattended study, in which Gait RMSE answers the comparisons.
     Tune(tune::Tune),
-    /// Repeat the paper's comparison: gaits tuned with and without muscles, with a report.
+    /// Reproduce the paper's comparison of gaits with and without muscles, and write a report.
     Reproduce(reproduce::Reproduce),
     /// Optimise one gait.
     Solve(solve::Solve),
-    /// Optimise one gait for each row of a table of actions.
+    /// Optimise a gait for each row of a table of actions.
     Sweep(sweep::Sweep),
-    /// Certify a gait independently of its optimisation: residuals, closed loop, stability.
+    /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
     Certify(certify::Certify),
-    /// Write a gait as a table, an OpenSim motion or a picture.
+    /// Convert a gait to a table, an OpenSim motion or a picture.
     Convert(convert::Convert),
-    /// Make a reference gait from a recording.
+    /// Compute a reference gait from a recording of joint angles.
     Reference(reference::Reference),
-    /// Process an electromyogram: envelopes, mean cycles, EMG RMSE, average activation.
+    /// Process an EMG recording: envelopes, mean cycles, EMG RMSE, average activation.
     Emg(emg::Emg),
-    /// Check the audit trail.
+    /// Verify the integrity of a database.
     Audit(record::Audit),
     /// Show the settings of the service.
     Config(config::Config),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
-    /// Copy a database, also while it is served.
+    /// Back up a database, also while the service is running.
     Backup(record::Backup),
-    /// Put a copy in place of a database.
+    /// Replace a database with a backup.
     Restore(record::Restore),
-    /// Write a whole study into one file.
+    /// Export a study to an archive.
     Export(study::Export),
-    /// Add the study of such a file to a database.
+    /// Import a study from an archive.
     Import(study::Import),
-    /// Make a key to sign such files with; prints its public half.
+    /// Create a key for signing archives, and print its public key.
     SigningKey(study::NewKey),
-    /// List users and make sign-in links for them.
+    /// List users or create sign-in links for them.
     Users(users::Users),
-    /// Drop old trajectories; what was learned from them stays.
+    /// Delete old trajectories. Figures, answers and recommended gaits are kept.
     Prune(study::Prune),
 }
 
@@ -119,7 +120,9 @@ pub fn run() -> ExitCode {
         return report(&error);
     }
     for name in unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())) {
-        tell(&format!("gaitwright: {name} is set, but is not a setting; `gaitwright config show` names them all"));
+        tell(&format!(
+            "gaitwright: the environment variable {name} is not a setting; `gaitwright config show` lists all settings"
+        ));
     }
     let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
         Ok(runtime) => runtime,

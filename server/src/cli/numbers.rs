@@ -1,10 +1,10 @@
-//! Numbers of the command line: what is refused is refused with its range.
+//! Parsers of numbers on the command line. Errors name the allowed range.
 
 use gaitwright_service::studies::plan::LARGEST_SEED;
 use std::fmt::Display;
 use std::str::FromStr;
 
-/// Most solves at the same time.
+/// Maximum number of parallel solves.
 const MOST_WORKERS: usize = 64;
 
 pub(super) fn workers(text: &str) -> Result<usize, String> {
@@ -24,12 +24,12 @@ pub(super) fn iterations(text: &str) -> Result<usize, String> {
 }
 
 pub(super) fn subject(text: &str) -> Result<u32, String> {
-    text.parse().map_err(|_| "known: 1, 2".to_owned())
+    text.parse().map_err(|_| "must be 1 or 2".to_owned())
 }
 
 pub(super) fn whole<T: FromStr + PartialOrd + Display + Copy>(text: &str, least: T, most: T) -> Result<T, String> {
     match text.trim().parse::<T>() {
         Ok(value) if value >= least && value <= most => Ok(value),
-        _ => Err(format!("allowed is a whole number from {least} to {most}")),
+        _ => Err(format!("must be a whole number from {least} to {most}")),
     }
 }

@@ -1,5 +1,5 @@
-//! A file that a command finishes at its end, but tries at its beginning: hours of solving are not lost to a typing
-//! error in its name. What is appended before the end is there even if the process is killed.
+//! An output file that is checked before a long command starts, and gets its name when it is complete. Appended rows
+//! survive if the process is killed.
 
 use super::output::tell;
 use gaitwright_service::error::Error;
@@ -8,29 +8,28 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A file that is written whole or not at all. Until then there is a hidden one beside it, with what was appended so
-/// far. A link is followed; a device or pipe is written to as it is.
+/// A file that appears only when it is complete. Until then, appended text is in a hidden file next to it. Follows
+/// links, and writes directly to devices and pipes.
 #[derive(Debug)]
 pub(super) struct OutFile {
     path: PathBuf,
-    /// `None`: no regular file.
+    /// The hidden file; `None` for a device or pipe.
     part: Option<PathBuf>,
     file: Option<File>,
 }
 
 impl OutFile {
-    /// Makes sure that the file can be written. `inputs` are files that the command reads: writing over one of them is
-    /// refused.
+    /// Checks that the file can be written. Refuses to overwrite one of `inputs`, which the command reads.
     ///
     /// # Errors
     /// [`Error::Malformed`] with the reason when it cannot.
     pub(super) fn open(path: &Path, inputs: &[&Path]) -> Result<Self, Error> {
         if path == Path::new("-") {
-            return Err(failed(path, "- is no file; what goes to standard output goes there without --out"));
+            return Err(failed(path, "- is not a file. Omit --out to write to standard output"));
         }
         let known = path.canonicalize().ok();
         if let (Some(known), Some(input)) = (&known, inputs.iter().find(|i| i.canonicalize().ok() == known)) {
-            return Err(failed(path, format!("{} is read by this command ({})", input.display(), known.display())));
+            return Err(failed(path, format!("{} is an input of this command ({})", input.display(), known.display())));
         }
         if path.is_dir() {
             return Err(failed(path, "it is a folder"));
@@ -44,18 +43,18 @@ impl OutFile {
         remove_left_over(&path, &name);
         let part = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
         let file = OpenOptions::new().write(true).create_new(true).open(&part).map_err(|e| failed(&path, e))?;
-        // For as long as this process lives; where files cannot be locked, none is taken for left over.
+        // Held while this process lives. Without file locks, no part counts as left over.
         let _ = file.try_lock();
         Ok(Self { path, part: Some(part), file: Some(file) })
     }
 
-    /// The same for a file that is not there yet, and that its owner alone can read.
+    /// The same for a new file that only its owner can read.
     ///
     /// # Errors
-    /// [`Error::Malformed`] with the reason when it is there, or cannot be written.
+    /// [`Error::Malformed`] if the file exists or cannot be written.
     pub(super) fn open_new(path: &Path) -> Result<Self, Error> {
         if path.exists() {
-            return Err(failed(path, "it exists"));
+            return Err(failed(path, "it already exists"));
         }
         let out = Self::open(path, &[])?;
         #[cfg(unix)]
@@ -71,7 +70,7 @@ impl OutFile {
         &self.path
     }
 
-    /// Where the file grows until it is whole.
+    /// The hidden file, until the file is complete.
     pub(super) fn part(&self) -> &Path {
         self.part.as_deref().unwrap_or(&self.path)
     }
@@ -85,7 +84,7 @@ impl OutFile {
         self.finish()
     }
 
-    /// Adds to what will be the file.
+    /// Appends text.
     ///
     /// # Errors
     /// [`Error::Malformed`] with the reason.
@@ -94,7 +93,7 @@ impl OutFile {
         file.write_all(text.as_bytes()).map_err(|e| failed(&self.path, e))
     }
 
-    /// Puts what was appended in the place of the file.
+    /// Gives the completed file its name.
     ///
     /// # Errors
     /// [`Error::Malformed`] with the reason.
@@ -113,7 +112,7 @@ impl OutFile {
             && let Err(e) = std::fs::remove_file(part)
             && e.kind() != std::io::ErrorKind::NotFound
         {
-            tell(&format!("gaitwright: {} is left over: {e}", part.display()));
+            tell(&format!("gaitwright: cannot remove {}: {e}", part.display()));
         }
     }
 }
@@ -139,7 +138,7 @@ impl Drop for OutFile {
     }
 }
 
-/// Removes the empty parts of this file that killed processes left. One with rows in it may be wanted.
+/// Removes empty hidden files of killed processes. One with rows may still be wanted.
 fn remove_left_over(path: &Path, name: &str) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let (start, end) = (format!(".{name}."), ".part");
@@ -151,14 +150,14 @@ fn remove_left_over(path: &Path, name: &str) {
             && entry.metadata().is_ok_and(|part| part.len() == 0)
             && File::open(entry.path()).is_ok_and(|part| part.try_lock().is_ok())
         {
-            // Whoever may not remove it may still write beside it.
+            // A failure does not prevent writing.
             let _ = std::fs::remove_file(entry.path());
         }
     }
 }
 
 fn failed(path: &Path, reason: impl std::fmt::Display) -> Error {
-    Error::Malformed(format!("cannot write {}: {reason}", path.display()))
+    Error::Malformed(format!("Cannot write {}: {reason}.", path.display()))
 }
 
 #[cfg(test)]
@@ -166,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_killed_process_left_is_removed_unless_rows_are_in_it() {
+    fn left_over_parts_are_removed_unless_they_have_rows() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         for (part, text) in [("1", ""), ("2", "a1,a2\n"), ("3", ""), ("x", "")] {

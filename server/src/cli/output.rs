@@ -1,12 +1,12 @@
-//! What the commands print: data to stdout, words to stderr. A reader that goes away early (`| head`) is no fault.
+//! Output of the commands: data to stdout, messages to stderr. A closed pipe (`| head`) is not an error.
 
 use gaitwright_service::error::Error;
 use std::io::{ErrorKind, Write};
 
-/// A line of data on stdout.
+/// Prints a line of data to stdout.
 ///
 /// # Errors
-/// When stdout cannot be written though somebody reads it, as on a full disk.
+/// When stdout cannot be written, as on a full disk. A closed pipe is not an error.
 pub(super) fn data(line: &str) -> Result<(), Error> {
     let mut stdout = std::io::stdout().lock();
     match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
@@ -15,7 +15,7 @@ pub(super) fn data(line: &str) -> Result<(), Error> {
     }
 }
 
-/// A line for people on stderr; lost when nobody listens.
+/// Prints a message to stderr, and ignores failures.
 pub(super) fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -1,4 +1,4 @@
-//! What `solve` and `sweep` share: flags of the gait problem, warm-start files, cancellation.
+//! Flags of the gait problem, warm-start files and cancellation, shared by `solve` and `sweep`.
 
 use super::body::{Body, Switch};
 use super::lineage::{Lineage, Start, basin_of_answer};
@@ -19,21 +19,21 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Files that describe what differs from the built-in problem.
+/// Files that replace parts of the built-in problem.
 #[derive(Debug, Clone, Args)]
 pub(super) struct ProblemFiles {
-    /// Device file (JSON); default: the built-in AMPRO3.
+    /// JSON device file (default: the built-in AMPRO3).
     #[arg(long, value_name = "FILE")]
     device: Option<PathBuf>,
-    /// Settings of the gait problem (JSON, only what differs from the defaults), as in
+    /// Settings of the gait problem that differ from the defaults (JSON), as in
     /// {"limits": {"speed_min_m_s": 1.1}, "muscles": {"sol": {"max_force_n": 3500}}}.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
+    /// JSON reference gait written by `gaitwright reference` (default: the built-in one).
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Settings of the interior point (JSON, only what differs from the defaults), as in {"tau_min": 0.995,
-    /// "linear_solver": "delayed_pivots"}; a name that it does not know is answered with those that it does.
+    /// Settings of the interior-point method that differ from the defaults (JSON), as in {"tau_min": 0.995,
+    /// "linear_solver": "delayed_pivots"}. The error for an unknown name lists the known ones.
     #[arg(long, value_name = "FILE")]
     solver_settings: Option<PathBuf>,
 }
@@ -46,21 +46,22 @@ impl ProblemFiles {
         })
     }
 
-    /// Validated as far as they stand in the file.
+    /// The settings of the gait problem, validated.
     pub(super) fn settings(&self) -> Result<GaitSettings, Error> {
         Ok(match &self.settings {
-            Some(path) => {
-                read_document(path, "settings of the gait problem", |read: &GaitSettings| Ok(read.validate()?))?
-            }
+            Some(path) => read_document(path, "a file with settings of the gait problem", |read: &GaitSettings| {
+                Ok(read.validate()?)
+            })?,
             None => GaitSettings::default(),
         })
     }
 
-    /// The usual options, with the settings of the interior point that were given.
+    /// The default options, with the given settings of the interior-point method.
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {
         match &self.solver_settings {
-            Some(path) => options_with_solver(&read(path)?)
-                .map_err(|e| Error::Malformed(format!("{}: not settings of the solver: {e}", path.display()))),
+            Some(path) => options_with_solver(&read(path)?).map_err(|e| {
+                Error::Malformed(format!("{} is not a file with settings of the solver: {e}", path.display()))
+            }),
             None => Ok(SolveOptions::default()),
         }
     }
@@ -70,9 +71,9 @@ impl ProblemFiles {
     }
 }
 
-/// Options whose solver is that of a document.
+/// Options with the solver settings of a document.
 fn options_with_solver(text: &str) -> Result<SolveOptions, Error> {
-    // By itself first: what cannot be read is then told with its field and its place.
+    // Parsed alone first, so that errors name the field and its position.
     document::read::<NlpSettings>(text.as_bytes())?;
     let solver: Value = document::read(text.as_bytes())?;
     let options: SolveOptions =
@@ -81,7 +82,7 @@ fn options_with_solver(text: &str) -> Result<SolveOptions, Error> {
     Ok(options)
 }
 
-/// The reference gait of a file, or the built-in one.
+/// Reads a reference gait, or returns the built-in one.
 pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> {
     let Some(path) = path else { return Ok(ReferenceGait::builtin()?) };
     read_document(path, "a reference gait", |read: &ReferenceGait| Ok(read.validate()?))
@@ -91,24 +92,24 @@ pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> 
 pub(super) struct ProblemFlags {
     #[command(flatten)]
     body: Body,
-    /// With muscles (C1-C12) or without (C1-C4).
+    /// Solve with muscles (C1-C12) or without (C1-C4).
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
     #[command(flatten)]
     files: ProblemFiles,
-    /// Mesh intervals per domain type DS2,DS3,SS2,SS1, as in 4,4,6,6.
+    /// Mesh intervals of the domains DS2,DS3,SS2,SS1, as in 4,4,6,6.
     #[arg(long, value_name = "N,N,N,N", value_parser = parse_mesh, allow_hyphen_values = true)]
     mesh: Option<Mesh>,
-    /// Start from the gait in this file, written by `solve --out`.
+    /// Warm-start from the gait in a file written by `solve --out`.
     #[arg(long, value_name = "FILE")]
     warm: Option<PathBuf>,
     /// Scaled optimality tolerance.
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     tolerance: Option<f64>,
-    /// Most iterations of each phase; those that track the reference have 200 at most.
+    /// Maximum number of iterations of each phase; phases that track the reference have at most 200.
     #[arg(long, value_name = "NUMBER", value_parser = iterations, allow_negative_numbers = true)]
     max_iterations: Option<usize>,
-    /// Most seconds for one solve.
+    /// Time limit of a solve.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit_s: Option<f64>,
 }
@@ -124,7 +125,7 @@ impl ProblemFlags {
         Ok(GaitProblem { subject, device, bounds, muscles, settings, reference })
     }
 
-    /// The files that are read.
+    /// The input files.
     pub(super) fn inputs(&self) -> Vec<&Path> {
         let ProblemFiles { device, settings, reference, solver_settings } = &self.files;
         [device, settings, reference, solver_settings, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
@@ -138,10 +139,10 @@ impl ProblemFlags {
         Ok(options)
     }
 
-    /// The start that was given; `basin` chooses another one than the answer of the solve that wrote the file.
+    /// The warm start that was given. `basin` chooses a gait of another basin in the file.
     pub(super) fn warm_start(&self, basin: Option<usize>) -> Result<Option<Start>, Error> {
         let Some(path) = &self.warm else { return Ok(None) };
-        let what = "a file of `gaitwright solve --out`";
+        let what = "a file written by `gaitwright solve --out`";
         let outcome: SolveOutcome = read_document(path, what, |_| Ok(()))?;
         let Kept { lineage } = read_document(path, what, |_| Ok(()))?;
         let answers = basin_of_answer(&outcome.report);
@@ -153,7 +154,7 @@ impl ProblemFlags {
         let other = outcome.other_basins.into_iter().find(|other| other.basin == basin);
         let refused = || {
             let known = known.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
-            Error::Malformed(format!("--warm-basin {basin} is not in {}; there are: {known}", path.display()))
+            Error::Malformed(format!("{} has no basin {basin} for --warm-basin. Basins: {known}.", path.display()))
         };
         let start = |other: OtherBasin| {
             Start::cold(other.warm_start, (Some(other.basin), other.objective, other.gait_rmse_rad))
@@ -162,7 +163,7 @@ impl ProblemFlags {
     }
 }
 
-/// What a file of `solve --out` says of its lineage; older ones say nothing.
+/// The lineage in a file of `solve --out`, if it has one.
 #[derive(Deserialize)]
 struct Kept {
     #[serde(default)]
@@ -170,22 +171,22 @@ struct Kept {
 }
 
 pub(super) fn read(path: &Path) -> Result<String, Error> {
-    let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("cannot read {}: {e}", path.display())))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("Cannot read {}: {e}.", path.display())))?;
     String::from_utf8(bytes).map_err(|error| {
         let readable = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = readable.split(|byte| *byte == b'\n').count();
-        Error::Malformed(format!("{}, line {line}: this is no UTF-8 text; save the file as UTF-8", path.display()))
+        Error::Malformed(format!("{}, line {line}, is not valid UTF-8. Save the file as UTF-8.", path.display()))
     })
 }
 
-/// Reads and checks a file; errors name it.
+/// Reads and checks a JSON file. Errors name the file.
 pub(super) fn read_document<T: DeserializeOwned>(
     path: &Path,
     what: &str,
     check: impl Fn(&T) -> Result<(), Error>,
 ) -> Result<T, Error> {
     let read = document::read(read(path)?.as_bytes()).and_then(|read| check(&read).map(|()| read));
-    read.map_err(|e| Error::Malformed(format!("{}: not {what}: {e}", path.display())))
+    read.map_err(|e| Error::Malformed(format!("{} is not {what}: {e}", path.display())))
 }
 
 /// A token that the first Ctrl-C cancels.
@@ -208,6 +209,6 @@ fn parse_mesh(text: &str) -> Result<Mesh, String> {
             mesh.validate().map_err(|e| e.to_string())?;
             Ok(mesh)
         }
-        _ => Err("expected four whole numbers DS2,DS3,SS2,SS1, as in 4,4,6,6".to_owned()),
+        _ => Err("must be four whole numbers for DS2,DS3,SS2,SS1, as in 4,4,6,6".to_owned()),
     }
 }

@@ -1,4 +1,4 @@
-//! `gaitwright audit` and `gaitwright backup`, `gaitwright restore`: care of the record.
+//! `gaitwright audit`, `gaitwright backup` and `gaitwright restore`.
 
 use super::output::{data, tell};
 use clap::{Args, Subcommand};
@@ -16,13 +16,13 @@ pub(super) struct Audit {
 
 #[derive(Debug, Subcommand)]
 enum AuditCommand {
-    /// Check the database file, walk the hash chains, compare every row with its seal or checksum, and the record with its
-    /// anchors: a change of the past is found, and an end that is missing.
+    /// Verify a database: its file, its schema, its hash chains, the seal of every row, and its anchors. Reports rows
+    /// that were changed, added or deleted outside the program.
     Verify {
-        /// The SQLite file.
+        /// SQLite file.
         #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
         database: PathBuf,
-        /// The anchor that the service keeps elsewhere, besides the one beside the record.
+        /// Second anchor file of the service, besides the one next to the database.
         #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
         anchor: Option<PathBuf>,
     },
@@ -34,17 +34,19 @@ impl Audit {
         exists(&database)?;
         let found = verify::file(&database, anchor.as_slice()).await?;
         let (rows, last) = found.audit;
-        data(&format!("whole: {rows} rows, last hash {last}"))?;
+        data(&format!("audit trail intact: {rows} rows, last hash {last}"))?;
         data(&match found.seals {
-            Some((seals, last)) => format!("whole: {seals} seals, last hash {last}"),
-            None => "no seals: an older version wrote this record; it is sealed when it is next opened".to_owned(),
+            Some((seals, last)) => format!("seals intact: {seals} seals, last hash {last}"),
+            None => {
+                "no seals: an older version wrote this record; the next start of the service will seal it".to_owned()
+            }
         })?;
         for (anchor, ends) in &found.anchors {
             let (audit, seals) = (ends.audit.seq, ends.seals.seq);
-            data(&format!("nothing is missing that {} has seen: {audit} rows, {seals} seals", anchor.display()))?;
+            data(&format!("complete according to anchor {}: {audit} rows, {seals} seals", anchor.display()))?;
         }
         if found.anchors.is_empty() {
-            data("no anchor: rows that are missing at the end cannot be seen")?;
+            data("no anchor: rows missing at the end cannot be detected")?;
         }
         Ok(())
     }
@@ -52,9 +54,9 @@ impl Audit {
 
 #[derive(Debug, Args)]
 pub(super) struct Backup {
-    /// Where the copy goes: a new file.
+    /// New file for the backup.
     to: PathBuf,
-    /// The SQLite file; the service may be running.
+    /// SQLite file; the service may be running.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
 }
@@ -63,23 +65,23 @@ impl Backup {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.database)?;
         if self.to.exists() {
-            return Err(Error::conflict(format!("{} exists; choose a new file", self.to.display())));
+            return Err(Error::conflict(format!("{} already exists. Choose a new file.", self.to.display())));
         }
         backup::of_file(&self.database, &self.to).await?;
         note_export(&self.database, "backup", "the whole record", Vec::new());
-        tell("copied and checked");
+        tell("backup written and checked");
         data(&self.to.display().to_string())
     }
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Restore {
-    /// A copy made by `gaitwright backup`.
+    /// Backup made by `gaitwright backup`.
     from: PathBuf,
-    /// The SQLite file to put it in place of; the present one is kept beside it.
+    /// SQLite file to replace; the current one is kept next to it.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
-    /// The anchor that the service keeps elsewhere; it then holds what the copy ends with.
+    /// Second anchor file of the service, which is updated to the backup.
     #[arg(long, env = "GAITWRIGHT_ANCHOR", value_name = "FILE")]
     anchor: Option<PathBuf>,
 }
@@ -88,15 +90,15 @@ impl Restore {
     pub(super) async fn run(self) -> Result<(), Error> {
         exists(&self.from)?;
         if let Some(kept) = restore::from_file(&self.from, &self.database, self.anchor.as_deref()).await? {
-            tell(&format!("the present record is kept as {}", kept.display()));
+            tell(&format!("the current database is kept as {}", kept.display()));
         }
         tell(&format!("restored {}", self.database.display()));
         Ok(())
     }
 }
 
-/// Notes for the access log that data of subjects leaves the record. Where nothing can be written beside the record, as on a
-/// read-only medium, a warning stays.
+/// Notes for the access log that data of subjects leaves the record. Prints a warning if nothing can be written next to
+/// the record, as on a read-only medium.
 pub(super) fn note_export(database: &Path, command: &str, object: &str, named: Vec<String>) {
     let access = Access {
         kind: Kind::Export,
@@ -109,10 +111,10 @@ pub(super) fn note_export(database: &Path, command: &str, object: &str, named: V
         named,
     };
     if let Err(error) = access_spool::note(database, &access) {
-        tell(&format!("gaitwright: the access log does not hear of this {command}: {error}"));
+        tell(&format!("gaitwright: cannot note this {command} for the access log: {error}"));
     }
 }
 
 pub(super) fn exists(path: &Path) -> Result<(), Error> {
-    if path.exists() { Ok(()) } else { Err(Error::Malformed(format!("there is no file {}", path.display()))) }
+    if path.exists() { Ok(()) } else { Err(Error::Malformed(format!("There is no file {}.", path.display()))) }
 }

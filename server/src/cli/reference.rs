@@ -1,4 +1,4 @@
-//! `gaitwright reference`: a reference gait from a recording.
+//! `gaitwright reference`: computes a reference gait from a recording.
 
 use super::choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
 use super::out_file::OutFile;
@@ -11,39 +11,39 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct Reference {
-    /// The recording.
+    /// Recording of joint angles.
     #[arg(value_name = "FILE")]
     recording: PathBuf,
     /// Name shown to people.
     #[arg(long, value_name = "TEXT")]
     name: String,
-    /// Form of the recording.
+    /// Format of the recording.
     #[arg(long, value_parser = one_of::<Form>(JOINT_ANGLE_FORMATS), default_value = "opensim")]
     form: Form,
-    /// Unit of an OpenSim file whose header does not say it.
+    /// Unit of angles, if the header of an OpenSim file does not state it.
     #[arg(long, value_parser = one_of::<Unit>(ANGLE_UNITS))]
     unit: Option<Unit>,
-    /// Column of the vertical force under the right foot in an OpenSim file; default with --forces: ground_force_vy, of
-    /// Camargo 2021 Treadmill_R_vy.
+    /// Column of the vertical force under the right foot (default with --forces: ground_force_vy, or Treadmill_R_vy for
+    /// Camargo 2021).
     #[arg(long, value_name = "NAME")]
     force_column: Option<String>,
-    /// The file with this column, where it is not the recording itself: an OpenSim file, or with --form camargo the fp
-    /// table as CSV. Both have one clock.
+    /// Separate file with the force column: an OpenSim file, or the fp table as CSV with --form camargo. Both files
+    /// must have the same time axis.
     #[arg(long, value_name = "FILE")]
     forces: Option<PathBuf>,
-    /// How right heel strikes are found.
+    /// How to find right heel strikes.
     #[arg(long, value_parser = one_of::<Strikes>(HEEL_STRIKES), default_value = "kinematics", conflicts_with = "heel_strikes_s")]
     strikes: Strikes,
-    /// Right heel strikes, s, as in 0.41,1.52,2.63.
+    /// Times of right heel strikes, as in 0.41,1.52,2.63.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', allow_negative_numbers = true)]
     heel_strikes_s: Vec<f64>,
-    /// Height of the person, for matching.
+    /// Height of the recorded person.
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     height_m: Option<f64>,
-    /// Body mass of the person, for matching.
+    /// Body mass of the recorded person.
     #[arg(long, value_name = "KILOGRAMS", allow_negative_numbers = true)]
     mass_kg: Option<f64>,
-    /// Where to write the reference (JSON); default: stdout.
+    /// JSON output file (default: standard output).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! Copies of the record that the service makes by itself.
+//! Background task that backs up the record on a schedule.
 
 use gaitwright_service::error::Error;
 use gaitwright_service::supervise::Task;
@@ -8,10 +8,10 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
-/// A copy that failed is tried again after so long.
+/// Delay after a failed backup.
 const RETRY: Duration = Duration::from_mins(10);
 
-/// Where copies go, how often, and how many are kept.
+/// Folder and interval of backups, and how many to keep.
 #[derive(Debug, Clone)]
 pub(super) struct BackupPlan {
     pub(super) folder: PathBuf,
@@ -20,7 +20,7 @@ pub(super) struct BackupPlan {
 }
 
 impl BackupPlan {
-    /// Makes copies as long as the task runs. What fails is logged and tried again.
+    /// Makes backups as long as the task runs. Failures are logged and retried.
     pub(super) async fn follow(self, store: Store, task: Task) -> Result<(), Error> {
         loop {
             task.works();
@@ -36,7 +36,7 @@ impl BackupPlan {
         }
     }
 
-    /// How long until the next copy: measured from the newest one, so that a restart neither adds nor skips one.
+    /// Time until the next backup, counted from the newest one, so that a restart neither adds nor skips a backup.
     fn due_in(&self, store: &Store) -> std::io::Result<Duration> {
         let copies = backup::scheduled(store.path(), &self.folder)?;
         let age = |made: SystemTime| SystemTime::now().duration_since(made).unwrap_or_default();
@@ -49,12 +49,12 @@ impl BackupPlan {
         let (object, detail) = (format!("file {}", file.display()), json!({ "bytes": bytes, "scheduled": true }));
         audit::append(&mut writer, &Actor::program(), "record.backup", &object, &detail).await?;
         commit(writer).await?;
-        tracing::info!(file = %file.display(), bytes, "the record was copied and the copy checked");
+        tracing::info!(file = %file.display(), bytes, "the record was backed up and the backup checked");
         Ok(())
     }
 
     fn failed(&self, error: &Error) -> Duration {
-        tracing::error!(folder = %self.folder.display(), %error, "the record was not copied; the next try is in ten minutes");
+        tracing::error!(folder = %self.folder.display(), %error, "the record was not backed up; retrying in ten minutes");
         RETRY
     }
 }

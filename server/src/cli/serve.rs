@@ -1,4 +1,4 @@
-//! `gaitwright serve`.
+//! `gaitwright serve`: starts the service, and stops it on Ctrl-C or SIGTERM.
 
 use super::config::{Flags, Settings};
 use super::output::tell;
@@ -25,17 +25,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Requests that run when the service is told to stop have so long to end.
+/// Time for running requests to finish when the service stops.
 const DRAIN: Duration = Duration::from_secs(20);
-/// A connection without a whole request head for so long is closed.
+/// Time after which a connection without a complete request head is closed.
 const SILENCE: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Args)]
 pub(super) struct Serve {
     #[command(flatten)]
     flags: Flags,
-    /// Print a one-time sign-in link for an administrator, also when there is a password; a new administrator when all
-    /// are disabled.
+    /// Print a one-time sign-in link for an administrator, even if one has a password. Adds an administrator if all are
+    /// disabled.
     #[arg(long)]
     sign_in_link: bool,
 }
@@ -57,13 +57,13 @@ impl Serve {
         let (proxies, limits) = (settings.proxies()?, settings.connections()?.within_descriptors());
         let access_log_days = settings.access_log_days()?;
         let backups = settings.backups()?;
-        // What can be refused is refused before a file is made.
+        // Check all settings before any file is created.
         let reserve = settings.reserve_bytes()?;
         let tls = match tls {
             Some((certificate, key)) => Some(certificate_of(certificate, key).await?),
             None => None,
         };
-        let cannot_listen = |e: std::io::Error| Error::Malformed(format!("cannot listen on {listen}: {e}"));
+        let cannot_listen = |e: std::io::Error| Error::Malformed(format!("Cannot listen on {listen}: {e}."));
         let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
         listener.set_nonblocking(true).map_err(cannot_listen)?;
         let address = listener.local_addr().map_err(cannot_listen)?;
@@ -88,7 +88,7 @@ impl Serve {
         let scheduler = Scheduler::new(&store, engine, None, Some(AfterSolves::by_optimizer()));
         let hosts = Hosts::new(address, &settings.host_names());
         let access = Arc::new(access);
-        // What commands exported while no service ran.
+        // Exports by commands while the service was not running.
         access.log.write(&store, true).await?;
         let mut state = AppState::new(scheduler.clone(), Arc::clone(&access), hosts);
         state.proxies = proxies.clone();
@@ -100,19 +100,19 @@ impl Serve {
         let chores = tokio::spawn(keep_house(scheduler.clone(), store.clone(), access_log_days, backups));
         tracing::info!(database = %database.display(), workers = scheduler.workers(), "listening on {origin}");
         if !local && scheme == "http" && !proxies.are_any() {
-            tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted, except on this machine");
+            tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted");
         }
         if let Some(secret) = link {
-            // All addresses are none that a browser can open.
+            // A browser cannot open the unspecified address.
             let here = if address.ip().is_unspecified() {
                 format!("localhost:{}", address.port())
             } else {
                 address.to_string()
             };
-            tell(&format!("sign in (once, within a day): {scheme}://{here}/sign-in/{secret}"));
+            tell(&format!("sign in (the link works once, within a day): {scheme}://{here}/sign-in/{secret}"));
         }
 
-        // Streams end when the scheduler stops, so that the drain is not held up by them.
+        // Event streams end with the scheduler, so they do not delay the shutdown.
         let handle = Handle::<Peer>::new();
         tokio::spawn({
             let (scheduler, handle, interrupted) = (scheduler.clone(), handle.clone(), interrupted());
@@ -138,7 +138,7 @@ impl Serve {
         served.map_err(|e| Error::Internal(e.to_string()))
     }
 
-    /// A sign-in link for whoever started the service, unless somebody can sign in already.
+    /// A sign-in link for the first administrator, unless a user can already sign in.
     async fn link(&self, store: &Store) -> Result<Option<String>, Error> {
         if !self.sign_in_link && people::has_admin(&mut *store.read().await?).await? {
             return Ok(None);
@@ -151,30 +151,31 @@ impl Serve {
     }
 }
 
-/// Whoever connects and does not say what is wanted loses the connection.
+/// Closes connections that send no request.
 fn cut_off_silence(http: &mut Builder<TokioExecutor>) {
     http.http1().timer(TokioTimer::new()).header_read_timeout(SILENCE);
 }
 
 async fn certificate_of(certificate: PathBuf, key: PathBuf) -> Result<RustlsConfig, Error> {
-    // Fails only when one was installed before, and that is this one.
+    // Fails only if the same provider is already installed.
     let _ = rustls::crypto::ring::default_provider().install_default();
     let name = certificate.display().to_string();
     let read = RustlsConfig::from_pem_file(certificate, key)
         .await
-        .map_err(|e| Error::Malformed(format!("cannot use the certificate {name} and its key: {e}")))?;
-    // Silence is cut off in HTTP/1 alone, so that is what is spoken.
+        .map_err(|e| Error::Malformed(format!("Cannot use the certificate {name} and its key: {e}.")))?;
+    // The timeout above exists for HTTP/1 only.
     let mut config = rustls::ServerConfig::clone(&read.get_inner());
     config.alpn_protocols = vec![b"http/1.1".to_vec()];
     Ok(RustlsConfig::from_config(Arc::new(config)))
 }
 
-/// The number given, or that of the cores.
+/// The given number, or the number of cores.
 pub(super) fn cores_or(given: Option<usize>) -> usize {
     given.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
 }
 
-/// Ctrl-C or, where there is one, SIGTERM. From this call on, not only once it is waited for, they do not end the process.
+/// Waits for Ctrl-C or SIGTERM. From this call on, before the future is polled, these signals no longer end the
+/// process.
 #[cfg(unix)]
 pub(super) fn interrupted() -> impl Future<Output = ()> + use<> {
     use tokio::signal::unix::{SignalKind, signal};
@@ -186,7 +187,7 @@ pub(super) fn interrupted() -> impl Future<Output = ()> + use<> {
                 _ = terminate.recv() => {}
             }
         } else {
-            // Without signals the process is ended from outside; the record stands that.
+            // Without signal handlers the process is killed, which the record survives.
             std::future::pending::<()>().await;
         }
     }
@@ -200,11 +201,10 @@ pub(super) async fn interrupted() {
     }
 }
 
-/// What the service does by itself beside tuning, until the scheduler is told to stop: drops what is past its time, and makes
-/// copies. What fails is logged and tried again; a task that panics is begun again, and `/ready` says so.
+/// Runs the housekeeping tasks until the scheduler stops: deletes expired data and makes backups. Failures are logged
+/// and retried. A task that panics is restarted, and `/ready` reports it.
 async fn keep_house(scheduler: Scheduler, store: Store, access_log_days: Option<u32>, backups: Option<BackupPlan>) {
-    let dropping =
-        scheduler.keep("dropping what is past its time", |task| retention::keep_dropping(store.clone(), task));
+    let dropping = scheduler.keep("deleting expired data", |task| retention::keep_dropping(store.clone(), task));
     let pruning = async {
         if let Some(days) = access_log_days {
             scheduler.keep("pruning the access log", |task| keep_pruning(store.clone(), days, task)).await;
@@ -212,7 +212,7 @@ async fn keep_house(scheduler: Scheduler, store: Store, access_log_days: Option<
     };
     let copying = async {
         if let Some(plan) = backups {
-            scheduler.keep("copying the record", |task| plan.clone().follow(store.clone(), task)).await;
+            scheduler.keep("backing up the record", |task| plan.clone().follow(store.clone(), task)).await;
         }
     };
     tokio::join!(dropping, pruning, copying);

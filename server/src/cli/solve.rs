@@ -1,4 +1,4 @@
-//! `gaitwright solve`: one gait.
+//! `gaitwright solve`: optimises one gait.
 
 use super::Ended;
 use super::lineage::{Lineage, Start, basin_of_answer};
@@ -21,7 +21,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Threads that a solve can use.
+/// Maximum number of threads of a solve.
 const MOST_THREADS: usize = 16;
 
 fn cold_guesses(text: &str) -> Result<usize, String> {
@@ -32,7 +32,7 @@ fn cold_guesses(text: &str) -> Result<usize, String> {
 pub(super) struct Solve {
     #[command(flatten)]
     flags: ProblemFlags,
-    /// Bounds that differ from the loosest of Table I, as in a1=20,a5=0.013.
+    /// Bounds that differ from the loosest values of Table I, as in a1=20,a5=0.013.
     #[arg(
         long,
         value_name = "NAME=VALUE,...",
@@ -41,7 +41,8 @@ pub(super) struct Solve {
         allow_hyphen_values = true
     )]
     bounds: String,
-    /// What a trial of the service solved, as its page gives it: in place of every flag that says what to solve and from where.
+    /// Problem file (problem.json) of a trial, downloaded from the service. Replaces all flags of the problem and the
+    /// start.
     #[arg(
         long,
         value_name = "FILE",
@@ -51,7 +52,7 @@ pub(super) struct Solve {
         ]
     )]
     problem: Option<PathBuf>,
-    /// Which basin of the file of --warm to start from, of those that its attempts are numbered by; default: its answer's.
+    /// Basin in the file of --warm to start from (default: that of its gait).
     #[arg(long, value_name = "NUMBER", requires = "warm")]
     warm_basin: Option<usize>,
     /// So many cold guesses are tried whatever becomes of them; --out keeps a gait of every basin that they reach.
@@ -61,21 +62,22 @@ pub(super) struct Solve {
     /// the lowest.
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     nearest_within: Option<f64>,
-    /// Write the whole outcome (figures, gait, multipliers, gaits of other basins, what it came from) as JSON.
+    /// Output file (JSON) for figures, gait, multipliers, gaits of other basins and lineage.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the figures as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Where no gait is found: say why, and which bound, relaxed alone, gives one. Solves up to eight times per bound.
+    /// If no gait is found, explain which bounds conflict and which one, relaxed alone, gives a gait. Takes up to eight
+    /// solves for each bound.
     #[arg(long)]
     explain: bool,
-    /// Certify a converged gait as `certify` does; with --json the certificate is its member `certificate`.
+    /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
     #[arg(long)]
     certify: bool,
 }
 
-/// The figures; where it was asked for, the certificate of the gait, or why there is none.
+/// The printed figures, with the certificate or the explanation if requested.
 #[derive(Debug, Serialize)]
 struct Figures<'a> {
     #[serde(flatten)]
@@ -87,7 +89,7 @@ struct Figures<'a> {
     explanation: Option<&'a Explanation>,
 }
 
-/// What is written of a solve.
+/// The content of the output file.
 #[derive(Debug, Serialize)]
 struct Kept<'a> {
     #[serde(flatten)]
@@ -99,7 +101,7 @@ impl Solve {
     fn input(&self) -> Result<(GaitProblem, SolveOptions, Option<Start>), Error> {
         if let Some(path) = &self.problem {
             let SolveInput { problem, options, warm_start } =
-                read_document(path, "what a trial solved", SolveInput::check)?;
+                read_document(path, "a problem file of a trial", SolveInput::check)?;
             return Ok((problem, options, warm_start.map(Start::unknown)));
         }
         let problem = self.flags.problem(TunedBounds::parse(&self.bounds)?)?;
@@ -119,9 +121,9 @@ impl Solve {
     pub(super) async fn run(self) -> Result<Ended, Error> {
         let (problem, mut options, start) = self.input()?;
         let warm = start.as_ref().map(|start| start.point.clone());
-        // The result does not depend on it.
+        // The result does not depend on the number of threads.
         options.threads = cores_or(None).min(MOST_THREADS);
-        // Before there is a file to leave behind.
+        // Before the output file is created, so that a signal cannot leave it behind.
         let cancel = cancelled_by_signal();
         let inputs: Vec<&Path> = self.flags.inputs().into_iter().chain(self.problem.as_deref()).collect();
         let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
@@ -156,7 +158,7 @@ impl Solve {
         } else {
             None
         };
-        // The figures first: whatever becomes of the file, they are not lost.
+        // Print the figures first, so that they are not lost if the file cannot be written.
         if self.json {
             let figures = Figures {
                 report: &outcome.report,
@@ -182,7 +184,7 @@ impl Solve {
     }
 }
 
-/// A status as in JSON.
+/// The status as in JSON.
 pub(super) fn status_word(status: SolveStatus) -> &'static str {
     match status {
         SolveStatus::Converged => "converged",
@@ -224,7 +226,7 @@ fn for_people(
     lines.join("\n")
 }
 
-/// Where the time of all attempts went.
+/// The time of all attempts by task.
 fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
     let Some(algebra) = &report.linear_algebra else { return Vec::new() };
     let fallbacks = match algebra.fallbacks {
@@ -244,13 +246,16 @@ fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
     ]
 }
 
-/// Which gait it is, and which it came from.
+/// The gait and its ancestors.
 fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&Start>) -> Vec<String> {
     let basin = lineage.basin.map_or_else(String::new, |basin| format!(" (basin {basin})"));
     let mut lines = vec![format!("  gait               {}{basin}", lineage.id)];
     let given = start.map(|start| &start.gait);
     if let (StartedFrom::ColdAfterWarm, Some(given)) = (report.started_from, given) {
-        lines.push(format!("  started from       its own guesses: nothing converged from {}", given.in_words()));
+        lines.push(format!(
+            "  started from       initial guesses: the warm start from {} did not converge",
+            given.in_words()
+        ));
     }
     for (generation, ancestor) in lineage.ancestors.iter().enumerate() {
         let which = if generation == 0 { "started from" } else { "which came from" };
@@ -259,14 +264,13 @@ fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&Star
     lines
 }
 
-/// The local optima that were found, where there are several, each as its first attempt left it: before any bound was
-/// tightened.
+/// The local optima, if there are several, each as found by its first attempt.
 fn basins_in_words(report: &SolveReport) -> Vec<String> {
     let answer = basin_of_answer(report);
     let mut lines: Vec<String> = Vec::new();
     for attempt in &report.attempts {
         let Some(basin) = attempt.basin.filter(|basin| *basin > lines.len()) else { continue };
-        let chosen = if attempt.basin == answer { ", the answer's" } else { "" };
+        let chosen = if attempt.basin == answer { ", chosen" } else { "" };
         lines.push(format!(
             "  basin {basin:<13}objective {:.5}   Gait RMSE {:.4} rad{chosen}",
             attempt.objective, attempt.gait_rmse_rad

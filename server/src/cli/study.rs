@@ -1,4 +1,4 @@
-//! `gaitwright export` and `gaitwright import`: a whole study as one file. `gaitwright prune`: retention.
+//! `gaitwright export`, `gaitwright import`, `gaitwright signing-key` and `gaitwright prune`.
 
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -20,14 +20,14 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct Export {
-    /// The study.
+    /// Identifier of the study.
     study: StudyId,
-    /// Where the archive goes: a new file.
+    /// New file for the archive.
     to: PathBuf,
-    /// The SQLite file; the service may be running.
+    /// SQLite file; the service may be running.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
-    /// Sign the archive with the key of this file, made by `gaitwright signing-key`.
+    /// Key file for signing the archive, made by `gaitwright signing-key`.
     #[arg(long, value_name = "FILE")]
     sign: Option<PathBuf>,
 }
@@ -46,21 +46,21 @@ impl Export {
 
 #[derive(Debug, Args)]
 pub(super) struct Import {
-    /// An archive made by `gaitwright export`.
+    /// Archive made by `gaitwright export`.
     from: PathBuf,
-    /// The SQLite file; no service may be running on it.
+    /// SQLite file; the service must not be running.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
-    /// Accept only archives that are signed by this key, as `gaitwright signing-key` printed it; can be repeated.
+    /// Public key that must have signed the archive, as printed by `gaitwright signing-key`; can be repeated.
     #[arg(long, value_name = "KEY")]
     trust: Vec<PublicKey>,
 }
 
 impl Import {
     pub(super) async fn run(self) -> Result<(), Error> {
-        let cannot = |e: std::io::Error| Error::Malformed(format!("cannot read {}: {e}", self.from.display()));
+        let cannot = |e: std::io::Error| Error::Malformed(format!("Cannot read {}: {e}.", self.from.display()));
         let file = std::fs::File::open(&self.from).map_err(cannot)?;
-        // Before a record is made for it.
+        // Checked before a database is created.
         let archive = archive::open(file, &self.trust).await?;
         let store = Store::open(&self.database).await?;
         let done = archive::import(&store, &Actor::terminal(), archive).await;
@@ -71,7 +71,7 @@ impl Import {
 
 #[derive(Debug, Args)]
 pub(super) struct NewKey {
-    /// Where the secret key goes: a new file, which its owner alone can read.
+    /// New file for the private key, which only its owner can read.
     to: PathBuf,
 }
 
@@ -88,11 +88,11 @@ impl NewKey {
 
 #[derive(Debug, Args)]
 pub(super) struct Prune {
-    /// Trajectories of studies that ended longer ago than this are dropped; those of gaits that are recommended or may
-    /// still be, of what they started from, and of lab sessions are kept.
+    /// Delete trajectories of studies that ended more than this many days ago. Keeps gaits that are or may be
+    /// recommended, their warm starts, and gaits of lab sessions.
     #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=36_500))]
     older_than_days: u32,
-    /// The SQLite file; no service may be running on it.
+    /// SQLite file; the service must not be running.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
 }
@@ -105,15 +105,15 @@ impl Prune {
         let expired = retention::drop_expired(&store).await;
         store.close().await;
         let (Dropped { answers, sessions, links }, trajectories) = (expired?, done?);
-        tell(&format!("{answers} answers to repeated requests, {sessions} sessions and {links} sign-in links dropped"));
-        data(&format!("{trajectories} trajectories dropped"))
+        tell(&format!("deleted {answers} idempotency keys, {sessions} sessions and {links} sign-in links"));
+        data(&format!("{trajectories} trajectories deleted"))
     }
 }
 
-/// Drops the trajectories of studies that ended so many days ago, but those that are recommended or may still be.
+/// Deletes the trajectories of studies that ended more than `days` ago, except gaits that are or may be recommended.
 ///
 /// # Errors
-/// What the database or the learner reports.
+/// Errors of the database and the learner.
 pub async fn prune(store: &mut Store, days: u32) -> Result<u64, Error> {
     let before = gaitwright_store::now().plus_seconds(-86_400 * i64::from(days));
     let mut dropped = 0;

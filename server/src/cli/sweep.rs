@@ -1,4 +1,5 @@
-//! `gaitwright sweep`: one gait for each row of a table of actions, in parallel, answers in the order of the rows.
+//! `gaitwright sweep`: optimises a gait for each row of a table of actions, in parallel. Results keep the order of the
+//! rows.
 
 use super::Ended;
 use super::numbers::workers;
@@ -24,19 +25,19 @@ use std::sync::mpsc;
 pub(super) struct Sweep {
     #[command(flatten)]
     flags: ProblemFlags,
-    /// The actions: a CSV file with header a1,a2,a3,a4,a5,a6,a7,a8.
+    /// CSV file of actions with the header a1,a2,a3,a4,a5,a6,a7,a8.
     #[arg(long, value_name = "FILE.csv")]
     actions: PathBuf,
-    /// Where the answers go: one row per action, in the same order. Until the last one is there they are in a hidden
-    /// file beside it (.FILE.csv.PROCESS.part), which a killed process leaves behind.
+    /// Output file with one row for each action, in the same order. Until it is complete, rows are in a hidden file
+    /// next to it (.FILE.csv.PROCESS.part), which stays if the process is killed.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
-    /// How many solves at the same time; default: the number of cores.
+    /// Number of solves that run in parallel (default: number of cores).
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
 }
 
-/// The columns after the action: a contract for scripts.
+/// The columns after the action. Scripts rely on them.
 const COLUMNS: [&str; 6] =
     ["status", "iterations", "seconds_total", "cost_of_transport", "gait_rmse_rad", "max_violation"];
 
@@ -69,15 +70,15 @@ impl Sweep {
     }
 }
 
-/// The table of answers: each row goes to the file as soon as all before it are there.
+/// The table of results. Each row is written as soon as all earlier ones are.
 struct Table {
     out: OutFile,
-    /// What could not be written to the file is printed at the end: hours of solving are not lost with it.
+    /// A write error. All rows are printed at the end then, so that hours of solving are not lost.
     unwritten: Option<Error>,
     text: String,
     rows: usize,
     converged: usize,
-    /// What is wrong with every row is wrong with the command.
+    /// An error that all rows have in common, which becomes the error of the command.
     refused: Option<SolveError>,
 }
 
@@ -130,7 +131,7 @@ impl Table {
         let path = self.out.path().display().to_string();
         if stopped {
             data(self.text.trim_end())?;
-            tell(&format!("stopped: what is done is above, {path} is as it was"));
+            tell(&format!("stopped: the finished rows are printed above, and {path} is unchanged"));
             return Ok(Ended::Interrupted);
         }
         if let Err(error) = self.unwritten.map_or_else(|| self.out.finish(), Err) {
@@ -151,7 +152,7 @@ fn actions(path: &Path) -> Result<Vec<TunedBounds>, Error> {
     let header = reader.headers().map_err(|e| malformed(e.to_string()))?.clone();
     if header.iter().ne(TunedBounds::NAMES) {
         let found = header.iter().collect::<Vec<_>>().join(",");
-        return Err(malformed(format!("the header is {found:?}, expected {:?}", TunedBounds::NAMES.join(","))));
+        return Err(malformed(format!("The header is {found:?}; it must be {:?}.", TunedBounds::NAMES.join(","))));
     }
     let mut actions = Vec::new();
     for record in reader.records() {
@@ -159,12 +160,14 @@ fn actions(path: &Path) -> Result<Vec<TunedBounds>, Error> {
         let line = record.position().map_or(0, csv::Position::line);
         let mut values = [0.0; 8];
         for ((value, cell), name) in values.iter_mut().zip(&record).zip(TunedBounds::NAMES) {
-            *value = cell.parse().map_err(|_| malformed(format!("line {line}: {name}: {cell:?} is not a number")))?;
+            *value = cell
+                .parse()
+                .map_err(|_| malformed(format!("line {line}: {name} is {cell:?}, which is not a number.")))?;
         }
         actions.push(TunedBounds::from_array(values).map_err(|e| malformed(format!("line {line}: {e}")))?);
     }
     if actions.is_empty() {
-        return Err(malformed("there is no action below the header".to_owned()));
+        return Err(malformed("The table has no rows.".to_owned()));
     }
     Ok(actions)
 }
@@ -191,7 +194,7 @@ fn solve_all(
                     let Some(action) = actions.get(row) else { return };
                     let problem = GaitProblem { bounds: *action, ..problem.clone() };
                     let answer = solve(&problem, warm, options, &mut |_| {}, cancel);
-                    // The receiver lives as long as this scope.
+                    // Cannot fail: the receiver lives as long as this scope.
                     let _ = sender.send((row, answer));
                 }
             });
@@ -211,7 +214,7 @@ fn solve_all(
     bar.finish_and_clear();
 }
 
-/// A number; nothing when it is not finite.
+/// The number, if it is finite.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

@@ -1,4 +1,4 @@
-//! `gaitwright tune`: an unattended study from the command line.
+//! `gaitwright tune`: runs an unattended study.
 
 use super::Ended;
 use super::body::{Body, Switch};
@@ -24,24 +24,24 @@ use std::sync::Arc;
 pub(super) struct Tune {
     #[command(flatten)]
     body: Body,
-    /// With muscles (C1-C12) or without (C1-C4).
+    /// Solve with muscles (C1-C12) or without (C1-C4).
     #[arg(long, value_enum, default_value = "on")]
     muscles: Switch,
     #[command(flatten)]
     files: ProblemFiles,
-    /// How many trials.
+    /// Number of trials.
     #[arg(long, default_value = "10", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
-    /// Every random draw derives from it.
+    /// Seed of every random draw.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// How many trials at the same time; default: the number of cores. 1 is reproducible bit for bit.
+    /// Number of trials that run in parallel (default: number of cores). Only 1 is reproducible bit for bit.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
-    /// The SQLite file; made if it does not exist. An unfinished study of the same kind in it goes on.
+    /// SQLite file, created if missing. Continues an unfinished study with the same settings.
     #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
     database: PathBuf,
-    /// Print one JSON object at the end instead of lines.
+    /// Print one JSON object at the end instead of a line for each trial.
     #[arg(long)]
     json: bool,
 }
@@ -82,7 +82,10 @@ impl Tune {
         self.print(&summary::of(&ran.snapshot, best, judged))?;
         if ran.interrupted {
             let done = ran.snapshot.trials.len() - ran.snapshot.open();
-            tell(&format!("interrupted after {done} of {} trials; the same command goes on from there", self.trials));
+            tell(&format!(
+                "interrupted after {done} of {} trials; run the same command again to continue",
+                self.trials
+            ));
             return Ok(Ended::Interrupted);
         }
         match unattended::failure(&ran.snapshot) {
@@ -109,14 +112,14 @@ impl Tune {
                 }
                 certificate_lines(summary).iter().try_for_each(|line| data(line))?;
             }
-            _ => data("no trial gave a gait")?,
+            _ => data("no trial found a gait")?,
         }
-        tell(&format!("look at it: gaitwright serve --database {}", self.database.display()));
+        tell(&format!("to look at the study: gaitwright serve --database {}", self.database.display()));
         Ok(())
     }
 }
 
-/// What the certificate of the best gait says, and where it failed, what to take in its place.
+/// The certificate of the best gait, and the alternative if it failed.
 fn certificate_lines(summary: &Summary) -> Vec<String> {
     let mut lines = vec![format!("  certificate       {}", summary.best_certificate.as_str().replace('_', " "))];
     lines.extend(summary.best_objections.iter().map(|objection| format!("    {objection}")));
@@ -126,12 +129,11 @@ fn certificate_lines(summary: &Summary) -> Vec<String> {
     match &summary.passing {
         Some(trial) => {
             let rmse = trial.gait_rmse_rad.map_or_else(String::new, |rmse| format!(": Gait RMSE {rmse:.4} rad"));
-            lines.push(format!("best gait that passes its certificate: trial {}{rmse}", trial.number));
+            lines.push(format!("best gait with a passed certificate: trial {}{rmse}", trial.number));
             lines.push(format!("  action            {}", action_line(&trial.action)));
         }
-        None => lines.push("none of the best gaits that were certified passes its certificate".to_owned()),
+        None => lines.push("none of the certified gaits passed".to_owned()),
     }
-    lines
-        .push("a finer mesh often passes with the same bounds: gaitwright solve --mesh 8,8,12,12 --certify".to_owned());
+    lines.push("a finer mesh often gives a gait that passes: gaitwright solve --mesh 8,8,12,12 --certify".to_owned());
     lines
 }

@@ -1,4 +1,4 @@
-//! A study that runs by itself from the command line: found or made, followed, run to its end.
+//! Runs an unattended study from the command line: finds or creates it, shows progress, certifies its best gait.
 
 use super::output::{data, tell};
 use super::serve::interrupted;
@@ -19,27 +19,27 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// Where a line per trial goes.
+/// Where to print a line for each trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Lines {
-    /// To stdout: they are the answer.
+    /// To stdout, as the result.
     Data,
-    /// To stderr: the answer comes later.
+    /// To stderr, as progress.
     Progress,
 }
 
 /// A study after its run.
 #[derive(Debug)]
 pub(super) struct Run {
-    /// How it stands.
+    /// Its snapshot.
     pub(super) snapshot: StudySnapshot,
-    /// Somebody stopped it before its end.
+    /// Whether a person stopped it.
     pub(super) interrupted: bool,
-    /// What the learner believes.
+    /// The cached posteriors.
     pub(super) beliefs: Arc<Beliefs>,
 }
 
-/// What went wrong in a study for reasons of the program or the machine. That an action has no gait is a result.
+/// The engineering failures of a study. A trial without a gait is a result, not a failure.
 pub(super) fn failure(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Option<String> {
     let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
     if study.state != StudyState::Finished {
@@ -47,10 +47,10 @@ pub(super) fn failure(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Op
     }
     let last = trials.iter().rev().find(failed)?;
     let count = trials.iter().filter(failed).count();
-    Some(format!("{count} of {} trials failed; the last, trial {}: {}", trials.len(), last.number, last.message))
+    Some(format!("{count} of {} trials failed; the last one was trial {}: {}", trials.len(), last.number, last.message))
 }
 
-/// The unfinished study of the same kind in the database, or a new one.
+/// The unfinished study with the same settings, or a new one.
 pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> {
     let mut writer = store.write().await?;
     let wanted = plan::checked(&mut writer, new.clone()).await?;
@@ -59,7 +59,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
     let study = if let Some(study) = unfinished {
         let done = trial_rows::counts(&mut writer, study.id).await?;
         let ended = done.total - done.open;
-        tell(&format!("going on with study {}: {ended} of {} trials", study.id, study.plan.trial_budget));
+        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.trial_budget));
         study
     } else {
         plan::create(&mut writer, &Actor::terminal(), new).await?
@@ -68,7 +68,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
     Ok(study)
 }
 
-/// Runs a study until it ends or somebody stops it.
+/// Runs a study until it ends or a person stops it.
 pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lines) -> Result<Run, Error> {
     let engine = InProcess::new(workers, Arc::new(GaitSolver));
     let scheduler = Scheduler::new(store, Arc::new(engine), Some(study.id), None);
@@ -92,7 +92,7 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
     Ok(Run { snapshot, interrupted, beliefs: Arc::clone(scheduler.beliefs()) })
 }
 
-/// Runs a study and certifies its best gaits, if nobody stopped it.
+/// Runs a study and certifies its best gaits, unless a person stops it.
 pub(super) async fn run_and_certify(
     store: &mut Store,
     study: &Study,
@@ -143,7 +143,7 @@ async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<()
             }
         }
         bar.set_position(shown.len() as u64);
-        // Nobody answers, resumes or starts anything here.
+        // No person can answer or resume here.
         if present.state != StudyState::Running {
             bar.finish_and_clear();
             return Ok(());
@@ -190,7 +190,7 @@ fn describe(line: &mut String, trial: &Trial, all: &[Trial]) -> std::fmt::Result
     Ok(())
 }
 
-/// An action as in `--bounds`.
+/// An action in the format of `--bounds`.
 pub(super) fn action_line(action: &TunedBounds) -> String {
     let parts: Vec<String> =
         TunedBounds::NAMES.iter().zip(action.to_array()).map(|(name, value)| format!("{name}={value}")).collect();

@@ -1,4 +1,4 @@
-//! `gaitwright users`: who may sign in, and a way in for whoever has the record.
+//! `gaitwright users`: lists users, and creates sign-in links for them.
 
 use super::output::{data, tell};
 use super::record::exists;
@@ -17,17 +17,17 @@ pub(super) struct Users {
 
 #[derive(Debug, Subcommand)]
 enum UsersCommand {
-    /// List the users: name, role, way to sign in, and who is disabled.
+    /// List users with name, role, way to sign in, and whether they are disabled.
     List {
-        /// The SQLite file; the service must not be running.
+        /// SQLite file; the service must not be running.
         #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
         database: PathBuf,
     },
-    /// Make a one-time sign-in link for a user, such as an administrator who forgot the password.
+    /// Create a one-time sign-in link for a user, such as an administrator who forgot the password.
     Link {
         /// Name of the user.
         name: String,
-        /// The SQLite file; the service must not be running.
+        /// SQLite file; the service must not be running.
         #[arg(long, env = "GAITWRIGHT_DATABASE", default_value = "gaitwright.db", value_name = "FILE")]
         database: PathBuf,
     },
@@ -41,8 +41,7 @@ impl Users {
         exists(database)?;
         let store = match Store::open(database).await {
             Err(StoreError::InUse { .. }) => {
-                let reason = "the service is running with this record: stop it first, or start it anew with \
-                              --sign-in-link";
+                let reason = "The service is using this database. Stop it first, or restart it with --sign-in-link.";
                 return Err(Error::conflict(reason));
             }
             opened => opened?,
@@ -64,12 +63,12 @@ impl Users {
             }
             UsersCommand::Link { name, .. } => {
                 let mut writer = store.write().await?;
-                let missing = || Error::NotFound { what: "the user".to_owned(), id: name.clone() };
+                let missing = || Error::NotFound { what: "user".to_owned(), id: name.clone() };
                 let user = users::by_name(&mut writer, name.trim()).await?.ok_or_else(missing)?;
                 let secret = people::link(&mut writer, &Actor::terminal(), user.id).await?;
                 commit(writer).await?;
                 tell(&format!(
-                    "a sign-in link for {}, once, within a day: open it at the service's address",
+                    "sign-in link for {}; it works once, within a day; open it at the address of the service",
                     user.name
                 ));
                 data(&format!("/sign-in/{secret}"))

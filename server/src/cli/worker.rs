@@ -1,4 +1,4 @@
-//! `gaitwright worker`.
+//! `gaitwright worker`: runs solves for a service on another machine.
 
 use super::config::queue_name;
 use super::numbers::workers;
@@ -11,16 +11,16 @@ use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, Args)]
 pub(super) struct Worker {
-    /// The broker.
+    /// Address of the NATS broker.
     #[arg(long, env = "GAITWRIGHT_NATS", value_name = "URL", hide_env_values = true)]
     nats: String,
     /// Name of the service on the broker.
     #[arg(long, env = "GAITWRIGHT_NATS_QUEUE", default_value = "gaitwright", value_name = "NAME", value_parser = queue_name)]
     nats_queue: String,
-    /// How many solves at the same time; default: the number of cores.
+    /// Number of solves that run in parallel (default: number of cores).
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
-    /// Name of this worker in the record; default: host and process.
+    /// Name of this worker in the record (default: host and process).
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 }
@@ -29,7 +29,7 @@ impl Worker {
     pub(super) async fn run(self) -> Result<(), Error> {
         let name = self.name.unwrap_or_else(|| format!("{} {}", host(), std::process::id()));
         if name.is_empty() || name.chars().count() > 200 {
-            return Err(Error::invalid("name", name, "1 to 200 characters"));
+            return Err(Error::invalid("name", name, "1 to 200 characters long"));
         }
         let size = cores_or(self.workers);
         let solver = Arc::new(GaitSolver);
@@ -49,7 +49,7 @@ impl Worker {
     }
 }
 
-/// The name of this machine, as far as it says.
+/// The name of this machine, if known.
 fn host() -> String {
     std::fs::read_to_string("/etc/hostname").map_or_else(|_| "worker".to_owned(), |name| name.trim().to_owned())
 }

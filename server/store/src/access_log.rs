@@ -1,4 +1,4 @@
-//! The access log: who saw or exported data of subjects, and who was refused.
+//! Rows of the access log: views and exports of subjects' data, and refusals.
 
 use super::audit::Actor;
 use super::{Connection, Instant, StoreResult, StudyId, SubjectId, now};
@@ -8,20 +8,20 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// What was done.
+/// Kind of an access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Shown.
+    /// The data was shown.
     View,
-    /// Given out as a file.
+    /// The data was exported as a file.
     Export,
-    /// Asked for and refused: a token or session that is not good, a right that is missing, a failed sign-in.
+    /// The request was refused: an invalid credential, a missing right, or a failed sign-in.
     Refused,
 }
 
 impl Kind {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::View => "view",
@@ -41,73 +41,73 @@ impl FromStr for Kind {
     }
 }
 
-/// What a row says, before it is written.
+/// An access to log.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Access {
-    /// What was done.
+    /// Kind of the access.
     pub kind: Kind,
-    /// By whom.
+    /// Who made the request.
     pub actor: String,
-    /// From which address; of the command line: empty.
-    pub address: String,
-    /// HTTP method; of the command line: empty.
-    pub method: String,
-    /// Route, or command.
-    pub route: String,
-    /// The address that was asked for, without secrets.
-    pub object: String,
-    /// HTTP status; of the command line: 0.
-    pub status: u16,
-    /// Identifiers that the request named: they lead to study and subject.
-    pub named: Vec<String>,
-}
-
-/// How often and when.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tally {
-    /// The first time.
-    pub first_at: Instant,
-    /// The last time.
-    pub last_at: Instant,
-    /// How often.
-    pub times: u32,
-}
-
-/// A row of the log.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct AccessRow {
-    /// Order.
-    pub seq: i64,
-    /// When, the first time.
-    pub created_at: Instant,
-    /// When, the last time.
-    pub last_at: Instant,
-    /// How often within a minute.
-    pub times: u32,
-    /// What was done.
-    pub kind: Kind,
-    /// By whom.
-    pub actor: String,
-    /// From which address; empty for the command line.
+    /// Client address; empty for the command line.
     pub address: String,
     /// HTTP method; empty for the command line.
     pub method: String,
     /// Route, or command.
     pub route: String,
-    /// The address that was asked for, without secrets.
+    /// Requested address, without secrets.
     pub object: String,
     /// HTTP status; 0 for the command line.
     pub status: u16,
-    /// The study, where one was named.
+    /// Identifiers in the request, from which study and subject are found.
+    pub named: Vec<String>,
+}
+
+/// Number and times of equal accesses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tally {
+    /// First time.
+    pub first_at: Instant,
+    /// Last time.
+    pub last_at: Instant,
+    /// Number.
+    pub times: u32,
+}
+
+/// Row of the access log.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AccessRow {
+    /// Sequence number.
+    pub seq: i64,
+    /// Time of the first access.
+    pub created_at: Instant,
+    /// Time of the last access.
+    pub last_at: Instant,
+    /// Number of equal accesses within a minute.
+    pub times: u32,
+    /// Kind of the access.
+    pub kind: Kind,
+    /// Who made the request.
+    pub actor: String,
+    /// Client address; empty for the command line.
+    pub address: String,
+    /// HTTP method; empty for the command line.
+    pub method: String,
+    /// Route, or command.
+    pub route: String,
+    /// Requested address, without secrets.
+    pub object: String,
+    /// HTTP status; 0 for the command line.
+    pub status: u16,
+    /// Study of the request, if any.
     pub study_id: Option<StudyId>,
-    /// The subject, where one was named.
+    /// Subject of the request, if any.
     pub subject_id: Option<SubjectId>,
 }
 
 /// Appends a row.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn append(db: &mut Connection, access: &Access, tally: Tally) -> StoreResult<()> {
     let mut whose = (None, None);
     for id in &access.named {
@@ -137,7 +137,7 @@ pub async fn append(db: &mut Connection, access: &Access, tally: Tally) -> Store
     Ok(())
 }
 
-/// Of which study and subject something is, whatever it is.
+/// The study and the subject of an object of any kind.
 async fn whose_is(db: &mut Connection, id: &str) -> StoreResult<(Option<StudyId>, Option<SubjectId>)> {
     let row = sqlx::query(
         "select id as study, subject_id as subject from studies where id = coalesce(\
@@ -155,11 +155,10 @@ async fn whose_is(db: &mut Connection, id: &str) -> StoreResult<(Option<StudyId>
     Ok((row.try_get("study")?, row.try_get("subject")?))
 }
 
-/// At most `limit` rows before `before`, newest first; those that `contains` stands in, where it is not empty, and those of
-/// a subject, where one is named.
+/// At most `limit` rows before `before`, newest first: those that contain a text, and those of a subject, if given.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn page(
     db: &mut Connection,
     contains: &str,
@@ -182,13 +181,13 @@ pub async fn page(
     rows.iter().map(from_row).collect()
 }
 
-/// Takes away at most `limit` of the rows that are older than so many days: how many there were.
+/// Deletes at most `limit` rows that are older than `days` days, and returns their number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn prune(db: &mut Connection, actor: &Actor, days: u32, limit: u32) -> StoreResult<u64> {
     let before = now().plus_seconds(-86_400 * i64::from(days));
-    // The log is pruned from its beginning on: what was written before the first row that is young enough.
+    // Rows are deleted from the beginning of the log, up to the first row that is young enough.
     let up_to: Option<i64> = sqlx::query_scalar(
         "select max(seq) from (select seq from access_log where seq < \
          coalesce((select min(seq) from access_log where last_at >= ?), 9223372036854775807) order by seq limit ?)",

@@ -1,5 +1,5 @@
-//! What commands export of a record that a service may own: they note it in a file beside the record, and whoever owns the
-//! record takes it into the access log.
+//! The access spool: a file next to the record in which commands note exports, until the owner of the record writes
+//! them to the access log.
 
 use super::access_log::{Access, Tally};
 use super::{Instant, StoreError, StoreResult, beside};
@@ -8,7 +8,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Longest spool that is read at a time.
+/// Number of bytes of the spool that are read at a time.
 const LONGEST_BYTES: u64 = 1 << 20;
 
 #[derive(Serialize, Deserialize)]
@@ -24,7 +24,7 @@ fn path_of(record: &Path) -> PathBuf {
 /// Notes an access durably.
 ///
 /// # Errors
-/// When the file beside the record cannot be written, as on a read-only medium.
+/// If the file cannot be written, as on a read-only medium.
 pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     let path = path_of(record);
     let failed = |source| StoreError::Open { path: path.clone(), source };
@@ -39,7 +39,7 @@ pub fn note(record: &Path, access: &Access) -> StoreResult<()> {
     file.lock().and_then(|()| file.write_all(text.as_bytes())).and_then(|()| file.sync_all()).map_err(failed)
 }
 
-/// What was noted and not taken yet. Held, nobody adds to it.
+/// The noted accesses. While this is held, no command can add any.
 #[derive(Debug)]
 pub struct Spool {
     file: File,
@@ -48,10 +48,10 @@ pub struct Spool {
     pub noted: Vec<(Access, Tally)>,
 }
 
-/// What was noted beside a record; `None`: nothing.
+/// Takes the accesses that were noted next to a record, if any.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// If the file cannot be read.
 pub fn take(record: &Path) -> StoreResult<Option<Spool>> {
     let path = path_of(record);
     if !std::fs::metadata(&path).is_ok_and(|file| file.len() > 0) {
@@ -61,7 +61,7 @@ pub fn take(record: &Path) -> StoreResult<Option<Spool>> {
     let file = OpenOptions::new().read(true).write(true).open(&path).map_err(failed)?;
     match file.try_lock() {
         Ok(()) => {}
-        // A command is writing: next time.
+        // A command is writing, so take it next time.
         Err(TryLockError::WouldBlock) => return Ok(None),
         Err(TryLockError::Error(source)) => return Err(failed(source)),
     }
@@ -69,7 +69,7 @@ pub fn take(record: &Path) -> StoreResult<Option<Spool>> {
     (&file).take(LONGEST_BYTES).read_to_string(&mut text).map_err(failed)?;
     let noted = text.lines().filter_map(|line| {
         let Ok(Line { at, access }) = serde_json::from_str(line) else {
-            tracing::warn!(file = %path.display(), "a line is no access and is not taken into the access log");
+            tracing::warn!(file = %path.display(), "ignoring a malformed line of the access spool");
             return None;
         };
         Some((access, Tally { first_at: at, last_at: at, times: 1 }))
@@ -79,10 +79,10 @@ pub fn take(record: &Path) -> StoreResult<Option<Spool>> {
 }
 
 impl Spool {
-    /// Forgets what was taken into the log.
+    /// Clears the spool after its accesses were written to the log.
     ///
     /// # Errors
-    /// When the file cannot be emptied.
+    /// If the file cannot be cleared.
     pub fn clear(self) -> StoreResult<()> {
         self.file.set_len(0).map_err(|source| StoreError::Open { path: self.path, source })
     }

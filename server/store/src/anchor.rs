@@ -1,8 +1,8 @@
-//! Anchors: files outside the database that hold the newest hashes of its chains. A record that lost its end, or was put
-//! back to an earlier state, still has whole chains; its anchor tells.
+//! Anchors: files outside the database with the newest hashes of its chains. They detect a record whose newest rows are
+//! missing, although its chains are intact.
 //!
-//! An anchor is written after the change is on the disk and before it is acknowledged, without waiting for the disk again:
-//! it never runs ahead of the record. Two places are written in turn, so that one is whole whenever the power fails.
+//! An anchor is written after a change is on the disk and before it is acknowledged, so it never runs ahead of the
+//! record. Two places are written in turn, so that one is intact after a power failure.
 
 use super::audit::ORIGIN;
 use super::files::FileId;
@@ -15,19 +15,19 @@ use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Length of one of the two places: what a disk writes at once.
+/// Length of one of the two places: a disk sector.
 const PLACE_BYTES: usize = 512;
 
-/// The end of a chain.
+/// The last row of a chain.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct End {
-    /// Number of its last row; 0: it has none.
+    /// Sequence number; 0 for an empty chain.
     pub seq: i64,
-    /// Hash of that row.
+    /// Hash of the row.
     pub hash: String,
 }
 
-/// The ends of the chains of a record.
+/// The last rows of the chains of a record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ends {
     /// Of the audit trail.
@@ -36,15 +36,15 @@ pub struct Ends {
     pub seals: End,
 }
 
-/// What stands in one of the two places.
+/// The content of one of the two places.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Place {
-    /// Counts the writes: the place with the larger number counts.
+    /// Number of the write. The place with the larger number applies.
     turn: u64,
     at: Instant,
     #[serde(flatten)]
     ends: Ends,
-    /// Of the rest: a place that was written in part is none.
+    /// Hash of the rest, to detect a partial write.
     sha256: String,
 }
 
@@ -60,7 +60,7 @@ impl Place {
         Ok(json::sha256(json::to_text("anchor", &parts)?.as_bytes()))
     }
 
-    /// As it stands in the file: a line, filled up with spaces.
+    /// The bytes in the file: a line, padded with spaces.
     fn bytes(&self) -> StoreResult<Vec<u8>> {
         let mut bytes = json::to_text("anchor", self)?.into_bytes();
         bytes.resize(PLACE_BYTES - 1, b' ');
@@ -68,7 +68,7 @@ impl Place {
         Ok(bytes)
     }
 
-    /// The newer of those in a file that are whole.
+    /// The newer of the intact places in a file.
     fn newest(file: &[u8]) -> Option<Self> {
         let read = |place: &[u8]| serde_json::from_slice::<Self>(place.trim_ascii()).ok();
         let whole = |place: &Self| place.digest().is_ok_and(|digest| digest == place.sha256);
@@ -76,12 +76,12 @@ impl Place {
     }
 }
 
-/// The anchor beside a record.
+/// The path of the anchor next to a record.
 pub fn beside_record(record: &Path) -> PathBuf {
     beside(record, ".anchor")
 }
 
-/// What the chains of an open record end with.
+/// Reads the last rows of the chains of an open record.
 pub(super) async fn ends(db: &mut Connection) -> StoreResult<Ends> {
     let sql = "select (select seq from audit order by seq desc limit 1), (select hash from audit order by seq desc limit 1), \
                (select seq from seals order by seq desc limit 1), (select hash from seals order by seq desc limit 1)";
@@ -93,25 +93,24 @@ pub(super) async fn ends(db: &mut Connection) -> StoreResult<Ends> {
     Ok(Ends { audit: end(0)?, seals: end(2)? })
 }
 
-/// What an anchor holds; `None`: there is no such file.
+/// Reads an anchor; `None` if there is no such file.
 ///
 /// # Errors
-/// [`StoreError::Open`], and [`StoreError::Damaged`] when neither place is whole.
+/// [`StoreError::Open`], and [`StoreError::Damaged`] if neither place is intact.
 pub fn read(anchor: &Path) -> StoreResult<Option<Ends>> {
     let bytes = match std::fs::read(anchor) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         other => other.map_err(|source| StoreError::Open { path: anchor.to_owned(), source })?,
     };
-    let reason = || format!("{} cannot be read; remove it if you know why", anchor.display());
+    let reason = || format!("{} cannot be read. Remove it only if you know the cause.", anchor.display());
     let place = Place::newest(&bytes).ok_or_else(|| StoreError::Damaged { what: "anchor", reason: reason() })?;
     Ok(Some(place.ends))
 }
 
-/// Compares a record with an anchor: the chains hold what the anchor saw, and perhaps more. What the anchor saw, when
-/// there is one.
+/// Checks that the chains of a record contain the rows that an anchor lists. Returns these rows, if there is an anchor.
 ///
 /// # Errors
-/// [`StoreError::CutOff`], [`StoreError::Rewritten`], those of [`read`], or what the database reports.
+/// [`StoreError::CutOff`], [`StoreError::Rewritten`], those of [`read`]; errors of the database.
 pub async fn check(db: &mut Connection, record: &Path, anchor: &Path) -> StoreResult<Option<Ends>> {
     let Some(ends) = read(anchor)? else { return Ok(None) };
     for (table, end) in [("audit", &ends.audit), ("seals", &ends.seals)] {
@@ -133,12 +132,12 @@ pub async fn check(db: &mut Connection, record: &Path, anchor: &Path) -> StoreRe
     Ok(Some(ends))
 }
 
-/// Whether an anchor has seen a row of the record.
+/// Whether an anchor lists any row.
 pub(super) fn has_seen_rows(anchor: &Path) -> StoreResult<bool> {
     Ok(read(anchor)?.is_some_and(|ends| ends.audit.seq > 0 || ends.seals.seq > 0))
 }
 
-/// Writes an anchor anew, durably.
+/// Replaces an anchor durably.
 pub(super) fn put(anchor: &Path, ends: &Ends) -> StoreResult<()> {
     let place = Place::new(1, ends.clone())?.bytes()?;
     make(anchor, &place).map_err(|source| StoreError::Open { path: anchor.to_owned(), source })
@@ -159,23 +158,23 @@ pub(super) struct Anchors(Mutex<Vec<Anchor>>);
 #[derive(Debug)]
 struct Anchor {
     path: PathBuf,
-    /// The file and what it is; `None`: it is made with the next write.
+    /// The open file and its identity; `None` until the next write creates it.
     file: Option<(File, FileId)>,
     turn: u64,
     written: Option<Ends>,
-    /// The last write failed, and that was logged.
+    /// Whether the last write failed, which was logged.
     failing: bool,
 }
 
 impl Anchors {
-    /// Those at these places; they are made with the first write.
+    /// Anchors at these paths. The first write creates them.
     pub(super) fn at(places: Vec<PathBuf>) -> Self {
         let anchor = |path| Anchor { path, file: None, turn: 0, written: None, failing: false };
         Self(Mutex::new(places.into_iter().map(anchor).collect()))
     }
 
-    /// Writes what the chains end with. A place that cannot be written holds less than the record then, which is
-    /// logged and is no reason to refuse a change.
+    /// Writes the last rows of the chains. An anchor that cannot be written lags behind the record, which is logged and
+    /// does not prevent changes.
     pub(super) fn write(&self, ends: &Ends) {
         for anchor in self.0.lock().unwrap_or_else(PoisonError::into_inner).iter_mut() {
             if anchor.written.as_ref() == Some(ends) {
@@ -185,7 +184,7 @@ impl Anchors {
                 Ok(()) => (anchor.written, anchor.failing) = (Some(ends.clone()), false),
                 Err(error) => {
                     if !anchor.failing {
-                        tracing::error!(anchor = %anchor.path.display(), %error, "the anchor cannot be written");
+                        tracing::error!(anchor = %anchor.path.display(), %error, "cannot write the anchor");
                     }
                     (anchor.file, anchor.failing) = (None, true);
                 }
@@ -193,13 +192,13 @@ impl Anchors {
         }
     }
 
-    /// Waits until the disk has them.
+    /// Syncs the anchors to the disk.
     pub(super) fn sync(&self) {
         for anchor in self.0.lock().unwrap_or_else(PoisonError::into_inner).iter() {
             if let Some((file, _)) = &anchor.file
                 && let Err(error) = file.sync_data()
             {
-                tracing::warn!(anchor = %anchor.path.display(), %error, "the anchor cannot be made durable");
+                tracing::warn!(anchor = %anchor.path.display(), %error, "cannot sync the anchor");
             }
         }
     }
@@ -235,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_was_written_in_part_leaves_the_one_before() {
+    fn partial_write_leaves_the_previous_place_intact() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.db.anchor");
         assert_eq!(read(&path).unwrap(), None);
@@ -259,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_deleted_anchor_is_made_anew_with_the_next_change() {
+    fn deleted_anchor_is_recreated_with_the_next_change() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.db.anchor");
         let anchors = Anchors::at(vec![path.clone(), folder.path().join("no folder/b.anchor")]);

@@ -1,4 +1,4 @@
-//! The rows of a study that an archive holds: reading them all from a record, and writing them into another one.
+//! The rows of a study in an archive: reads them from a record, and writes them to another one.
 
 use super::row::{Cell, Row};
 use super::seals;
@@ -8,8 +8,8 @@ use sqlx::{AssertSqlSafe, Row as _};
 use std::collections::HashMap;
 use tokio::sync::mpsc::Sender;
 
-/// Tables in the order in which their rows can be written, and which rows belong to a study. Certificates and
-/// explanations are made anew where the study is imported: nobody has to believe them.
+/// Tables in the order in which their rows can be written, with the condition for rows of a study. Certificates and
+/// explanations are not included: the importing service computes them again.
 const TABLES: [(&str, &str); 29] = [
     ("subjects", "id in (select subject_id from studies where id = ?)"),
     ("devices", "id in (select device_id from studies where id = ?)"),
@@ -42,10 +42,10 @@ const TABLES: [(&str, &str); 29] = [
     ("imports", "study_id = ? order by seq"),
 ];
 
-/// The column in which a selected row has its seal.
+/// Alias of the column with the newest seal.
 const SEAL: &str = "newest seal";
 
-/// A row that was read, and its table.
+/// A row and its table.
 #[derive(Debug)]
 pub struct Read {
     /// Name of its table.
@@ -58,15 +58,15 @@ pub struct Read {
     pub seal: Option<String>,
 }
 
-/// The name of a table that archives hold, and its place in the order.
+/// The position and the name of a table in archives.
 pub fn table(name: &str) -> Option<(usize, &'static str)> {
     TABLES.iter().map(|(table, _)| *table).enumerate().find(|(_, table)| *table == name)
 }
 
-/// Reads every row of a study, all of the same instant, one after the other. Ends early when nobody receives them.
+/// Reads every row of a study in one consistent state, and sends it to `rows`. Ends early if the receiver is dropped.
 ///
 /// # Errors
-/// [`StoreError::Missing`], [`StoreError::Withdrawn`], or what the database reports.
+/// [`StoreError::Missing`], [`StoreError::Withdrawn`]; errors of the database.
 pub async fn read(db: &mut Connection, study: StudyId, rows: &Sender<Read>) -> StoreResult<()> {
     let mut db = sqlx::Connection::begin(db).await?;
     studies::get(&mut db, study).await?;
@@ -87,23 +87,23 @@ pub async fn read(db: &mut Connection, study: StudyId, rows: &Sender<Read>) -> S
     Ok(())
 }
 
-/// What a record has already of a row that an archive brings.
+/// How a row of an archive relates to the record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Known {
-    /// Nothing.
+    /// The record does not have it.
     New,
-    /// The very same, under this identifier.
+    /// The record has an identical row with this identifier.
     Same(String),
-    /// Another row under the same identifier: these columns differ.
+    /// The record has a row with the same identifier, and these columns differ.
     Differs(Vec<String>),
-    /// Another row of the same name.
+    /// The record has another row with the same name.
     NameTaken(String),
 }
 
-/// What a record has already of a subject, device or reference gait.
+/// Compares a subject, device or reference gait with the record.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn known(db: &mut Connection, table: &str, row: &Row) -> StoreResult<Known> {
     let id = row.text("id").unwrap_or_default();
     let sql = AssertSqlSafe(format!("select * from {table} where id = ?"));
@@ -136,17 +136,17 @@ pub async fn known(db: &mut Connection, table: &str, row: &Row) -> StoreResult<K
 /// Writes the rows of one study into a record.
 #[derive(Debug, Default)]
 pub struct Unpacking {
-    /// Identifiers here of devices and references that were here under another one.
+    /// For devices and reference gaits that the record has under another identifier: that identifier.
     pub same: HashMap<String, String>,
     sequence: HashMap<i64, i64>,
     columns: HashMap<&'static str, Vec<String>>,
 }
 
 impl Unpacking {
-    /// Writes a row as it is.
+    /// Writes a row unchanged.
     ///
     /// # Errors
-    /// A violated constraint or trigger, an unknown column, or what the database reports.
+    /// A violated constraint or trigger, an unknown column; errors of the database.
     pub async fn write(&mut self, db: &mut Connection, table: &'static str, row: Row) -> StoreResult<i64> {
         if !self.columns.contains_key(table) {
             let rows = sqlx::query_scalar("select name from pragma_table_info(?)").bind(table).fetch_all(&mut *db);
@@ -155,11 +155,11 @@ impl Unpacking {
         row.insert(db, table, self.columns.get(table).map_or(&[], Vec::as_slice)).await
     }
 
-    /// Writes a row with what must differ: a study that was going on is paused, solves that ran are queued, and
-    /// sequence numbers are those of this record.
+    /// Writes a row with the necessary changes: a running study is paused, running solves are queued, and rows get
+    /// sequence numbers of this record.
     ///
     /// # Errors
-    /// A violated constraint or trigger, or what the database reports.
+    /// A violated constraint or trigger; errors of the database.
     pub async fn adapt_and_write(&mut self, db: &mut Connection, table: &'static str, mut row: Row) -> StoreResult<()> {
         let text = |value: &str| Cell::Text(value.to_owned());
         let mut before = None;
@@ -172,7 +172,7 @@ impl Unpacking {
                 }
                 if matches!(row.text("state"), Some("running" | "waiting")) {
                     row.set("state", text("paused"));
-                    row.set("state_reason", text("imported while it was going on"));
+                    row.set("state_reason", text("imported while running"));
                 }
                 if let Some(parent) = row.text("forked_from") {
                     let found = sqlx::query("select 1 from studies where id = ?").bind(parent.to_owned());
@@ -186,7 +186,7 @@ impl Unpacking {
                 row.set("worker", Cell::Null);
                 row.set("lease_until", Cell::Null);
             }
-            // Scripts keep what they asked for; what the program ran is queued again.
+            // Scripts keep their open trials. Our own running solves are queued again.
             "trials" if row.text("asked_by").is_none() && row.text("state") == Some("running") => {
                 row.set("state", text("queued"));
             }
@@ -212,11 +212,10 @@ impl Unpacking {
     }
 }
 
-/// Every trial of a record whose job says otherwise than the trial: none that is queued or running lacks an open job,
-/// and none that has ended has one.
+/// The first trial whose state contradicts its job: queued or running without an open job, or ended with one.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn trial_unlike_its_job(db: &mut Connection) -> StoreResult<Option<u32>> {
     Ok(sqlx::query_scalar(
         "select t.number from trials t left join jobs j on j.trial_id = t.id \
@@ -227,27 +226,27 @@ pub async fn trial_unlike_its_job(db: &mut Connection) -> StoreResult<Option<u32
     .await?)
 }
 
-/// Texts of definitions that are not as this program writes them, or whose hash is not theirs, are named by table.
+/// Reads the only definition of a table, for checks against its name and hash.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn definition(db: &mut Connection, table: &str) -> StoreResult<Definition> {
     let sql = AssertSqlSafe(format!("select name, definition, sha256 from {table}"));
     let rows = sqlx::query(sql).fetch_all(db).await?;
     let [row] = &rows[..] else {
-        let reason = format!("{} rows of {table}, expected one", rows.len());
+        let reason = format!("{table} has {} rows instead of one", rows.len());
         return Err(StoreError::Damaged { what: "archive", reason });
     };
     Ok(Definition { name: row.try_get("name")?, text: row.try_get("definition")?, sha256: row.try_get("sha256")? })
 }
 
-/// A device or reference gait as an archive has it.
+/// A device or reference gait in an archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Definition {
     /// Its name.
     pub name: String,
     /// The JSON text.
     pub text: String,
-    /// The hash that stands beside it.
+    /// The stored hash.
     pub sha256: String,
 }

@@ -1,15 +1,15 @@
-//! What an archive holds of orders: only those that were unblinded.
+//! The allocations that an archive may contain: only unblinded ones.
 
 use super::row::{Cell, Row};
 
-/// Allocations of sessions that were unblinded; the place of `?` is the study.
+/// Condition for allocations of unblinded sessions; `?` is the study.
 pub(super) const LAB: &str = "session_id in (select l.id from lab_sessions l join lab_acts t on t.session_id = l.id \
                               where l.study_id = ? and t.act = 'unblinded')";
-/// Allocations of pairs of raters who were unblinded.
+/// Condition for allocations of pairs of unblinded raters.
 pub(super) const PAIRS: &str = "presentation_id in (select p.id from presentations p join unblindings u \
                                 on u.study_id = p.study_id and u.rater = p.rater where p.study_id = ?)";
 
-/// A row without what else says an order: the column of the baseline, and the place in a block that others of it share.
+/// Removes other columns that reveal an allocation: a legacy column, and the place in a block.
 #[must_use]
 pub fn masked(table: &str, mut row: Row) -> Row {
     match table {

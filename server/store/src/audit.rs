@@ -1,4 +1,4 @@
-//! The audit trail: who did what, when and why, chained by hashes so that a change of the past is found.
+//! The audit trail: who did what, when and why, as a chain of hashes that detects later changes.
 
 use super::{Connection, Instant, StoreResult, UserId, json, now};
 use serde::Serialize;
@@ -9,10 +9,10 @@ use utoipa::ToSchema;
 
 /// Hash before the first row.
 pub(super) const ORIGIN: &str = "0000000000000000000000000000000000000000000000000000000000000000";
-/// Rows read at a time when the chain is walked.
+/// Number of rows read at a time during verification.
 const BATCH: i64 = 1000;
 
-/// Who acts.
+/// Who makes a change.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Actor {
     text: String,
@@ -20,10 +20,10 @@ pub struct Actor {
 }
 
 impl Actor {
-    /// How the text of a token begins; that of a user begins with the role.
+    /// Prefix of the text of a token. The text of a user starts with the role.
     pub const OF_TOKENS: &str = "token ";
 
-    /// Whether the text of an actor is that of a token.
+    /// Whether the text of an actor denotes a token.
     pub fn is_token(text: &str) -> bool {
         text.starts_with(Self::OF_TOKENS)
     }
@@ -33,17 +33,17 @@ impl Actor {
         Self::named(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
     }
 
-    /// Whoever runs the command line.
+    /// The command line.
     pub fn terminal() -> Self {
         Self::named("command line")
     }
 
-    /// Whoever reaches the service without signing in.
+    /// A caller who is not signed in.
     pub fn anonymous() -> Self {
         Self::named("not signed in")
     }
 
-    /// Somebody with a name.
+    /// An actor with this text.
     pub fn named(name: &str) -> Self {
         Self { text: name.chars().take(120).collect(), user: None }
     }
@@ -53,42 +53,42 @@ impl Actor {
         Self { user: Some(id), ..Self::named(name) }
     }
 
-    /// Which user it is.
+    /// The user, if it is one.
     pub fn user_id(&self) -> Option<UserId> {
         self.user
     }
 
-    /// As stored.
+    /// The text in the record.
     pub fn as_str(&self) -> &str {
         &self.text
     }
 }
 
-/// A row of the trail.
+/// Row of the audit trail.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AuditRow {
-    /// Order.
+    /// Sequence number.
     pub seq: i64,
-    /// When.
+    /// Time of the change.
     pub at: Instant,
-    /// Who.
+    /// Who made the change.
     pub actor: String,
-    /// What was done: `subject.add`, `study.pause`, ...
+    /// Action, such as `subject.add` or `study.pause`.
     pub action: String,
-    /// To what: `study 0190...`.
+    /// Object of the action, such as `study 0190...`.
     pub object: String,
     /// What exactly, with the reason where there is one.
     pub detail: Value,
-    /// Hash of the row before.
+    /// Hash of the previous row.
     pub previous: String,
-    /// Hash of this row with it.
+    /// Hash of this row and the previous hash.
     pub hash: String,
 }
 
-/// Appends a row to the transaction of the change.
+/// Appends a row within the transaction of the change.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &str, detail: &Value) -> StoreResult<()> {
     let last = sqlx::query("select hash from audit order by seq desc limit 1").fetch_optional(&mut *db).await?;
     let previous: String = match last {
@@ -110,11 +110,10 @@ pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &s
     Ok(())
 }
 
-/// At most `limit` rows before `before`, newest first; those that `contains` stands in, where it is not empty: in who, what,
-/// to what, or exactly.
+/// At most `limit` rows before `before`, newest first: those that contain a text in actor, action, object or detail.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limit: u32) -> StoreResult<Vec<AuditRow>> {
     let rows = sqlx::query(
         "select * from audit where (?1 is null or seq < ?1)
@@ -129,27 +128,27 @@ pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limi
     rows.iter().map(from_row).collect()
 }
 
-/// What walking the chain found.
+/// The result of verifying the chain.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChainCheck {
-    /// Every row follows from the one before.
+    /// Every row matches its hash and the previous row.
     Whole {
-        /// How many rows.
+        /// Number of rows.
         rows: u64,
-        /// Hash of the last one.
+        /// Hash of the last row.
         last: String,
     },
-    /// This row does not.
+    /// A row does not match.
     Broken {
-        /// Its sequence number.
+        /// Sequence number of the row.
         seq: i64,
     },
 }
 
-/// Walks the whole chain.
+/// Verifies the whole chain.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn verify(db: &mut Connection) -> StoreResult<ChainCheck> {
     let (mut rows, mut last, mut after) = (0_u64, ORIGIN.to_owned(), 0_i64);
     loop {
@@ -163,31 +162,31 @@ pub async fn verify(db: &mut Connection) -> StoreResult<ChainCheck> {
         }
         for raw in &batch {
             let seq: i64 = raw.try_get("seq")?;
-            // A row that cannot even be read was not written by this program.
+            // An unreadable row was not written by this program.
             let Ok(row) = from_row(raw) else { return Ok(ChainCheck::Broken { seq }) };
             let at: String = raw.try_get("at")?;
             let expected = hash(&last, &at, &row.actor, &row.action, &row.object, &row.detail);
-            // No row is ever deleted: the numbers have no gap.
+            // Rows are never deleted, so the numbers have no gaps.
             if seq != after + 1 || row.previous != last || row.hash != expected {
                 return Ok(ChainCheck::Broken { seq });
             }
             (rows, last, after) = (rows + 1, row.hash, seq);
         }
     }
-    // The database counts for itself how many there were.
+    // SQLite keeps the largest number ever used.
     if last_ever(db, "audit").await? != after {
         return Ok(ChainCheck::Broken { seq: after + 1 });
     }
     Ok(ChainCheck::Whole { rows, last })
 }
 
-/// The largest number that a table ever gave to a row, also when the row is there no more.
+/// The largest sequence number that a table has ever used, even if the row was deleted.
 pub(super) async fn last_ever(db: &mut Connection, table: &str) -> StoreResult<i64> {
     let last = sqlx::query_scalar("select seq from sqlite_sequence where name = ?");
     Ok(last.bind(table).fetch_optional(db).await?.unwrap_or(0))
 }
 
-/// Hash of a row and the one before: of an object with sorted keys, so that there is one way to write it.
+/// The hash of a row and the previous one, over a JSON object with sorted keys.
 fn hash(previous: &str, at: &str, actor: &str, action: &str, object: &str, detail: &Value) -> String {
     let whole =
         json!({"action": action, "actor": actor, "at": at, "detail": detail, "object": object, "previous": previous});

@@ -1,4 +1,4 @@
-//! Copies of the record: consistent while the service runs, checked before they are trusted.
+//! Backups of the record: consistent while the service is running, and checked.
 
 use super::whole_file::{WholeFile, folder_of};
 use super::{Store, StoreError, StoreResult, beside, file_kind, free_name, migrations};
@@ -6,15 +6,16 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::{Path, PathBuf};
 
-/// Writes a compact copy of an open record to a new file and checks the copy.
+/// Writes a compact backup of an open record to a new file and checks it.
 ///
 /// # Errors
-/// When the file exists, cannot be written, or the copy is not whole.
+/// If the file exists or cannot be written, or the backup is damaged.
 pub async fn of_store(store: &Store, to: &Path) -> StoreResult<()> {
     into_file(&store.readers, to, store.path()).await
 }
 
-/// Writes a compact copy beside the record (`gaitwright.db.backup-20260501T101500`) and checks it: the file and its size.
+/// Writes a backup next to the record (`gaitwright.db.backup-20260501T101500`) and checks it. Returns the file and its
+/// size.
 ///
 /// # Errors
 /// As [`of_store`].
@@ -26,11 +27,11 @@ pub async fn beside_record(store: &Store) -> StoreResult<(PathBuf, u64)> {
     Ok((to, size))
 }
 
-/// Begins the names of copies that the service makes by itself.
+/// Prefix of the names of scheduled backups.
 const SCHEDULED: &str = "scheduled";
 
-/// Writes a compact copy into a folder (`gaitwright.db.scheduled-20260501T101500`), checks it, and removes the oldest copies
-/// that were made in this way beyond `keep`: the new file and its size.
+/// Writes a scheduled backup to a folder (`gaitwright.db.scheduled-20260501T101500`), checks it, and removes the oldest
+/// ones beyond `keep`. Returns the new file and its size.
 ///
 /// # Errors
 /// As [`of_store`], and when an old copy cannot be removed.
@@ -47,10 +48,10 @@ pub async fn into_folder(store: &Store, folder: &Path, keep: usize) -> StoreResu
     Ok((to, size))
 }
 
-/// The copies of a record that [`into_folder`] left in a folder, newest first, and when each was made.
+/// The scheduled backups of a record in a folder, newest first, with their times.
 ///
 /// # Errors
-/// When the folder cannot be read.
+/// If the folder cannot be read.
 pub fn scheduled(record: &Path, folder: &Path) -> std::io::Result<Vec<(PathBuf, std::time::SystemTime)>> {
     let start = format!("{}.{SCHEDULED}-", record.file_name().unwrap_or_default().to_string_lossy());
     let mut found = Vec::new();
@@ -64,10 +65,10 @@ pub fn scheduled(record: &Path, folder: &Path) -> std::io::Result<Vec<(PathBuf, 
     Ok(found.into_iter().rev().map(|(made, path)| (path, made)).collect())
 }
 
-/// The copies that lie beside the record under the names that this program gives them, newest first: name and bytes.
+/// The backups next to the record, newest first, with their names and sizes.
 ///
 /// # Errors
-/// When the folder cannot be read.
+/// If the folder cannot be read.
 pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
     let own = record.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut found = Vec::new();
@@ -75,7 +76,7 @@ pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
         let kind = name.strip_prefix(&own).and_then(|rest| rest.strip_prefix('.'));
-        // `backup-20260501T101500`, made when asked for; `v42`, made before a new version changed the form.
+        // `backup-20260501T101500` was made on request, `v42` before a migration.
         let is_copy = |kind: &str| {
             let of_form = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit()) && !rest.contains('.');
             kind.starts_with("backup-") || kind.strip_prefix('v').is_some_and(of_form)
@@ -89,7 +90,7 @@ pub fn those_beside(record: &Path) -> std::io::Result<Vec<(String, i64)>> {
     Ok(found.into_iter().rev().map(|(_, name, bytes)| (name, bytes)).collect())
 }
 
-/// Writes a compact copy of a record that another process may own, and checks the copy.
+/// Writes a compact backup of a record that another process may own, and checks it.
 ///
 /// # Errors
 /// As [`of_store`].
@@ -100,10 +101,10 @@ pub async fn of_file(from: &Path, to: &Path) -> StoreResult<()> {
     done
 }
 
-/// Checks that a file is a whole record of a version that this program knows.
+/// Checks that a file is an intact record of a known version.
 ///
 /// # Errors
-/// [`StoreError::NewerSchema`], [`StoreError::Damaged`] with what the database found.
+/// [`StoreError::NewerSchema`], [`StoreError::Damaged`] with the finding of the database.
 pub async fn check(file: &Path) -> StoreResult<()> {
     let pool = open_read_only(file).await?;
     let found = check_open(&pool).await;
@@ -111,20 +112,21 @@ pub async fn check(file: &Path) -> StoreResult<()> {
     found
 }
 
-/// A connection to read a record that another process may own, also where nothing can be written beside it.
+/// Opens a record read-only, even if another process owns it or its folder is not writable.
 ///
 /// # Errors
-/// When it cannot be opened, [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
+/// [`StoreError::Open`], [`StoreError::NotADatabase`], [`StoreError::NewerSchema`].
 pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
     file_kind::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
-    // A row may hold a whole recording.
+    // Small, because a row may contain a whole measurement file.
     let options = options.row_buffer_size(super::quarantine::ROWS_AHEAD);
     let refused = match connect(options.clone(), file).await {
         Err(error @ StoreError::Open { .. }) => error,
         other => return other,
     };
-    // SQLite cannot make its shared memory there. Without a log it needs none; with one it reads a copy of both.
+    // In a read-only folder SQLite cannot create its shared memory. Without a log it needs none; with one, open a copy
+    // of both.
     let log = beside(file, "-wal");
     if std::fs::metadata(&log).map_or(0, |log| log.len()) == 0 {
         return connect(options.immutable(true), file).await;
@@ -136,17 +138,17 @@ pub async fn open_read_only(file: &Path) -> StoreResult<SqlitePool> {
         Ok(_) => connect(SqliteConnectOptions::new().filename(&copy), file).await,
         Err(source) => Err(StoreError::Open { path: file.to_owned(), source }),
     };
-    // What is open stays readable without a name.
+    // Open files stay readable after they are deleted.
     let _ = std::fs::remove_dir_all(&folder);
     opened
 }
 
-/// One connection that stays open, to a record.
+/// A pool of one connection that stays open.
 async fn connect(options: SqliteConnectOptions, file: &Path) -> StoreResult<SqlitePool> {
     let one = SqlitePoolOptions::new().max_connections(1).idle_timeout(None).max_lifetime(None);
     let pool = one.connect_with(options).await.map_err(|error| file_kind::named(file, error.into()))?;
     let refusal = match migrations::check_version(&pool, file).await.map_err(|error| file_kind::named(file, error)) {
-        Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it holds no record yet".to_owned() },
+        Ok(0) => StoreError::NotADatabase { path: file.to_owned(), reason: "it contains no record yet".to_owned() },
         Ok(_) => return Ok(pool),
         Err(error) => error,
     };
@@ -154,10 +156,10 @@ async fn connect(options: SqliteConnectOptions, file: &Path) -> StoreResult<Sqli
     Err(refusal)
 }
 
-/// A new folder that its owner alone may open.
+/// Creates a folder that only its owner can open.
 fn private_folder() -> std::io::Result<PathBuf> {
     let folder = std::env::temp_dir().join(format!("gaitwright-{}", uuid::Uuid::now_v7()));
-    #[allow(unused_mut, reason = "not where there are no permissions of this kind")]
+    #[allow(unused_mut, reason = "only mutated on Unix")]
     let mut builder = std::fs::DirBuilder::new();
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
@@ -165,7 +167,7 @@ fn private_folder() -> std::io::Result<PathBuf> {
     Ok(folder)
 }
 
-/// Writes a compact copy to a new file, checks it and gives it its name.
+/// Writes a compact backup to a new file, checks it, and gives it its name.
 async fn into_file(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<()> {
     let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
     if to.exists() {
@@ -174,7 +176,7 @@ async fn into_file(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<(
     whole_copy(pool, to, record).await?.keep_as(to).map_err(cannot_write)
 }
 
-/// A compact copy that was checked and has no name yet.
+/// Writes and checks a compact copy that has no final name yet.
 pub(super) async fn whole_copy(pool: &SqlitePool, to: &Path, record: &Path) -> StoreResult<WholeFile> {
     let family = record.file_name().unwrap_or_default().to_string_lossy();
     let copy = WholeFile::begin(to, &family).map_err(|source| StoreError::Open { path: to.to_owned(), source })?;
@@ -191,7 +193,7 @@ pub(super) async fn check_open(pool: &SqlitePool) -> StoreResult<()> {
     }
     if let Some(row) = sqlx::query("pragma foreign_key_check").fetch_optional(pool).await? {
         let table: String = row.try_get(0)?;
-        return Err(damaged(format!("a row of {table} points at nothing")));
+        return Err(damaged(format!("a row of {table} refers to a missing row")));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Certificates of gaits, as they were made.
+//! Stored certificates of gaits.
 
 use super::{Connection, StoreResult, StudyId, TrialId, json, now};
 use gait_optimizer::certificate::{self, Certificate};
@@ -6,10 +6,10 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use std::collections::HashMap;
 
-/// The certificate of a trial's gait by the present certification, if it was made.
+/// The certificate of a trial's gait in the current format, if there is one.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Certificate>> {
     sqlx::query("select document from certificates where trial_id = ? and format_version = ?")
         .bind(trial)
@@ -20,10 +20,10 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Cer
         .transpose()
 }
 
-/// Whether a trial's gait passed the present certification, if it was made.
+/// Whether the certificate of a trial's gait passed, if there is one.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn passed(db: &mut Connection, trial: TrialId) -> StoreResult<Option<bool>> {
     Ok(sqlx::query_scalar("select passed from certificates where trial_id = ? and format_version = ?")
         .bind(trial)
@@ -32,10 +32,11 @@ pub async fn passed(db: &mut Connection, trial: TrialId) -> StoreResult<Option<b
         .await?)
 }
 
-/// Keeps a certificate. `false` when there was one: it is deterministic, so both are the same.
+/// Stores a certificate. Returns `false` if there was one already, which is identical because certification is
+/// deterministic.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn keep(db: &mut Connection, trial: TrialId, certificate: &Certificate) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into certificates (trial_id, format_version, passed, document, created_at) values (?, ?, ?, ?, ?) \
@@ -51,40 +52,40 @@ pub async fn keep(db: &mut Connection, trial: TrialId, certificate: &Certificate
     Ok(done.rows_affected() > 0)
 }
 
-/// What the record has of the certificate of a converged gait.
+/// State of the certificate of a converged gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CertificateOnRecord {
     /// The gait passed.
     Passed,
     /// The gait failed.
     Failed,
-    /// The gait is there and was not certified yet.
+    /// The gait has no certificate yet.
     NotCertified,
-    /// There is no gait to certify.
+    /// The gait was pruned before it was certified.
     Pruned,
 }
 
-/// The certificates of the converged trials of a study, by the present certification.
+/// The states of the certificates of all converged trials of a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<HashMap<TrialId, CertificateOnRecord>> {
     let sql = AssertSqlSafe(format!("{SELECT} where t.study_id = ?2 and t.state = 'converged'"));
     let rows = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
-/// The same of one trial; none: it has not converged.
+/// The same for one trial; `None` if it has not converged.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Option<CertificateOnRecord>> {
     let sql = AssertSqlSafe(format!("{SELECT} where t.id = ?2 and t.state = 'converged'"));
     let row = sqlx::query(sql).bind(certificate::FORMAT_VERSION).bind(trial).fetch_optional(db).await?;
     Ok(row.as_ref().map(from_row).transpose()?.map(|(_, found)| found))
 }
 
-/// What is known of the certificates of trials.
+/// Selects trials with the results of their certificates.
 const SELECT: &str = "select t.id, c.passed, exists (select 1 from gaits g where g.trial_id = t.id) as here \
                       from trials t left join certificates c on c.trial_id = t.id and c.format_version = ?1 ";
 

@@ -1,6 +1,6 @@
-//! Consent of subjects, as it was given and withdrawn.
+//! Consents and withdrawals of subjects.
 //!
-//! That nothing new is written of a subject who withdrew is the business of triggers: there is no way round them.
+//! Triggers refuse all new data of a subject who withdrew consent.
 
 use super::audit::Actor;
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, SubjectId, now};
@@ -8,18 +8,18 @@ use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use utoipa::ToSchema;
 
-/// What a subject said.
+/// Kind of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConsentKind {
-    /// The subject takes part.
+    /// The subject gave consent.
     Given,
-    /// The subject does not take part any more.
+    /// The subject withdrew consent.
     Withdrawn,
 }
 
 impl ConsentKind {
-    /// The word in the record.
+    /// The name in the record.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Given => "given",
@@ -28,25 +28,25 @@ impl ConsentKind {
     }
 }
 
-/// A row of the record of consent; the newest counts.
+/// Consent or withdrawal of a subject. The newest entry applies.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Consent {
-    /// Order.
+    /// Sequence number.
     pub seq: i64,
-    /// What was said.
+    /// Consent or withdrawal.
     pub kind: ConsentKind,
-    /// Given: which version of which form was signed. Withdrawn: why, as far as the subject says.
+    /// For a consent, name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
     pub note: String,
-    /// Who wrote it down.
+    /// Who recorded it.
     pub actor: String,
-    /// When.
+    /// Time of recording.
     pub created_at: Instant,
 }
 
-/// Appends what a subject said.
+/// Appends an entry.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn append(
     db: &mut Connection,
     subject: SubjectId,
@@ -66,10 +66,10 @@ pub async fn append(
     Ok(Consent { seq: done.last_insert_rowid(), ..row })
 }
 
-/// Everything that a subject said, oldest first.
+/// All entries of a subject, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_subject(db: &mut Connection, subject: SubjectId) -> StoreResult<Vec<Consent>> {
     let rows =
         sqlx::query("select * from consents where subject_id = ? order by seq").bind(subject).fetch_all(db).await?;
@@ -91,10 +91,10 @@ pub async fn of_subject(db: &mut Connection, subject: SubjectId) -> StoreResult<
         .collect()
 }
 
-/// Whether the subject of a study withdrew.
+/// Whether the subject of a study withdrew consent.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_withdrawn(db: &mut Connection, study: StudyId) -> StoreResult<bool> {
     let withdrawn =
         sqlx::query("select 1 from studies where id = ? and subject_id in (select subject_id from withdrawn_subjects)")
@@ -104,10 +104,10 @@ pub async fn is_withdrawn(db: &mut Connection, study: StudyId) -> StoreResult<bo
     Ok(withdrawn.is_some())
 }
 
-/// Refuses to show or give out what there is of a study whose subject withdrew.
+/// Refuses to show or export data of a study whose subject withdrew consent.
 ///
 /// # Errors
-/// [`StoreError::Withdrawn`], or what the database reports.
+/// [`StoreError::Withdrawn`]; errors of the database.
 pub async fn may_be_shown(db: &mut Connection, study: StudyId) -> StoreResult<()> {
     if is_withdrawn(db, study).await? { Err(StoreError::Withdrawn) } else { Ok(()) }
 }

@@ -1,4 +1,4 @@
-//! Devices: prosthesis models.
+//! Stored devices: models of powered prostheses.
 
 use super::{Connection, DeviceId, Instant, StoreError, StoreResult, json, now};
 use gait_optimizer::Device as Definition;
@@ -7,7 +7,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A device of the record. A changed definition is a new row: studies keep what they used.
+/// Device. A changed definition is a new device, so that studies keep theirs.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Device {
     /// Identifier.
@@ -17,14 +17,14 @@ pub struct Device {
     /// The device itself.
     #[schema(value_type = Object)]
     pub definition: Definition,
-    /// When the row was written.
+    /// Time of creation.
     pub created_at: Instant,
 }
 
-/// The row with this very definition, and whether it was added now.
+/// Finds the row with this definition, or adds it. Returns whether it was added.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(Device, bool)> {
     if let Some(found) = find(db, definition).await? {
         return Ok((found, false));
@@ -51,25 +51,25 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
 /// The device with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: DeviceId) -> StoreResult<Device> {
     let row = sqlx::query("select * from devices where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "device", id: id.to_string() })
 }
 
-/// Whether a device has this name, in letters of either case.
+/// Whether a device has this name, ignoring case.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn has_name(db: &mut Connection, name: &str) -> StoreResult<bool> {
     let found = sqlx::query("select 1 from devices where lower(trim(name)) = lower(trim(?)) limit 1").bind(name);
     Ok(found.fetch_optional(db).await?.is_some())
 }
 
-/// The row with this very definition.
+/// The row with exactly this definition.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<Option<Device>> {
     let hash = json::sha256(json::to_text("device", definition)?.as_bytes());
     let row = sqlx::query("select * from devices where sha256 = ?").bind(hash).fetch_optional(db).await?;
@@ -79,7 +79,7 @@ pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<O
 /// Every device, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<Device>> {
     let rows = sqlx::query("select * from devices order by id desc").fetch_all(db).await?;
     rows.iter().map(from_row).collect()

@@ -1,49 +1,54 @@
-//! What can go wrong with the record.
+//! The errors of the record.
 
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Result of a store function.
+/// The result of a store function.
 pub type StoreResult<T> = Result<T, StoreError>;
 
-/// What can go wrong with the record.
+/// An error of the record.
 #[derive(Debug, Error)]
 pub enum StoreError {
     /// The file cannot be opened or created.
     #[error(
-        "cannot open the database {}: {source}; the file must be writable, and its folder too: -wal, -shm and .lock files \
-         are kept beside it",
+        "Cannot open the database {}: {source}. The file and its folder must be writable, because the -wal, -shm and .lock \
+         files are kept there.",
         path.display()
     )]
     Open {
         /// The file.
         path: PathBuf,
-        /// What the system reports.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The file is something else than a database.
-    #[error("{} is not a gaitwright database: {reason}", path.display())]
+    /// The file is not a database of this program.
+    #[error("{} is not a gaitwright database: {reason}.", path.display())]
     NotADatabase {
         /// The file.
         path: PathBuf,
-        /// How that was seen.
+        /// How this was detected.
         reason: String,
     },
     /// Another process owns the file.
-    #[error("the database {} is in use by another gaitwright process; stop it first or choose another place", path.display())]
+    #[error("The database {} is in use by another gaitwright process. Stop that process or choose another file.", path.display())]
     InUse {
         /// The file.
         path: PathBuf,
     },
-    /// The file can be reached by another name, under which another process may own it.
-    #[error("the database {} has several names (hard links), which mixes up its log: leave it one; `gaitwright backup` copies it", path.display())]
+    /// The file has hard links: another process may own it under another name.
+    #[error(
+        "The database {} has hard links, which would mix up its write-ahead log. Remove the other links; to copy the database, \
+         use `gaitwright backup`.",
+        path.display()
+    )]
     SeveralNames {
         /// The file.
         path: PathBuf,
     },
     /// A newer version of the program wrote the file.
     #[error(
-        "the database {} has schema version {found}, this program knows up to {known}: use a newer gaitwright; nothing was changed",
+        "The database {} has schema version {found}, but this program supports versions up to {known}. Nothing was changed. Use \
+         a newer gaitwright.",
         path.display()
     )]
     NewerSchema {
@@ -51,38 +56,37 @@ pub enum StoreError {
         path: PathBuf,
         /// Its schema version.
         found: i64,
-        /// The newest version this program knows.
+        /// The newest version that this program supports.
         known: i64,
     },
-    /// There is nothing where a record was.
+    /// The database file is missing, but its anchor or log is there.
     #[error(
-        "there is no record at {}, but {} says that there was one: put a copy in place with `gaitwright restore`; to begin \
-         an empty record, remove that file",
+        "There is no record at {}, but {} shows that there was one. Restore a backup with `gaitwright restore`. To start an empty \
+         record, remove that file.",
         path.display(), evidence.display()
     )]
     RecordMissing {
-        /// Where the record should be.
+        /// The expected path of the database.
         path: PathBuf,
-        /// Its anchor or its log.
+        /// The anchor or the log.
         evidence: PathBuf,
     },
-    /// The file of the open record, or its log, was deleted, replaced or cut.
+    /// The database file or its log was deleted, replaced or truncated while the record was open.
     #[error(
-        "the record {} takes no changes: {what} while it was open; what was acknowledged before may be lost with the \
-         process. Stop the service, then run `gaitwright audit verify`",
+        "The record {} accepts no changes, because {what} while it was open. Changes that were already acknowledged may be lost \
+         when the process ends. Stop the service, then run `gaitwright audit verify`.",
         path.display()
     )]
     RecordVanished {
         /// The database file.
         path: PathBuf,
-        /// What happened to which file.
+        /// Which file was changed, and how.
         what: String,
     },
-    /// The record has lost its end, or is an earlier state of itself.
+    /// The newest rows are missing: the record was truncated, or is an older copy.
     #[error(
-        "the record {} ends with row {found} of {table}, but its anchor {} has seen row {seen}: acknowledged changes are \
-         missing, nothing was changed. Put the missing log or a newer copy in place; if this state is the right one, remove \
-         the anchor",
+        "The record {} ends with row {found} of {table}, but its anchor {} lists row {seen}, so acknowledged changes are missing. \
+         Nothing was changed. Put the missing log or a newer copy in place. If this copy is the right one, remove the anchor.",
         record.display(), anchor.display()
     )]
     CutOff {
@@ -92,15 +96,15 @@ pub enum StoreError {
         anchor: PathBuf,
         /// `audit` or `seals`.
         table: &'static str,
-        /// The last row there is.
+        /// The last row of the table.
         found: i64,
-        /// The last row that the anchor saw.
+        /// The last row that the anchor lists.
         seen: i64,
     },
-    /// The record has another past than the one its anchor saw.
+    /// A row differs from the one that the anchor lists.
     #[error(
-        "row {seq} of {table} in the record {} is not the one that its anchor {} has seen: the past was rewritten, or this is \
-         another record. Nothing was changed; if this record is the right one, remove the anchor",
+        "Row {seq} of {table} in the record {} differs from the one that its anchor {} lists: its history was rewritten, or this \
+         is another record. Nothing was changed. If this record is the right one, remove the anchor.",
         record.display(), anchor.display()
     )]
     Rewritten {
@@ -115,63 +119,63 @@ pub enum StoreError {
     },
     /// A row was not written by this program.
     #[error(
-        "row {key} of {table} in the record was not written by this program: it has no seal. Nothing was changed; run \
-         `gaitwright audit verify` and put a copy in place with `gaitwright restore`"
+        "Row {key} of {table} has no seal, so this program did not write it. Nothing was changed. Run `gaitwright audit verify`, \
+         then restore a backup with `gaitwright restore`."
     )]
     Unsealed {
-        /// Its table.
+        /// The table.
         table: String,
-        /// Its primary key.
+        /// The primary key of the row.
         key: String,
     },
-    /// The schema could not be brought up to date.
-    #[error("migrating the database: {0}")]
+    /// A migration failed.
+    #[error("Cannot migrate the database: {0}")]
     Migrate(#[from] sqlx::migrate::MigrateError),
     /// A row that must exist does not.
-    #[error("{what} {id} does not exist")]
+    #[error("There is no {what} {id}.")]
     Missing {
-        /// What was looked for.
+        /// The kind of row.
         what: &'static str,
         /// Its identifier.
         id: String,
     },
-    /// A stored value cannot be understood: the file was damaged or edited.
-    #[error("the record is damaged: {what}: {reason}")]
+    /// A stored value cannot be read: the file was damaged or edited.
+    #[error("The record is damaged. {what}: {reason}")]
     Damaged {
-        /// Which value.
+        /// The damaged value.
         what: &'static str,
-        /// Why.
+        /// The kind of damage.
         reason: String,
     },
-    /// The system has no random numbers.
-    #[error("no random numbers: {0}")]
+    /// The operating system gives no random numbers.
+    #[error("The operating system gives no random numbers: {0}")]
     NoRandomNumbers(String),
     /// The subject withdrew consent.
-    #[error("the subject withdrew consent: the record is kept, but nothing is added to it, shown or given out")]
+    #[error("The subject withdrew consent. The data is kept, but nothing can be added, shown or exported.")]
     Withdrawn,
     /// The record was closed.
-    #[error("the database is closed: the service is shutting down")]
+    #[error("The database is closed because the service is shutting down.")]
     Closed,
-    /// A change could not be written to the disk; it did not happen.
-    #[error("database: the change could not be made durable: {0}")]
+    /// A change could not be written to the disk, and was rolled back.
+    #[error("The change could not be written to the disk: {0}")]
     NotDurable(String),
-    /// So little space is left that nothing large is begun.
+    /// The free space has shrunk to the reserve, so nothing large is started.
     #[error(
-        "the disk is nearly full: {free_mb} MB are free, {reserve_mb} MB are kept in reserve; make room and try again"
+        "The disk is nearly full: {free_mb} MB are free, and {reserve_mb} MB are kept in reserve. Free some space and try again."
     )]
     NearlyFull {
-        /// What is free.
+        /// Free space, MB.
         free_mb: u64,
-        /// What is kept.
+        /// Reserve, MB.
         reserve_mb: u64,
     },
-    /// Anything else the database reports.
-    #[error("database: {0}")]
+    /// Any other error of the database.
+    #[error("The database failed: {0}")]
     Database(#[from] sqlx::Error),
 }
 
 impl StoreError {
-    /// Whether the subject withdrew consent: refused here, or by a trigger.
+    /// Whether the change was refused, here or by a trigger, because the subject withdrew consent.
     pub fn is_withdrawal(&self) -> bool {
         match self {
             Self::Withdrawn => true,
@@ -191,7 +195,7 @@ impl StoreError {
         }
     }
 
-    /// Whether the record takes no changes now, for a reason of the machine.
+    /// Whether the machine currently prevents changes of the record.
     pub fn is_unwritable(&self) -> bool {
         let says_so = |text: &str| ["disk I/O error", "readonly database"].iter().any(|words| text.contains(words));
         match self {
@@ -201,7 +205,7 @@ impl StoreError {
         }
     }
 
-    /// The same for everybody whose change was made durable together with another.
+    /// The same error for every change of one group commit.
     pub(super) fn for_all(&self) -> Self {
         match self {
             Self::RecordVanished { path, what } => Self::RecordVanished { path: path.clone(), what: what.clone() },
@@ -210,7 +214,7 @@ impl StoreError {
         }
     }
 
-    /// Whether a file was named that cannot be what was meant, rather than a failure of the record itself.
+    /// Whether the caller named a file that is not a usable record.
     pub fn is_wrong_file(&self) -> bool {
         matches!(self, Self::Open { .. } | Self::NotADatabase { .. } | Self::NewerSchema { .. })
     }
@@ -218,11 +222,11 @@ impl StoreError {
 
 /// Turns the violation of a named constraint into a specific error.
 pub trait OnConstraint<T> {
-    /// Replaces the error when it says that `name` was violated. For a CHECK, `name` is its name; for a
-    /// UNIQUE, SQLite reports the columns (`subjects.pseudonym`).
+    /// Replaces the error if it reports a violation of `name`. A CHECK is reported by its name, a UNIQUE by its columns
+    /// (`subjects.pseudonym`).
     ///
     /// # Errors
-    /// `error()` on that violation, otherwise the error as it was.
+    /// `error()` for that violation, otherwise the original error.
     fn on_constraint<E: From<StoreError>>(self, name: &str, error: impl FnOnce() -> E) -> Result<T, E>;
 }
 

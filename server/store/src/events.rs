@@ -1,31 +1,31 @@
-//! Events: what happened in a study, for people who watch; replayed from any point.
+//! Events of studies, which event streams can replay from any point.
 
 use super::{Connection, Instant, StoreResult, StudyId, json, now};
 use serde::Serialize;
 use sqlx::Row;
 use utoipa::ToSchema;
 
-/// Something that happened.
+/// Event of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Event {
-    /// Order over all studies.
+    /// Sequence number over all studies.
     pub seq: i64,
     /// The study.
     pub study_id: StudyId,
-    /// `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`, `feedback_retracted`,
-    /// `lab_session_answered`, `safety_reviewed`, `gait_certified`, `trial_explained`,
+    /// Kind of the event: `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`,
+    /// `feedback_retracted`, `lab_session_answered`, `safety_reviewed`, `gait_certified`, `trial_explained`,
     /// `trial_not_explained`.
     pub kind: String,
-    /// What exactly, as JSON.
+    /// Details.
     pub payload: serde_json::Value,
-    /// When.
+    /// Time of the event.
     pub created_at: Instant,
 }
 
-/// Appends an event to the transaction that makes it true.
+/// Appends an event within the transaction of the change.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn append<P: Serialize>(
     db: &mut Connection,
     study: StudyId,
@@ -45,7 +45,7 @@ pub async fn append<P: Serialize>(
 /// At most `limit` events of a study after a sequence number, in order.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn after(db: &mut Connection, study: StudyId, seq: i64, limit: u32) -> StoreResult<Vec<Event>> {
     let rows = sqlx::query("select * from events where study_id = ? and seq > ? order by seq limit ?")
         .bind(study)
@@ -66,11 +66,11 @@ pub async fn after(db: &mut Connection, study: StudyId, seq: i64, limit: u32) ->
         .collect()
 }
 
-/// The studies that have ended, of subjects who did not withdraw, in which something happened after a sequence number, and the
+/// The ended studies with events after a sequence number, without those of subjects who withdrew consent; and the
 /// newest sequence number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_ended_studies(db: &mut Connection, after: i64) -> StoreResult<(Vec<StudyId>, i64)> {
     let newest = sqlx::query_scalar("select coalesce(max(seq), 0) from events").fetch_one(&mut *db).await?;
     let ended = sqlx::query_scalar(
@@ -81,10 +81,10 @@ pub async fn of_ended_studies(db: &mut Connection, after: i64) -> StoreResult<(V
     Ok((ended.bind(after).fetch_all(db).await?, newest))
 }
 
-/// The sequence number of the last event of a study; 0 when there is none.
+/// The sequence number of the last event of a study; 0 without events.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn last(db: &mut Connection, study: StudyId) -> StoreResult<i64> {
     let row =
         sqlx::query("select coalesce(max(seq), 0) from events where study_id = ?").bind(study).fetch_one(db).await?;

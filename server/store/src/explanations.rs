@@ -1,4 +1,4 @@
-//! Explanations of trials without a gait, as they were made, and who asked for them.
+//! Stored infeasibility explanations, and requests for them.
 
 use super::audit::Actor;
 use super::{Connection, Instant, StoreResult, StudyId, TrialId, json, now};
@@ -6,23 +6,23 @@ use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
 use std::collections::BTreeSet;
 
-/// An explanation as it was made.
+/// A stored explanation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explained {
-    /// Which version of the program made it.
+    /// Version of the program that made it.
     pub program: String,
-    /// SHA-256 of the problem that it was made from, as the problem's file gives it.
+    /// SHA-256 of the trial's `problem.json`.
     pub problem_sha256: String,
-    /// What was found.
+    /// The explanation.
     pub explanation: Explanation,
-    /// When.
+    /// Time of creation.
     pub created_at: Instant,
 }
 
-/// The explanation of a trial, if it was made.
+/// The explanation of a trial, if there is one.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Explained>> {
     let row = sqlx::query("select * from explanations where trial_id = ?").bind(trial).fetch_optional(db).await?;
     row.map(|row| {
@@ -36,10 +36,10 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Exp
     .transpose()
 }
 
-/// Keeps what this program found out about a problem. `false` when the trial had an explanation: that one stays.
+/// Stores an explanation. Returns `false` if the trial has one already, which is kept.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn keep(db: &mut Connection, trial: TrialId, problem: &str, explanation: &Explanation) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into explanations (trial_id, program, problem_sha256, relieved_by, document, created_at) \
@@ -56,20 +56,20 @@ pub async fn keep(db: &mut Connection, trial: TrialId, problem: &str, explanatio
     Ok(done.rows_affected() > 0)
 }
 
-/// Writes down that somebody asks for the explanation of a trial. `false` when somebody did before.
+/// Records a request for the explanation of a trial. Returns `false` if there was one already.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn request(db: &mut Connection, trial: TrialId, actor: &Actor) -> StoreResult<bool> {
     let sql = "insert into explanation_requests (trial_id, actor, created_at) values (?, ?, ?) on conflict do nothing";
     let done = sqlx::query(sql).bind(trial).bind(actor.as_str()).bind(now()).execute(db).await?;
     Ok(done.rows_affected() > 0)
 }
 
-/// Whether somebody asked for the explanation of a trial.
+/// Whether the explanation of a trial was requested.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
     let found = sqlx::query("select 1 from explanation_requests where trial_id = ?").bind(trial).fetch_optional(db);
     Ok(found.await?.is_some())
@@ -79,7 +79,7 @@ pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bo
 /// `refused`.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn next_requested(db: &mut Connection, refused: &BTreeSet<TrialId>) -> StoreResult<Option<TrialId>> {
     Ok(sqlx::query_scalar(
         "select r.trial_id from explanation_requests r join trials t on t.id = r.trial_id \
@@ -94,11 +94,11 @@ pub async fn next_requested(db: &mut Connection, refused: &BTreeSet<TrialId>) ->
     .await?)
 }
 
-/// The first trial without a gait of a study that has ended and whose subject did not withdraw, of those that the program
-/// solved, whose last iterates are kept and that have no explanation; none of `refused`.
+/// The first trial of an ended study that did not converge, can be explained and has no explanation, except those in
+/// `refused`. `None` if the subject withdrew consent.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn next_of_ended(
     db: &mut Connection,
     study: StudyId,
@@ -119,30 +119,30 @@ pub async fn next_of_ended(
     .await?)
 }
 
-/// What the explanations of a study have in common.
+/// Summary of the explanations of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Common {
-    /// How many trials are explained.
+    /// Number of explained trials.
     pub explained: u32,
     /// The tuned bound that, relaxed alone, gives a gait most often.
     pub relief: Option<Relief>,
 }
 
-/// A bound that gives a gait.
+/// A bound whose relaxation gives a gait.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Relief {
     /// `a1`..`a8`.
     pub bound: String,
-    /// In how many trials its relaxation is the smallest one that does.
+    /// Number of trials in which its relaxation is the smallest one that does.
     pub trials: u32,
-    /// The first of them: identifier and number.
+    /// Identifier and number of the first of these trials.
     pub instance: (TrialId, u32),
 }
 
-/// What the explanations of a study have in common.
+/// Summary of the explanations of a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn in_common(db: &mut Connection, study: StudyId) -> StoreResult<Common> {
     let rows = sqlx::query(
         "select e.relieved_by, count(*) as trials, min(t.number) as number, t.id from explanations e \

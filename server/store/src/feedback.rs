@@ -1,4 +1,4 @@
-//! Feedback: everything the learner ever hears, append-only, in the order it was heard.
+//! The feedback log: labels, preferences and suggestions for the learner, append-only.
 
 use super::many_rows::read_many;
 use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
@@ -9,24 +9,24 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Where an answer comes from.
+/// Source of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// Whether the solver converged.
+    /// The solver.
     Convergence,
-    /// The smaller Gait RMSE wins.
+    /// Gait RMSE; the smaller one wins.
     GaitRmse,
-    /// The subject said so.
+    /// The subject.
     Subject,
-    /// A clinician said so.
+    /// A clinician.
     Clinician,
-    /// A program of the lab said so.
+    /// A script of the lab.
     Script,
 }
 
 impl Source {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Convergence => "convergence",
@@ -48,45 +48,45 @@ impl FromStr for Source {
     }
 }
 
-/// What was said, in terms of trials.
+/// Content of an entry, in terms of trials.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum FeedbackContent {
-    /// The trial falls into this ordinal category (0: not converged, 1: converged).
+    /// Label of a trial.
     Label {
         /// The trial.
         trial: TrialId,
-        /// Its category.
+        /// Category: 0 for not converged, 1 for converged.
         category: u32,
     },
     /// One trial is better than another.
     Preference {
-        /// The better one.
+        /// Better trial.
         winner: TrialId,
-        /// The other.
+        /// Other trial.
         loser: TrialId,
     },
-    /// No difference between two trials.
+    /// Two trials are equally good.
     Tie {
-        /// One.
+        /// One trial.
         a: TrialId,
-        /// The other.
+        /// The other trial.
         b: TrialId,
     },
-    /// This action would have been better than that trial.
+    /// An action would have been better than a trial.
     Suggestion {
-        /// The action, as a grid index.
+        /// Index of the suggested action.
         #[schema(value_type = u64)]
         suggested: ActionIndex,
-        /// The trial.
+        /// Trial.
         over: TrialId,
     },
 }
 
-/// A row of feedback.
+/// Entry of the feedback log.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct FeedbackRow {
-    /// Order in which it was heard.
+    /// Sequence number.
     pub seq: i64,
     /// Identifier.
     pub id: FeedbackId,
@@ -95,35 +95,35 @@ pub struct FeedbackRow {
     /// What was said.
     #[serde(flatten)]
     pub said: FeedbackContent,
-    /// Where it comes from.
+    /// Source.
     pub source: Source,
-    /// Who said it.
+    /// Author.
     pub author: String,
     /// Free text.
     pub note: String,
-    /// Whether a rater said so, in a comparison that shows no labels.
+    /// Whether it comes from a rater's blind comparison.
     pub by_rater: bool,
-    /// Whether that rater could have known which gait is which: then it is no blind answer.
+    /// Whether that rater could have known the allocation, so that it does not count as blind.
     pub unblinded: bool,
-    /// When it was written.
+    /// Time of recording.
     pub created_at: Instant,
-    /// Set when it was taken back.
+    /// Retraction, if it was retracted.
     pub retraction: Option<Retraction>,
 }
 
-/// Who took an answer back, when and why.
+/// Retraction of an answer.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Retraction {
-    /// Who.
+    /// Who retracted it.
     pub author: String,
-    /// Why: never empty.
+    /// Reason, never empty.
     pub reason: String,
-    /// When.
+    /// Time of the retraction.
     pub created_at: Instant,
 }
 
 impl Retraction {
-    /// That of a row with the columns `retracted_by`, `retracted_because`, `retracted_at`.
+    /// Reads the columns `retracted_by`, `retracted_because` and `retracted_at`.
     pub(super) fn from_row(row: &SqliteRow) -> StoreResult<Option<Self>> {
         let at: Option<Instant> = row.try_get("retracted_at")?;
         let retraction = |created_at| -> StoreResult<Self> {
@@ -133,21 +133,21 @@ impl Retraction {
     }
 }
 
-/// Who says something.
+/// Source, author and note of an entry.
 #[derive(Debug, Clone, Copy)]
 pub struct Attribution<'a> {
-    /// Where it comes from.
+    /// Source.
     pub source: Source,
-    /// Who.
+    /// Author.
     pub author: &'a str,
     /// Free text.
     pub note: &'a str,
 }
 
-/// Appends a row.
+/// Appends an entry.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
+/// A violated constraint or trigger; errors of the database.
 pub async fn append(
     db: &mut Connection,
     study: StudyId,
@@ -183,10 +183,10 @@ pub async fn append(
     Ok(id)
 }
 
-/// Takes a row back: it stays, the learner does not hear it any more. `false`: it was taken back already.
+/// Retracts an entry, which stays in the log. Returns `false` if it was already retracted.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reason: &str) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into retractions (feedback_seq, author, reason, created_at) values (?, ?, ?, ?) \
@@ -201,7 +201,7 @@ pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reaso
     Ok(done.rows_affected() == 1)
 }
 
-/// A row with what became of it, and whether a rater said so.
+/// Selects entries with their retraction and the rater's blinding.
 const SELECT: &str = "select f.*, r.author as retracted_by, r.reason as retracted_because, \
                       r.created_at as retracted_at, \
                       p.presentation_id is not null as by_rater, \
@@ -217,7 +217,7 @@ fn select(rest: &str) -> AssertSqlSafe<String> {
 /// The row with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow> {
     let row = sqlx::query(select("where f.id = ?")).bind(id).fetch_optional(db).await?;
     row.as_ref()
@@ -226,27 +226,27 @@ pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow
         .ok_or_else(|| StoreError::Missing { what: "preference", id: id.to_string() })
 }
 
-/// Every row of a study with a sequence number above `after`, retracted ones included, as heard.
+/// The entries of a study after a sequence number, retracted ones included, in order.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreResult<Vec<FeedbackRow>> {
     let query = sqlx::query(select("where f.study_id = ? and f.seq > ? order by f.seq")).bind(study).bind(after);
     read_many(&query.fetch_all(db).await?, from_row).await
 }
 
-/// At most `limit` comparisons of a study with a sequence number above `after`, retracted ones included, as heard.
+/// At most `limit` preferences and ties of a study after a sequence number, retracted ones included, in order.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn comparisons(db: &mut Connection, study: StudyId, after: i64, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
     answers(db, study, false, after, limit).await
 }
 
-/// The same of suggestions.
+/// The same for suggestions.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn suggestions(db: &mut Connection, study: StudyId, after: i64, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
     answers(db, study, true, after, limit).await
 }
@@ -270,10 +270,10 @@ async fn answers(
     rows.iter().map(from_row).collect()
 }
 
-/// At most `limit` comparisons by people about trials of a study, as heard: the newest of them.
+/// The newest answers of people in a study, at most `limit`, in order.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<FeedbackRow>> {
     let rows = sqlx::query(select(
         "where f.study_id = ? and f.source in ('subject', 'clinician', 'script') order by f.seq desc limit ?",
@@ -285,11 +285,11 @@ pub async fn newest_of_people(db: &mut Connection, study: StudyId, limit: u32) -
     rows.iter().rev().map(from_row).collect()
 }
 
-/// At most `limit` comparisons of two trials, whichever was named first, by people and scripts, that were not taken back, but
-/// those of one author: the newest first.
+/// At most `limit` answers of people and scripts about two trials in either order, newest first, without retracted ones
+/// and those of one author.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_pair(
     db: &mut Connection,
     (a, b): (TrialId, TrialId),
@@ -309,11 +309,10 @@ pub async fn of_pair(
     rows.iter().map(from_row).collect()
 }
 
-/// Who answered a comparison of two trials, whichever was named first, but blindly, in answers that were not taken back: the
-/// newest first.
+/// The authors of answers about two trials in either order, newest first, without retracted and blind ones.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn authors_of_pair(
     db: &mut Connection,
     (a, b): (TrialId, TrialId),
@@ -332,17 +331,17 @@ pub async fn authors_of_pair(
     rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get("author")?))).collect()
 }
 
-/// The version of what a study has heard: changes with every row and every retraction.
+/// The version of the feedback log of a study, which changes with every entry and every retraction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct LogVersion {
     last: i64,
     retracted: i64,
 }
 
-/// The present version.
+/// The current version.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<LogVersion> {
     let row = sqlx::query(
         "select coalesce(max(f.seq), 0) as last, count(r.feedback_seq) as retracted \
@@ -354,19 +353,19 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<LogVers
     Ok(LogVersion { last: row.try_get("last")?, retracted: row.try_get("retracted")? })
 }
 
-/// How many rows of feedback a study has.
+/// The number of entries of a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn count(db: &mut Connection, study: StudyId) -> StoreResult<u32> {
     let row = sqlx::query("select count(*) from feedback where study_id = ?").bind(study).fetch_one(db).await?;
     Ok(row.try_get(0)?)
 }
 
-/// The converged trial of a study that was recorded last, before the trial `except`.
+/// The converged trial of a study that was recorded last, other than `except`.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn last_converged(db: &mut Connection, study: StudyId, except: TrialId) -> StoreResult<Option<TrialId>> {
     let row = sqlx::query(
         "select trial_a from feedback where study_id = ? and kind = 'label' and category > 0 and trial_a <> ? \
@@ -392,7 +391,12 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         ("suggestion", None, None, Some(index)) => {
             FeedbackContent::Suggestion { suggested: ActionIndex(u64::try_from(index).unwrap_or(0)), over: a }
         }
-        _ => return Err(StoreError::Damaged { what: "feedback", reason: format!("a {kind} with other columns") }),
+        _ => {
+            return Err(StoreError::Damaged {
+                what: "feedback",
+                reason: format!("an entry of kind {kind} has the wrong columns"),
+            });
+        }
     };
     Ok(FeedbackRow {
         seq: row.try_get("seq")?,

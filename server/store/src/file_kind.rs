@@ -1,4 +1,4 @@
-//! Whether a file can be a database at all, before anything is written beside it.
+//! Checks that a file is an SQLite database, before anything is written next to it.
 
 use super::{StoreError, StoreResult};
 use std::fs::File;
@@ -8,15 +8,15 @@ use std::path::Path;
 /// The first bytes of every SQLite file.
 const HEADER: &[u8; 16] = b"SQLite format 3\0";
 
-/// SQLite's codes for a file that is damaged and for one that is no database.
+/// SQLite's error codes for a damaged file and for a file that is not a database.
 const NO_DATABASE: [u32; 2] = [11, 26];
-/// Its codes for a file that cannot be written and for one that cannot be opened, or whose companions cannot.
+/// SQLite's error codes for a file that cannot be written or opened, or whose companion files cannot.
 const NO_ACCESS: [u32; 2] = [8, 14];
 
-/// Names the file in what SQLite says when it finds out only later.
+/// Adds the path to an error that SQLite reports later.
 pub(super) fn named(path: &Path, error: StoreError) -> StoreError {
     let StoreError::Database(sqlx::Error::Database(found)) = &error else { return error };
-    // The lowest byte is the code, what is above it tells more.
+    // The lowest byte is the primary error code.
     let code = found.code().and_then(|code| code.parse().ok()).map(|code: u32| code & 0xff);
     let path = path.to_owned();
     match code {
@@ -30,7 +30,7 @@ pub(super) fn named(path: &Path, error: StoreError) -> StoreError {
     }
 }
 
-/// Refuses what is certainly no database. A file that is missing or empty is one to be made.
+/// Refuses a file that is not a database. A missing or empty file will become one.
 pub(super) fn check(path: &Path) -> StoreResult<()> {
     let cannot_open = |source| StoreError::Open { path: path.to_owned(), source };
     let no_database = |reason: &str| Err(StoreError::NotADatabase { path: path.to_owned(), reason: reason.to_owned() });
@@ -43,5 +43,9 @@ pub(super) fn check(path: &Path) -> StoreResult<()> {
     };
     let mut start = Vec::with_capacity(HEADER.len());
     file.take(HEADER.len() as u64).read_to_end(&mut start).map_err(cannot_open)?;
-    if start.is_empty() || start == HEADER { Ok(()) } else { no_database("its first bytes are not those of SQLite") }
+    if start.is_empty() || start == HEADER {
+        Ok(())
+    } else {
+        no_database("it does not start with the header of SQLite")
+    }
 }

@@ -1,5 +1,5 @@
-//! Whether the files of the record are still the ones that were opened. SQLite goes on writing into a file that was deleted
-//! or replaced: every change is acknowledged, and all of them are gone with the process.
+//! Detects that files of the open record were deleted, replaced or truncated. SQLite would keep writing to a deleted
+//! file, and all acknowledged changes would be lost with the process.
 
 use super::log::Log;
 use super::{StoreError, StoreResult, beside};
@@ -7,7 +7,7 @@ use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Which file a name stands for.
+/// The identity of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct FileId(u64, u64);
 
@@ -20,18 +20,18 @@ impl FileId {
 
     #[cfg(not(unix))]
     pub(super) fn of(_: &Metadata) -> Self {
-        // An open file cannot be deleted or replaced there.
+        // On these systems an open file cannot be deleted or replaced.
         Self(0, 0)
     }
 }
 
-/// A file and what was seen of it last.
+/// A file and its last known state.
 #[derive(Debug)]
 struct Seen {
     what: &'static str,
     path: PathBuf,
     id: FileId,
-    /// SQLite itself makes neither the file nor its log shorter while the record is open. `None`: it may.
+    /// The known length. SQLite never shortens the file or its log while the record is open. `None` if it may.
     bytes: Option<u64>,
 }
 
@@ -41,14 +41,14 @@ pub(super) struct Files {
     path: PathBuf,
     seen: Mutex<Vec<Seen>>,
     log: Mutex<Log>,
-    /// What was found once stays found: whatever lies there later is not what was written to.
+    /// The first problem found. It is permanent, because a file that appears later is a different one.
     gone: OnceLock<String>,
-    /// Saving what is only in the log was tried.
+    /// Whether saving the content of the log was attempted.
     saved: OnceLock<()>,
 }
 
 impl Files {
-    /// The file of a record that a connection has open, and what SQLite keeps beside it.
+    /// The database file of an open connection, and SQLite's companion files.
     pub(super) fn of(path: &Path) -> StoreResult<Self> {
         let files =
             [("the database file", ""), ("its write-ahead log (-wal)", "-wal"), ("its shared memory (-shm)", "-shm")];
@@ -70,7 +70,7 @@ impl Files {
         })
     }
 
-    /// Refuses when one of them is not the file that was opened, now or at any time before.
+    /// Returns an error if any file was ever found to be deleted, replaced or truncated.
     pub(super) fn check(&self) -> StoreResult<()> {
         if let Some(what) = self.gone.get() {
             return Err(self.vanished(what));
@@ -79,12 +79,12 @@ impl Files {
         found.map_or(Ok(()), |found| Err(self.refuse(found)))
     }
 
-    /// [`Self::check`], and refuses a log of so many frames that is not as it was written.
+    /// [`Self::check`], and verifies the log up to the given number of frames.
     pub(super) fn check_log(&self, frames: u32) -> StoreResult<()> {
         self.check()?;
         match self.log().is_whole(frames) {
             Ok(true) => Ok(()),
-            Ok(false) => Err(self.refuse("its write-ahead log (-wal) was cut during a change".to_owned())),
+            Ok(false) => Err(self.refuse("its write-ahead log (-wal) was truncated during a change".to_owned())),
             Err(error) => Err(self.refuse(format!("its write-ahead log (-wal) cannot be read back ({error})"))),
         }
     }
@@ -99,8 +99,8 @@ impl Files {
         refusal
     }
 
-    /// Whether the database file itself is there, so that what is only in a log without a name can be saved: once. The log
-    /// has so many frames.
+    /// Whether the database file is intact, so that the content of a deleted log can be saved to it. True only once.
+    /// The log has the given number of frames.
     pub(super) fn log_is_to_be_saved(&self, frames: u32) -> bool {
         if self.saved.set(()).is_err() || !self.log().is_whole(frames).is_ok_and(|whole| whole) {
             return false;
@@ -117,14 +117,14 @@ impl Files {
 }
 
 impl Seen {
-    /// What became of the file; `None`: it is as it should be.
+    /// What happened to the file; `None` if it is intact.
     fn look(&mut self) -> Option<String> {
         let what = self.what;
         match std::fs::metadata(&self.path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Some(format!("{what} was deleted")),
             Err(error) => Some(format!("{what} cannot be reached ({error})")),
             Ok(file) if FileId::of(&file) != self.id => Some(format!("{what} was replaced")),
-            Ok(file) if self.is_cut(&file) => Some(format!("{what} was cut to {} bytes", file.len())),
+            Ok(file) if self.is_cut(&file) => Some(format!("{what} was truncated to {} bytes", file.len())),
             Ok(file) => {
                 self.bytes = self.bytes.map(|_| file.len());
                 None

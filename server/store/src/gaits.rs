@@ -1,4 +1,4 @@
-//! Gaits: the trajectory of a finished solve, kept as the optimiser wrote it.
+//! Stored gaits: trajectory, warm start and iterations of completed solves, compressed.
 
 use super::{Connection, Packed, PackedText, StoreError, StoreResult, TrialId, json, now};
 use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
@@ -6,7 +6,7 @@ use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
 use sqlx::Row;
 
-/// A gait made ready to be written.
+/// A compressed gait, ready to be written.
 #[derive(Debug)]
 pub struct PackedGait {
     format_version: u32,
@@ -20,15 +20,14 @@ pub struct PackedGait {
 }
 
 impl PackedGait {
-    /// Serialises and compresses what a solve gave. `None` when it holds numbers that are not finite: the
-    /// last iterate of a diverging solve is nothing to show or to start from.
+    /// Serialises and compresses an outcome. `None` if it has numbers that are not finite, as after a diverging solve.
     ///
     /// # Errors
-    /// When serialising fails.
+    /// If serialisation fails.
     pub fn new(pool: &OnPool, outcome: &SolveOutcome, iterations: &[IterationRecord]) -> StoreResult<Option<Self>> {
         let gait = json::to_text("gait", &outcome.gait)?;
         let warm_start = json::to_text("warm start", &outcome.warm_start)?;
-        // JSON has no word for such numbers: they are written as null and cannot be read back.
+        // JSON writes such numbers as null, which cannot be read back.
         if serde_json::from_str::<Gait>(&gait).is_err() || serde_json::from_str::<WarmStart>(&warm_start).is_err() {
             return Ok(None);
         }
@@ -52,10 +51,10 @@ fn is_finite(record: &IterationRecord) -> bool {
         .all(|x| x.is_finite())
 }
 
-/// Writes the gait of a trial.
+/// Stores the gait of a trial.
 ///
 /// # Errors
-/// A violated constraint when it has one already, or what the database reports.
+/// A violated constraint if the trial has one already; errors of the database.
 pub async fn insert(db: &mut Connection, trial: TrialId, packed: &PackedGait) -> StoreResult<()> {
     sqlx::query(
         "insert into gaits (trial_id, format_version, speed_m_s, stride_length_m, stride_time_s, gait, warm_start, \
@@ -76,10 +75,10 @@ pub async fn insert(db: &mut Connection, trial: TrialId, packed: &PackedGait) ->
     Ok(())
 }
 
-/// Whether the columns beside a gait say what is in it.
+/// Whether the descriptive columns of a gait match it.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_described(db: &mut Connection, trial: TrialId, gait: &Gait) -> StoreResult<bool> {
     let row = sqlx::query(
         "select format_version = ? and speed_m_s is ? and stride_length_m is ? and stride_time_s is ? \
@@ -95,10 +94,11 @@ pub async fn is_described(db: &mut Connection, trial: TrialId, gait: &Gait) -> S
     Ok(row.try_get(0)?)
 }
 
-/// Whether the gait of a trial, or the last iterate of a solve without one, is here: a script may have told figures alone, and trajectories are pruned.
+/// Whether the record has the gait of a trial, or its last iterate. Not for trials of scripts and for pruned
+/// trajectories.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
     let row = sqlx::query("select exists(select 1 from gaits where trial_id = ?)").bind(trial).fetch_one(db).await?;
     Ok(row.try_get(0)?)
@@ -107,17 +107,17 @@ pub async fn is_here(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
 /// The gait of a trial.
 ///
 /// # Errors
-/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+/// [`StoreError::Missing`] if the trial has none; errors of the database.
 pub async fn get(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Gait>> {
     let sql = "select gait, gait_sha256 from gaits where trial_id = ?";
     let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?.ok_or_else(|| missing(trial))?;
     Ok(Packed::new(PackedText::new("gait", row.try_get("gait")?, Some(row.try_get("gait_sha256")?))))
 }
 
-/// [`get`]; `None` when the trial has none.
+/// [`get`]; `None` if the trial has none.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Packed<Gait>>> {
     match get(db, trial).await {
         Ok(gait) => Ok(Some(gait)),
@@ -126,10 +126,10 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Pac
     }
 }
 
-/// What another solve can start from.
+/// The warm start of a trial.
 ///
 /// # Errors
-/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+/// [`StoreError::Missing`] if the trial has none; errors of the database.
 pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<WarmStart>> {
     column(db, trial, "warm start", "select warm_start from gaits where trial_id = ?").await
 }
@@ -137,16 +137,16 @@ pub async fn warm_start(db: &mut Connection, trial: TrialId) -> StoreResult<Pack
 /// The iterations of the solve.
 ///
 /// # Errors
-/// [`StoreError::Missing`] when the trial has none, or what the database reports.
+/// [`StoreError::Missing`] if the trial has none; errors of the database.
 pub async fn iterations(db: &mut Connection, trial: TrialId) -> StoreResult<Packed<Vec<IterationRecord>>> {
     column(db, trial, "iterations", "select iterations from gaits where trial_id = ?").await
 }
 
-/// Drops the gaits of a study but those of these trials, those that they started from, and those that people walk with in
-/// lab sessions: how many.
+/// Deletes the gaits of a study, except those of the `kept` trials, their warm starts, and gaits of lab sessions.
+/// Returns their number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn drop_of_study(db: &mut Connection, study: super::StudyId, kept: &[TrialId]) -> StoreResult<u64> {
     let done = sqlx::query(
         "delete from gaits where trial_id in (select id from trials where study_id = ?1) \

@@ -1,4 +1,4 @@
-//! Identifiers: UUIDv7, one type per noun, so that a trial is never taken for a study.
+//! Identifiers: UUIDv7, with one type for each kind of object, so that they cannot be confused.
 
 use serde::{Deserialize, Serialize};
 use sqlx::encode::IsNull;
@@ -18,12 +18,12 @@ macro_rules! identifier {
         pub struct $name(Uuid);
 
         impl $name {
-            /// A fresh identifier, later than every earlier one of this process.
+            /// A new identifier, larger than all earlier ones of this process.
             pub fn fresh() -> Self {
                 Self(Uuid::now_v7())
             }
 
-            /// The last characters: enough for people to tell rows apart.
+            /// The last characters, for display.
             pub fn short(self) -> String {
                 let text = self.0.simple().to_string();
                 text[text.len() - 8..].to_owned()
@@ -76,11 +76,11 @@ identifier!(JobId, "job");
 identifier!(UserId, "user");
 identifier!(TokenId, "token");
 identifier!(MemberId, "membership in a study");
-identifier!(SessionId, "session of a person who signed in");
+identifier!(SessionId, "session of a user");
 identifier!(PresentationId, "presentation");
 identifier!(RemarkId, "remark");
 identifier!(SafetyReviewId, "safety review");
 identifier!(LabSessionId, "lab session");
 identifier!(LabRecordingId, "recording of a lab session");
 identifier!(LabDeviceFileId, "controller file of a lab session");
-identifier!(EmgResultId, "result of electromyograms");
+identifier!(EmgResultId, "result of EMG processing");

@@ -1,10 +1,10 @@
-//! Answers to requests with an Idempotency-Key, kept in the transaction of their effect.
+//! Stored responses to requests with an Idempotency-Key, written in the transaction of their effect.
 
 use super::audit::Actor;
 use super::{Connection, Instant, StoreResult, json, now};
 use sqlx::Row;
 
-/// What was answered.
+/// A stored response.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Kept {
     /// SHA-256 of the request.
@@ -17,17 +17,17 @@ pub struct Kept {
     pub body: String,
 }
 
-/// The fingerprint of a request.
+/// The hash of a request.
 pub fn fingerprint(method: &str, path: &str, body: &[u8]) -> String {
     let mut whole = format!("{method} {path}\n").into_bytes();
     whole.extend_from_slice(body);
     json::sha256(&whole)
 }
 
-/// What was answered to this key before.
+/// The stored response for a key of a caller.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, actor: &Actor, key: &str) -> StoreResult<Option<Kept>> {
     let row = sqlx::query("select * from idempotency_keys where actor = ? and key = ?")
         .bind(actor.as_str())
@@ -43,13 +43,13 @@ pub async fn find(db: &mut Connection, actor: &Actor, key: &str) -> StoreResult<
     }))
 }
 
-/// The key of a caller, as SQLite names it in a violation.
+/// The unique key, as SQLite names it in a violation.
 pub const KEY_UNIQUE: &str = "idempotency_keys.key";
 
-/// Keeps an answer.
+/// Stores a response.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &Kept) -> StoreResult<()> {
     sqlx::query(
         "insert into idempotency_keys (actor, key, request, status, location, body, created_at) \
@@ -67,10 +67,10 @@ pub async fn keep(db: &mut Connection, actor: &Actor, key: &str, kept: &Kept) ->
     Ok(())
 }
 
-/// Drops answers that were kept before an instant: how many.
+/// Deletes responses older than an instant, and returns their number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn drop_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
     let done = sqlx::query("delete from idempotency_keys where created_at < ?").bind(at).execute(db).await?;
     Ok(done.rows_affected())

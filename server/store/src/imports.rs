@@ -1,4 +1,4 @@
-//! Where studies came from that were not made here.
+//! Imports: the origin of studies that were made in another record.
 
 use super::{Connection, Instant, StoreResult, StudyId, now};
 use crate::audit::Actor;
@@ -7,40 +7,40 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// An import of a study.
+/// Import of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Import {
     /// SHA-256 of the archive.
     pub file_sha256: String,
-    /// Public key of whoever signed the archive; `None`: it is not signed.
+    /// Public key of the signer. Absent for an unsigned archive.
     pub signed_by: Option<String>,
-    /// Whether the import named that key as one to trust.
+    /// Whether the import required a signature by that key.
     pub trusted: bool,
-    /// Trials with a Gait RMSE that could not be computed anew, because the archive has no gait of theirs.
+    /// Number of trials whose Gait RMSE could not be checked, because the archive does not have their gaits.
     pub unchecked_rmse: u32,
     /// Who imported it.
     pub actor: String,
-    /// When.
+    /// Time of the import.
     pub imported_at: Instant,
 }
 
-/// What is to be noted of an import.
+/// An import to record.
 #[derive(Debug, Clone)]
 pub struct NewImport {
     /// SHA-256 of the archive.
     pub file_sha256: String,
-    /// Public key of whoever signed it.
+    /// Public key of the signer.
     pub signed_by: Option<String>,
     /// Whether that key is trusted.
     pub trusted: bool,
-    /// Trials whose Gait RMSE could not be computed anew.
+    /// Number of trials whose Gait RMSE could not be checked.
     pub unchecked_rmse: u32,
 }
 
-/// Notes an import.
+/// Records an import.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn insert(db: &mut Connection, study: StudyId, actor: &Actor, new: &NewImport) -> StoreResult<()> {
     sqlx::query(
         "insert into imports (study_id, file_sha256, signed_by, trusted, unchecked_rmse, actor, created_at) \
@@ -58,10 +58,10 @@ pub async fn insert(db: &mut Connection, study: StudyId, actor: &Actor, new: &Ne
     Ok(())
 }
 
-/// The imports of a study, the first one first: one for each record that it came through.
+/// The imports of a study in order, one for each record that it passed through.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Import>> {
     let rows = sqlx::query("select * from imports where study_id = ? order by seq").bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()

@@ -1,7 +1,7 @@
-//! Jobs: the queue of solves, with leases.
+//! The queue of solves, with leases.
 //!
-//! `attempts` is the fence: a result counts only when it carries the number of the current attempt and the
-//! job is still leased, so that whatever arrives late or twice is recorded at most once.
+//! `attempts` is a fencing token: a result counts only if it has the number of the current attempt and the job is still
+//! leased. Late and repeated results are therefore never recorded twice.
 
 use super::members::{binds, reached};
 use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
@@ -11,7 +11,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// The right to run a job, for as long as the lease is kept alive.
+/// The exclusive right to run a job until the lease expires.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lease {
     /// The job.
@@ -24,12 +24,12 @@ pub struct Lease {
     pub attempt: u32,
 }
 
-/// How often a job went wrong so far.
+/// Numbers of failures of a job so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Troubles {
-    /// Panics and errors of the program.
+    /// Number of panics and errors.
     pub failures: u32,
-    /// Workers that were not heard of again.
+    /// Number of workers that stopped responding.
     pub losses: u32,
 }
 
@@ -44,15 +44,15 @@ pub struct Job {
     pub state: String,
     /// How often a worker was to start it.
     pub attempts: u32,
-    /// Of which ended by a panic or an error of the program.
+    /// Attempts that ended with a panic or an error.
     pub failures: u32,
-    /// Of which ended by a worker that was not heard of again.
+    /// Attempts whose worker stopped responding.
     pub losses: u32,
     /// Who has it.
     pub worker: Option<String>,
-    /// Until when, without a sign of life.
+    /// End of the lease, unless it is renewed.
     pub lease_until: Option<Instant>,
-    /// When it was queued.
+    /// Time of queueing.
     pub created_at: Instant,
 }
 
@@ -93,7 +93,7 @@ pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<
 /// Queues the solve of a trial.
 ///
 /// # Errors
-/// A violated constraint (`jobs_trial_unique`), or what the database reports.
+/// A violated constraint (`jobs_trial_unique`); errors of the database.
 pub async fn insert(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
     sqlx::query("insert into jobs (id, trial_id, state, created_at) values (?, ?, 'queued', ?)")
         .bind(JobId::fresh())
@@ -104,11 +104,11 @@ pub async fn insert(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
     Ok(())
 }
 
-/// Leases the next job: highest priority first, then the study with the fewest running jobs, then the
-/// oldest. With `only`, from that study. `None`: there is none, or `most` are leased already.
+/// Leases the next job: the one with the highest priority, then from the study with the fewest running jobs, then the
+/// oldest. With `only`, from that study. `None` if there is none, or if `most` jobs are already leased.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn lease(
     db: &mut Connection,
     worker: &str,
@@ -149,24 +149,24 @@ pub async fn lease(
     Ok(Some(lease))
 }
 
-/// The lease of an attempt at a trial, whether it still holds or not.
+/// The lease of an attempt at a trial, whether it is still valid or not.
 ///
 /// # Errors
-/// [`StoreError::Missing`] when the trial has no job, or what the database reports.
+/// [`StoreError::Missing`] if the trial has no job; errors of the database.
 pub async fn lease_of(db: &mut Connection, trial: TrialId, attempt: u32) -> StoreResult<Lease> {
     let row =
         sqlx::query("select j.id, t.study_id from jobs j join trials t on t.id = j.trial_id where j.trial_id = ?")
             .bind(trial)
             .fetch_optional(db)
             .await?
-            .ok_or_else(|| StoreError::Missing { what: "the job of trial", id: trial.to_string() })?;
+            .ok_or_else(|| StoreError::Missing { what: "job of trial", id: trial.to_string() })?;
     Ok(Lease { job: row.try_get("id")?, trial, study: row.try_get("study_id")?, attempt })
 }
 
-/// Keeps a lease alive. `false`: it is not ours any more.
+/// Renews a lease. Returns `false` if it has passed to another attempt.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn heartbeat(db: &mut Connection, lease: &Lease, until: Instant) -> StoreResult<bool> {
     let done = sqlx::query("update jobs set lease_until = ? where id = ? and attempts = ? and state = 'leased'")
         .bind(until)
@@ -177,10 +177,10 @@ pub async fn heartbeat(db: &mut Connection, lease: &Lease, until: Instant) -> St
     Ok(done.rows_affected() == 1)
 }
 
-/// Ends a job. `false`: the lease is not ours any more, and nothing may be recorded.
+/// Ends a job. Returns `false` if the lease has passed to another attempt; the caller must not record anything then.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn finish(db: &mut Connection, lease: &Lease) -> StoreResult<bool> {
     let done = sqlx::query(
         "update jobs set state = 'done', worker = null, lease_until = null \
@@ -193,10 +193,10 @@ pub async fn finish(db: &mut Connection, lease: &Lease) -> StoreResult<bool> {
     Ok(done.rows_affected() == 1)
 }
 
-/// Ends the job of a trial, whatever its state (a person cancelled the trial).
+/// Ends the job of a cancelled trial, in any state.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn cancel(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
     sqlx::query("update jobs set state = 'done', worker = null, lease_until = null where trial_id = ?")
         .bind(trial)
@@ -205,10 +205,10 @@ pub async fn cancel(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
     Ok(())
 }
 
-/// Gives a job back to the queue and counts what went wrong.
+/// Queues a job again and stores its numbers of failures.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn requeue(db: &mut Connection, job: JobId, troubles: Troubles) -> StoreResult<()> {
     sqlx::query(
         "update jobs set state = 'queued', worker = null, lease_until = null, failures = ?, losses = ? where id = ?",
@@ -221,10 +221,10 @@ pub async fn requeue(db: &mut Connection, job: JobId, troubles: Troubles) -> Sto
     Ok(())
 }
 
-/// Lets an ended trial run once more.
+/// Queues the job of an ended trial again.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn reopen(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
     sqlx::query("update jobs set state = 'queued', failures = 0, losses = 0 where trial_id = ? and state = 'done'")
         .bind(trial)
@@ -233,10 +233,10 @@ pub async fn reopen(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
     Ok(())
 }
 
-/// How often the job of a lease went wrong so far.
+/// The numbers of failures of a job.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn troubles(db: &mut Connection, job: JobId) -> StoreResult<Troubles> {
     let row = sqlx::query("select failures, losses from jobs where id = ?")
         .bind(job)
@@ -246,10 +246,10 @@ pub async fn troubles(db: &mut Connection, job: JobId) -> StoreResult<Troubles> 
     Ok(Troubles { failures: row.try_get("failures")?, losses: row.try_get("losses")? })
 }
 
-/// Leases that ran out before `at`.
+/// Leases that expired before `at`.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
@@ -262,10 +262,10 @@ pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>
     )
 }
 
-/// Leases of studies that do not go on, whose solves no worker began.
+/// Leases of inactive studies whose solves have not started.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn held_up(db: &mut Connection) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
@@ -278,10 +278,10 @@ pub async fn held_up(db: &mut Connection) -> StoreResult<Vec<Lease>> {
     )
 }
 
-/// Every lease that was given to an engine: at start, what an earlier process left behind.
+/// Every lease of an engine. At the start, these are leftovers of an earlier process.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn leased(db: &mut Connection, engine: Option<&str>) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
@@ -295,10 +295,10 @@ pub async fn leased(db: &mut Connection, engine: Option<&str>) -> StoreResult<Ve
     )
 }
 
-/// How many jobs wait and run, over all studies.
+/// The numbers of queued and leased jobs over all studies.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn depth(db: &mut Connection) -> StoreResult<(u32, u32)> {
     let row = sqlx::query(
         "select (select count(*) from jobs where state = 'queued') as queued, \

@@ -1,4 +1,4 @@
-//! JSON and compressed JSON columns.
+//! Reads and writes JSON columns, plain and compressed.
 
 use super::{StoreError, StoreResult};
 use gaitwright_compute::OnPool;
@@ -9,18 +9,18 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use std::io::Read;
 
-/// zstd level: past this, trajectories shrink little and slowly.
+/// zstd level. Higher levels are slow and gain little for trajectories.
 const COMPRESSION: i32 = 9;
-/// Largest value that is compressed, and largest that a compressed value may expand to: twice the largest upload.
+/// Largest uncompressed value, twice the largest upload.
 const LARGEST_BYTES: u64 = 32 << 20;
-/// Largest window of a compressed value, as a power of two: what the level above needs, and room for others.
+/// Largest accepted zstd window, as a power of two.
 const WINDOW_LOG: u32 = 23;
 
 pub(super) fn to_text<T: Serialize>(what: &'static str, value: &T) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }
 
-/// [`to_text`], or `None` where it could not be read back: JSON has no word for numbers that are not finite.
+/// [`to_text`], or `None` if the text cannot be read back because numbers are not finite.
 pub(super) fn readable<T: Serialize + DeserializeOwned>(what: &'static str, value: &T) -> StoreResult<Option<String>> {
     let text = to_text(what, value)?;
     Ok(serde_json::from_str::<T>(&text).is_ok().then_some(text))
@@ -42,13 +42,13 @@ pub(super) fn optional_column<T: DeserializeOwned>(row: &SqliteRow, name: &'stat
 
 pub(super) fn compress(_: &OnPool, what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
     if bytes.len() as u64 > LARGEST_BYTES {
-        let reason = format!("{} bytes; at most {LARGEST_BYTES} are kept", bytes.len());
+        let reason = format!("it has {} bytes, but at most {LARGEST_BYTES} are allowed", bytes.len());
         return Err(StoreError::Damaged { what, reason });
     }
     zstd::encode_all(bytes, COMPRESSION).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }
 
-/// What a compressed value holds, of which there is never more than [`LARGEST_BYTES`], however little it takes compressed.
+/// Decompresses a value, up to [`LARGEST_BYTES`].
 pub(super) fn decompress(_: &OnPool, what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
     let damaged = |reason: String| StoreError::Damaged { what, reason };
     let read = || {

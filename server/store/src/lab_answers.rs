@@ -1,4 +1,4 @@
-//! Which walk of a lab session the person who walked found better, in terms of walks.
+//! Stored answers of subjects in lab sessions, in terms of walks.
 
 use super::audit::Actor;
 use super::presentations::Judgement;
@@ -6,27 +6,27 @@ use super::{Connection, Instant, LabSessionId, StoreResult, now};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// An answer of the record.
+/// An answer of the subject.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabAnswer {
-    /// 1; a further one when the one before was taken back.
+    /// Number of the answer, from 1. It grows with each retraction.
     pub number: u32,
-    /// What was said; first is walk 2.
+    /// The answer. First is walk 2.
     pub said: Judgement,
     /// Free text.
     pub note: String,
-    /// Who wrote it down.
+    /// Who recorded it.
     pub actor: String,
-    /// When.
+    /// Time of recording.
     pub at: Instant,
-    /// Whether it was taken back.
+    /// Whether it was retracted.
     pub taken_back: bool,
 }
 
-/// Adds an answer. `false`: there is one with this number.
+/// Adds an answer. Returns `false` if there is one with this number.
 ///
 /// # Errors
-/// A violated trigger, or what the database reports.
+/// A violated trigger; errors of the database.
 pub async fn insert(
     db: &mut Connection,
     actor: &Actor,
@@ -49,10 +49,10 @@ pub async fn insert(
     Ok(done.rows_affected() == 1)
 }
 
-/// Takes an answer back. `false`: it was taken back before.
+/// Retracts an answer. Returns `false` if it was already retracted.
 ///
 /// # Errors
-/// A violated constraint when there is no such answer, or what the database reports.
+/// A violated constraint if there is no such answer; errors of the database.
 pub async fn take_back(db: &mut Connection, actor: &Actor, id: LabSessionId, number: u32) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into lab_answer_retractions (session_id, number, actor, created_at) values (?, ?, ?, ?) \
@@ -70,7 +70,7 @@ pub async fn take_back(db: &mut Connection, actor: &Actor, id: LabSessionId, num
 /// The answers of a session, in order.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_session(db: &mut Connection, id: LabSessionId) -> StoreResult<Vec<LabAnswer>> {
     let rows = sqlx::query(
         "select a.*, r.number is not null as taken_back from lab_answers a \

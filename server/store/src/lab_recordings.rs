@@ -1,4 +1,4 @@
-//! What was measured in the walks of a lab session, and what was made of it.
+//! Stored measurement files of lab sessions, and results of EMG processing.
 
 use super::audit::Actor;
 use super::{
@@ -12,7 +12,7 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// What a recording is of.
+/// Kind of a measurement file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordingKind {
@@ -42,26 +42,26 @@ impl FromStr for RecordingKind {
     }
 }
 
-/// A recording, without the file itself.
+/// Measurement file, without its content.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LabRecording {
     /// Identifier.
     pub id: LabRecordingId,
     /// The session.
     pub session_id: LabSessionId,
-    /// Of which walk: 1, 2, 3.
+    /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// What it is of.
     pub kind: RecordingKind,
     /// SHA-256 of the file.
     pub raw_sha256: String,
-    /// Who brought it.
+    /// Who uploaded it.
     pub actor: String,
-    /// When.
+    /// Time of the upload.
     pub created_at: Instant,
 }
 
-/// A file made ready to be written.
+/// A compressed file, ready to be written.
 #[derive(Debug)]
 pub struct PackedRecording {
     kind: RecordingKind,
@@ -90,10 +90,10 @@ impl PackedRecording {
     }
 }
 
-/// Adds a recording.
+/// Adds a file.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn insert(
     db: &mut Connection,
     actor: &Actor,
@@ -128,10 +128,10 @@ pub async fn insert(
     Ok(added)
 }
 
-/// All but the file itself.
+/// Selects files without their content.
 const SELECT: &str = "select id, session_id, walk, kind, raw_sha256, actor, created_at from lab_recordings";
 
-/// The recording with this identifier.
+/// The file with this identifier, without its content.
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
@@ -141,7 +141,7 @@ pub async fn get(db: &mut Connection, id: LabRecordingId) -> StoreResult<LabReco
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| missing(id))
 }
 
-/// Every recording of a session, oldest first.
+/// Every file of a session, oldest first, without content.
 ///
 /// # Errors
 /// What the database reports.
@@ -154,7 +154,7 @@ fn missing(id: LabRecordingId) -> StoreError {
     StoreError::Missing { what: "recording", id: id.to_string() }
 }
 
-/// The file of a recording, and how it is to be read.
+/// The content of a file, and how to read it.
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
@@ -168,10 +168,10 @@ pub async fn file<T: DeserializeOwned>(db: &mut Connection, id: LabRecordingId) 
     Ok((json::column(&row, "reading")?, file))
 }
 
-/// Adds what was made of a session's electromyograms.
+/// Adds a result of EMG processing.
 ///
 /// # Errors
-/// When serialising fails, or what the database reports.
+/// If serialisation fails; errors of the database.
 pub async fn insert_result<T: Serialize>(
     db: &mut Connection,
     actor: &Actor,
@@ -190,10 +190,10 @@ pub async fn insert_result<T: Serialize>(
     Ok(id)
 }
 
-/// What was made of a session's electromyograms last.
+/// The newest result of EMG processing of a session.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Option<T>> {
     let row = sqlx::query("select document from emg_results where session_id = ? order by id desc limit 1")
         .bind(session)
@@ -202,10 +202,10 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
     row.as_ref().map(|row| json::column(row, "document")).transpose()
 }
 
-/// Everything that was made of a session's electromyograms, oldest first.
+/// Every result of EMG processing of a session, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
     let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
     rows.fetch_all(db).await?.iter().map(|row| json::column(row, "document")).collect()

@@ -1,5 +1,4 @@
-//! Lab sessions: who walks with which two gaits, and what happened to them. The order of the gaits is an allocation
-//! (`super::allocations`).
+//! Stored lab sessions and their progress. The order of the gaits is an allocation (`super::allocations`).
 
 use super::allocations::{self, OfSession};
 use super::audit::Actor;
@@ -13,14 +12,14 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Something that happens to a session, once.
+/// A step of a session, which happens at most once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// A walk was recorded: 1, 2, 3.
+    /// Walk 1, 2 or 3 was recorded.
     Walk(u8),
-    /// Unblinded: somebody knows which walk was with which gait.
+    /// The session was unblinded.
     Unblinded,
-    /// Nothing is recorded any more.
+    /// The session was closed.
     Closed,
 }
 
@@ -48,72 +47,72 @@ impl FromStr for Act {
     }
 }
 
-/// That it happened.
+/// Completed step of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Done {
-    /// Why, or what was noted.
+    /// Reason or note.
     pub note: String,
     /// Who did it.
     pub actor: String,
-    /// When.
+    /// Time.
     pub at: Instant,
 }
 
-/// A session of the record. What of it may be seen is decided in `studies::lab`.
+/// A stored session. `studies::lab` decides what may be shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabSession {
     /// Identifier.
     pub id: LabSessionId,
     /// The study.
     pub study_id: StudyId,
-    /// 1, 2, ... of this study.
+    /// Number in the study, from 1.
     pub number: u32,
-    /// One of the two gaits.
+    /// Trial of one gait.
     pub gait_one: TrialId,
-    /// The other one.
+    /// Trial of the other gait.
     pub gait_two: TrialId,
-    /// What may be known of the order of its gaits.
+    /// What may be known of its allocation.
     pub allocation: OfSession,
     /// Free text.
     pub notes: String,
     /// Who planned it.
     pub actor: String,
-    /// When.
+    /// Time of planning.
     pub created_at: Instant,
-    /// What happened, in order.
+    /// Completed steps, in order.
     pub acts: Vec<(Act, Done)>,
-    /// What the person who walked said of the two gaits, in order.
+    /// Answers of the subject, in order.
     pub answers: Vec<LabAnswer>,
 }
 
 impl LabSession {
-    /// Whether this happened, and how.
+    /// A step, if it is completed.
     pub fn done(&self, act: Act) -> Option<&Done> {
         self.acts.iter().find(|(known, _)| *known == act).map(|(_, done)| done)
     }
 
-    /// The answer that stands.
+    /// The current answer, which was not retracted.
     pub fn answer(&self) -> Option<&LabAnswer> {
         self.answers.last().filter(|answer| !answer.taken_back)
     }
 
-    /// The gaits of walks 2 and 3; none before the session is unblinded.
+    /// The gaits of walks 2 and 3; `None` while the session is blinded.
     pub fn walked(&self) -> Option<(TrialId, TrialId)> {
         let one_first = self.allocation.gait_one_first?;
         Some(if one_first { (self.gait_one, self.gait_two) } else { (self.gait_two, self.gait_one) })
     }
 }
 
-/// A session to write.
+/// A session to add.
 #[derive(Debug, Clone)]
 pub struct NewLabSession<'a> {
     /// The study.
     pub study_id: StudyId,
-    /// 1, 2, ... of this study.
+    /// Number in the study, from 1.
     pub number: u32,
-    /// One of the two gaits.
+    /// Trial of one gait.
     pub gait_one: TrialId,
-    /// The other one.
+    /// Trial of the other gait.
     pub gait_two: TrialId,
     /// Free text.
     pub notes: &'a str,
@@ -122,7 +121,7 @@ pub struct NewLabSession<'a> {
 /// Adds a session.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>) -> StoreResult<LabSessionId> {
     let id = LabSessionId::fresh();
     sqlx::query(
@@ -142,10 +141,10 @@ pub async fn insert(db: &mut Connection, actor: &Actor, new: &NewLabSession<'_>)
     Ok(id)
 }
 
-/// Writes that something happened to a session. `false`: it had happened before.
+/// Records a step of a session. Returns `false` if it was already recorded.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn act(db: &mut Connection, actor: &Actor, id: LabSessionId, act: Act, note: &str) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into lab_acts (session_id, act, note, actor, created_at) values (?, ?, ?, ?, ?) \
@@ -164,7 +163,7 @@ pub async fn act(db: &mut Connection, actor: &Actor, id: LabSessionId, act: Act,
 /// The session with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: LabSessionId) -> StoreResult<LabSession> {
     let row = sqlx::query("select * from lab_sessions where id = ?").bind(id).fetch_optional(&mut *db).await?;
     let row = row.ok_or_else(|| StoreError::Missing { what: "lab session", id: id.to_string() })?;
@@ -174,17 +173,17 @@ pub async fn get(db: &mut Connection, id: LabSessionId) -> StoreResult<LabSessio
 /// The sessions of a study, in order.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<LabSession>> {
     let query = sqlx::query("select * from lab_sessions where study_id = ? order by number").bind(study);
     let rows = query.fetch_all(&mut *db).await?;
     all(db, &rows).await
 }
 
-/// Sessions that a caller reaches and that are not closed, of subjects who did not withdraw, newest first.
+/// Open sessions of accessible studies, newest first, without those of subjects who withdrew consent.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn open(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<LabSession>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(

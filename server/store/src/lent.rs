@@ -1,4 +1,4 @@
-//! Connections as the store lends them: as long as one is held, the store is borrowed.
+//! Borrowed connections: while one is held, the store cannot compute.
 
 use super::{Store, Writer};
 use sqlx::Sqlite;
@@ -6,15 +6,14 @@ use sqlx::pool::PoolConnection;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// Something of the store that is given back when it is dropped. The store is borrowed until then, so nothing is computed
-/// with it: see [`Store::compute`].
+/// A resource that borrows the store until it is dropped, so that [`Store::compute`] cannot be called.
 #[derive(Debug)]
 pub struct Lent<'a, T> {
     inner: T,
     _borrowed: Borrowed<'a>,
 }
 
-/// Has a destructor, so that the borrow lasts until the end of the scope, and not only until the last use.
+/// Has a destructor, so that the borrow lasts until the end of the scope instead of the last use.
 #[derive(Debug)]
 struct Borrowed<'a>(PhantomData<&'a Store>);
 
@@ -22,10 +21,10 @@ impl Drop for Borrowed<'_> {
     fn drop(&mut self) {}
 }
 
-/// A connection to read with. Sees one consistent state per statement.
+/// A read-only connection, with one consistent state per statement.
 pub type Reader<'a> = Lent<'a, PoolConnection<Sqlite>>;
 
-/// The one connection that writes, with a change begun.
+/// The only writing connection, within a change.
 pub type LentWriter<'a> = Lent<'a, Writer>;
 
 impl<T> Lent<'_, T> {

@@ -1,4 +1,4 @@
-//! The record: one SQLite file, owned by one process.
+//! The record: one SQLite database, owned by one process. Only this module contains SQL.
 //!
 //! Only this crate depends on SQLite. Reads go through a small pool of read-only connections that never block;
 //! writes go through one connection, one after the other, so that no writer ever meets `SQLITE_BUSY`.
@@ -92,15 +92,15 @@ use std::time::Duration;
 use tokio::sync::Mutex;
 use writing::{Outside, Writing};
 
-/// Whether the record takes changes is tried at most so often.
+/// Least time between two probes.
 const PROBED_AGAIN: Duration = Duration::from_secs(1);
-/// When it was tried whether the record takes changes, and why not.
+/// Time and result of a probe whether the record can be written.
 type Probe = (std::time::Instant, Result<(), String>);
 
-/// A change that takes longer is as good as none.
+/// Time limit of a probe.
 const SLOWEST_PROBE: Duration = Duration::from_secs(5);
 
-/// The open record. It lends connections and computing, never both at once.
+/// The open record. It lends either connections or the thread pool, never both at once.
 ///
 /// ```compile_fail,E0502
 /// # use gaitwright_store::{Store, StoreResult};
@@ -123,23 +123,23 @@ const SLOWEST_PROBE: Duration = Duration::from_secs(5);
 pub struct Store {
     /// Read-only connections.
     readers: SqlitePool,
-    /// The one connection that writes.
+    /// The only writing connection.
     writing: Arc<Writing>,
-    /// Where the file is, for messages.
+    /// Path of the file.
     path: PathBuf,
-    /// Held while a copy is made beside the record: two that begin together take two names.
+    /// Held during a backup, so that two backups at once get different names.
     copying: Arc<Mutex<()>>,
-    /// What is computed from what was read.
+    /// Threads for computations.
     pool: Pool,
-    /// When it was last tried whether the record takes changes, and what was found.
+    /// The last probe.
     probed: Arc<Mutex<Option<Probe>>>,
-    /// Held until the record is closed or the last clone is dropped: a second process that opens the file for writing is
-    /// refused.
+    /// Held until the record is closed or the last clone is dropped, so that no other process can open the file for
+    /// writing.
     owner: Arc<Mutex<Option<Ownership>>>,
 }
 
 impl Store {
-    /// Opens or creates the file, takes ownership of it and brings its schema up to date.
+    /// Opens or creates the file, takes ownership of it and migrates its schema.
     ///
     /// # Errors
     /// As [`Store::open_anchored`].
@@ -147,13 +147,13 @@ impl Store {
         Self::open_anchored(path, None).await
     }
 
-    /// [`Store::open`] with a second anchor, best on another disk than the record and the anchor beside it.
+    /// [`Store::open`] with a second anchor, best on another disk.
     ///
     /// # Errors
-    /// [`StoreError::NotADatabase`] when the file is something else, [`StoreError::InUse`] when another process owns
-    /// it, [`StoreError::NewerSchema`] when a newer version of the program wrote it, [`StoreError::RecordMissing`],
-    /// [`StoreError::CutOff`] and [`StoreError::Rewritten`] when an anchor has seen more than there is,
-    /// [`StoreError::Unsealed`] when another program wrote a row, otherwise what the database reports.
+    /// [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
+    /// [`StoreError::NewerSchema`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
+    /// if the record contradicts an anchor, [`StoreError::Unsealed`] if another program wrote a row; errors of the
+    /// database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
         file_kind::check(path)?;
         let anchors: Vec<PathBuf> =
@@ -189,7 +189,7 @@ impl Store {
             .synchronous(SqliteSynchronous::Full)
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(10))
-            // Every table has statements of its own for its seals.
+            // Each table has its own statements for seals.
             .statement_cache_capacity(400);
         let only = SqlitePoolOptions::new().max_connections(1).connect_with(options.clone()).await?;
         if migrations::check_version(&only, path).await? == 0 {
@@ -202,7 +202,7 @@ impl Store {
         migrations::apply(&only, path).await?;
         let mut connection = only.acquire().await?.detach();
         seals::watch(&mut connection).await?;
-        // The log goes into the file when it was read back, and not in the middle of a commit.
+        // The log is merged into the file only after it was verified, not in the middle of a commit.
         sqlx::query("pragma wal_autocheckpoint = 0").execute(&mut connection).await?;
         let files = Arc::new(Files::of(path)?);
         let outside = Outside { files: Some(Arc::clone(&files)), anchors: Some(Anchors::at(anchors)) };
@@ -211,7 +211,7 @@ impl Store {
             .max_connections(4)
             .idle_timeout(None)
             .max_lifetime(None)
-            // Never what lies there in place of the record.
+            // Refuse to open a file that has replaced the record.
             .after_connect(move |_, _| {
                 let files = files.check().map_err(|error| sqlx::Error::Configuration(error.into()));
                 Box::pin(async move { files })
@@ -231,19 +231,19 @@ impl Store {
         Ok(store)
     }
 
-    /// A connection to read with.
+    /// A read-only connection.
     ///
     /// # Errors
-    /// When no connection can be had.
+    /// If no connection is available.
     pub async fn read(&self) -> StoreResult<Reader<'_>> {
         Ok(Lent::new(self.readers.acquire().await?))
     }
 
-    /// Computes on a pool: what takes long, off the threads that answer. Whoever calls this holds no connection of this
-    /// handle, and what is computed with is owned.
+    /// Runs a long computation on the thread pool. The exclusive borrow ensures that the caller holds no connection of
+    /// this handle.
     ///
     /// # Errors
-    /// When the work panics.
+    /// If the work panics.
     pub async fn compute<T: Send + 'static>(
         &mut self,
         work: impl FnOnce(&OnPool) -> T + Send + 'static,
@@ -251,26 +251,26 @@ impl Store {
         self.pool.run(work).await
     }
 
-    /// The same record with a pool of its own, so that what others compute does not hold up its computing.
+    /// The same record with its own thread pool, so that computations of others cannot delay its own.
     #[must_use]
     pub fn with_own_pool(&self) -> Self {
         Self { pool: Pool::default(), ..self.clone() }
     }
 
-    /// Begins a write transaction; dropped without [`commit`], it leaves no trace.
+    /// Begins a write transaction. Dropping it without [`commit`] rolls it back.
     ///
     /// # Errors
-    /// When no transaction can be begun.
+    /// If no transaction can be started.
     pub async fn write(&self) -> StoreResult<LentWriter<'_>> {
         Ok(Lent::new(self.writing.begin().await?))
     }
 
-    /// Keeps so many free bytes in reserve: below, nothing large is begun.
+    /// Sets the free space below which nothing large is started.
     pub fn set_reserve(&self, bytes: u64) {
         self.writing.space().set_reserve(bytes);
     }
 
-    /// Refuses where less is free than is kept in reserve.
+    /// Fails if less space is free than the reserve.
     ///
     /// # Errors
     /// [`StoreError::NearlyFull`].
@@ -282,7 +282,7 @@ impl Store {
     /// the last second.
     ///
     /// # Errors
-    /// Why it takes none.
+    /// Why the record cannot be written.
     pub async fn probe(&self) -> Result<(), String> {
         let mut last = self.probed.lock().await;
         if let Some((at, found)) = &*last
@@ -292,13 +292,13 @@ impl Store {
         }
         let found = match tokio::time::timeout(SLOWEST_PROBE, self.write_nothing()).await {
             Ok(written) => written.map_err(|error| error.to_string()),
-            Err(_) => Err(format!("no change was possible within {} s", SLOWEST_PROBE.as_secs())),
+            Err(_) => Err(format!("a test write took longer than {} s", SLOWEST_PROBE.as_secs())),
         };
         *last = Some((std::time::Instant::now(), found.clone()));
         found
     }
 
-    /// Writes a header field of the file as it is.
+    /// Rewrites a header field of the file with its current value.
     async fn write_nothing(&self) -> StoreResult<()> {
         let mut writer = self.write().await?;
         let row = sqlx::query("pragma user_version").fetch_one(&mut **writer).await?;
@@ -307,12 +307,12 @@ impl Store {
         commit(writer).await
     }
 
-    /// The file.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Closes every connection, folding the write-ahead log into the file, and gives up the ownership of it.
+    /// Closes every connection, merges the write-ahead log into the file, and releases the ownership.
     pub async fn close(&self) {
         self.readers.close().await;
         self.writing.close().await;
@@ -320,10 +320,10 @@ impl Store {
     }
 }
 
-/// Makes the changes of a transaction durable.
+/// Commits a transaction durably.
 ///
 /// # Errors
-/// When the database cannot; nothing has happened then.
+/// Errors of the database. The transaction is rolled back then.
 pub async fn commit(mut writer: LentWriter<'_>) -> StoreResult<()> {
     seals::seal(&mut writer).await?;
     writer.into_writer().commit().await
@@ -334,10 +334,10 @@ pub fn sha256(bytes: &[u8]) -> String {
     json::sha256(bytes)
 }
 
-/// A plain connection: what the functions of the nouns take, from a [`Reader`] or a [`Writer`].
+/// A plain connection, which a [`Reader`] or a [`Writer`] dereferences to.
 pub type Connection = SqliteConnection;
 
-/// Refuses the file of another program, or of a newer version of this one, before a connection that may write touches it.
+/// Refuses a file of another program or a newer version, before a writing connection opens it.
 async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     if !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
         return Ok(());
@@ -348,12 +348,13 @@ async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
     pool.close().await;
     match checked {
         Err(refusal @ (StoreError::NotADatabase { .. } | StoreError::NewerSchema { .. })) => Err(refusal),
-        // What cannot be read without writing, such as a journal to be rolled back, is seen by the next connection.
+        // A file that cannot be read without writing, such as one with a hot journal, is checked by the next
+        // connection.
         _ => Ok(()),
     }
 }
 
-/// An empty file is a record to be made, unless there was one.
+/// Accepts an empty file as a new record, unless an anchor shows that there was one.
 fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
     let bytes = |file: &Path| std::fs::metadata(file).map_or(0, |file| file.len());
     if bytes(path) > 0 {
@@ -366,7 +367,7 @@ fn refuse_empty_in_place_of_record(path: &Path, anchors: &[PathBuf]) -> StoreRes
     refuse_to_begin_anew(path, anchors)
 }
 
-/// A file without a schema is all that is left of a record whose log was lost.
+/// Refuses a file without a schema if an anchor shows that its log was lost.
 fn refuse_to_begin_anew(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
     for anchor in anchors {
         if anchor::has_seen_rows(anchor)? {
@@ -376,14 +377,14 @@ fn refuse_to_begin_anew(path: &Path, anchors: &[PathBuf]) -> StoreResult<()> {
     Ok(())
 }
 
-/// The file next to the record whose name ends so.
+/// The path next to the record with this suffix.
 fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     PathBuf::from(name)
 }
 
-/// `gaitwright.db.WHAT-20260501T101500`, or with a number where there is one of that second.
+/// `gaitwright.db.WHAT-20260501T101500`, with a number if that name is taken.
 fn free_name(of: &Path, what: &str) -> PathBuf {
     let stamp: String = now().to_string().chars().filter(char::is_ascii_alphanumeric).take(15).collect();
     let first = beside(of, &format!(".{what}-{stamp}"));

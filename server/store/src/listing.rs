@@ -1,11 +1,11 @@
-//! The table of a study's trials, sorted and filtered by the database: a page of ten thousand is as quick as one of ten.
+//! The table of a study's trials, sorted and filtered by the database.
 
 use super::trials::{TrialState, of_a_gait};
 use super::{Connection, StoreResult, StudyId, TrialId, json};
 use gait_optimizer::TunedBounds;
 use sqlx::Row;
 
-/// By what trials can be sorted: figures by the names of their columns, bounds by their own.
+/// Columns by which trials can be sorted.
 pub const SORTS: [&str; 14] = [
     "number",
     "state",
@@ -23,56 +23,56 @@ pub const SORTS: [&str; 14] = [
     "a8",
 ];
 
-/// Which trials, and in which order.
+/// Filter, order and page of a listing.
 #[derive(Debug, Clone)]
 pub struct Listing {
     /// One of [`SORTS`].
     pub sort: &'static str,
-    /// The largest first. What has no figure comes last either way.
+    /// Whether to sort in descending order. Trials without a value come last in both orders.
     pub descending: bool,
-    /// Only those in this state.
+    /// Only trials in this state.
     pub state: Option<TrialState>,
-    /// Only those whose reason or message contains this, whatever the case.
+    /// Only trials whose reason or message contains this text, ignoring case.
     pub contains: String,
-    /// At most so many.
+    /// Maximum number of trials.
     pub limit: u32,
-    /// After so many.
+    /// Number of trials to skip.
     pub offset: u32,
 }
 
-/// A trial in the table.
+/// A row of the table.
 #[derive(Debug, Clone)]
 pub struct Listed {
     /// Identifier.
     pub id: TrialId,
-    /// 1, 2, ... within the study.
+    /// Number of the trial, from 1.
     pub number: u32,
     /// The action as bounds.
     pub action: TunedBounds,
-    /// Why the learner chose it.
+    /// Reason for the trial.
     pub reason: String,
-    /// The trial whose gait it starts from, and its number.
+    /// Identifier and number of the trial that gave the warm start.
     pub from: Option<(TrialId, u32)>,
-    /// Where it stands.
+    /// State of the trial.
     pub state: TrialState,
-    /// Gait RMSE, rad; of a gait alone.
+    /// Gait RMSE, rad, of a converged gait.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport; of a gait alone.
+    /// Cost of transport of a converged gait.
     pub cost_of_transport: Option<f64>,
     /// Interior-point iterations.
     pub iterations: Option<u32>,
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
-    /// What to tell people about how it ended; may be empty.
+    /// Message for people about the end of the trial; may be empty.
     pub message: String,
-    /// How many trials there are with this filter.
+    /// Number of trials that match the filter.
     pub matching: u32,
 }
 
 /// The trials of a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<Listed>> {
     let rows = sqlx::query(
         "select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \

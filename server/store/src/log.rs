@@ -1,6 +1,7 @@
-//! The write-ahead log, read back after each commit. SQLite writes where its log should end, whatever became of the file
-//! meanwhile: a log that was cut during a commit is as long as before afterwards, with a hole in it. The checksums of the
-//! frames, which SQLite itself compares only when it recovers, tell.
+//! Verifies the write-ahead log after each commit, by the checksums of its frames.
+//!
+//! SQLite writes at the expected end of its log, so a log that was truncated during a commit has the expected length
+//! afterwards, with a hole in it. SQLite itself compares the checksums only during recovery.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -8,31 +9,32 @@ use std::path::Path;
 
 const HEADER_BYTES: usize = 32;
 const FRAME_HEADER_BYTES: usize = 24;
-/// Begins a log whose checksums are of little-endian words; with the lowest bit set, of big-endian ones.
+/// Magic number of a log with little-endian checksums. With the lowest bit set, they are big-endian.
 const MAGIC: u32 = 0x377f_0682;
 
-/// Sums over everything before, in two halves.
+/// A cumulative checksum, in two halves.
 type Sums = (u32, u32);
 
-/// A log and how far it was read.
+/// A log and the position up to which it was verified.
 #[derive(Debug)]
 pub(super) struct Log {
     file: File,
     read: Option<Place>,
 }
 
-/// A place in a log.
+/// A position in a log.
 #[derive(Debug, Clone, Copy)]
 struct Place {
-    /// Of the header: another one when SQLite writes from the beginning again.
+    /// Salt of the header, which changes when SQLite restarts the log.
     salt: [u8; 8],
-    /// Frames before it.
+    /// Number of frames before the position.
     frames: u32,
-    /// Before the last of these frames. It is read again each time: a hole ends where the next frames begin.
+    /// Checksum before the last of these frames, which is read again each time, because a hole ends where the next
+    /// frames begin.
     before_last: Sums,
 }
 
-/// Header of a log.
+/// The header of a log.
 #[derive(Debug)]
 struct Header {
     salt: [u8; 8],
@@ -42,13 +44,13 @@ struct Header {
 }
 
 impl Log {
-    /// The log with this name.
+    /// Opens a log.
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         Ok(Self { file: File::open(path)?, read: None })
     }
 
-    /// Reads what was written since the last time, up to the end of a log of so many frames. `false`: it is not as SQLite
-    /// wrote it.
+    /// Verifies new frames, up to the given number of frames. Returns `false` if the log differs from what SQLite
+    /// wrote.
     pub(super) fn is_whole(&mut self, frames: u32) -> io::Result<bool> {
         if frames == 0 {
             return Ok(true);
@@ -95,7 +97,7 @@ impl Log {
 }
 
 impl Header {
-    /// The sums with this frame; `None`: it is not of this log, or not whole.
+    /// The checksum including this frame; `None` if the frame does not belong to the log or is damaged.
     fn sums_after(&self, before: Sums, frame: &[u8]) -> Option<Sums> {
         let (head, page) = frame.split_at_checked(FRAME_HEADER_BYTES)?;
         let sums = summed(summed(before, head.get(..8)?, self.big_endian), page, self.big_endian);
@@ -109,7 +111,7 @@ fn words(bytes: &[u8], big_endian: bool) -> Vec<u32> {
     bytes.as_chunks().0.iter().map(word).collect()
 }
 
-/// As the file format of SQLite has it.
+/// The checksum of SQLite's file format.
 fn summed((mut first, mut second): Sums, bytes: &[u8], big_endian: bool) -> Sums {
     let (pairs, _) = bytes.as_chunks::<8>();
     for &[a, b, c, d, e, f, g, h] in pairs {
@@ -120,7 +122,7 @@ fn summed((mut first, mut second): Sums, bytes: &[u8], big_endian: bool) -> Sums
     (first, second)
 }
 
-/// `false`: the file ends before.
+/// Fills the buffer. Returns `false` if the file ends earlier.
 fn read_whole(file: &mut File, buffer: &mut [u8]) -> io::Result<bool> {
     match file.read_exact(buffer) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
@@ -143,7 +145,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_log_is_whole_until_any_byte_of_its_last_change_is_lost() {
+    async fn loss_of_any_byte_of_the_last_change_is_detected() {
         let folder = tempfile::tempdir().unwrap();
         let options = SqliteConnectOptions::new().filename(folder.path().join("a.db")).create_if_missing(true);
         let mut db = options.journal_mode(SqliteJournalMode::Wal).connect().await.unwrap();
@@ -156,7 +158,7 @@ mod tests {
             run(&mut db, insert).await;
             assert!(log.is_whole(frames(&mut db).await).unwrap());
         }
-        // From the beginning again, shorter than before.
+        // The log restarts and is shorter than before.
         run(&mut db, "pragma wal_checkpoint(passive)").await;
         run(&mut db, insert).await;
         let count = frames(&mut db).await;

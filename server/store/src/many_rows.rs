@@ -1,11 +1,11 @@
-//! Reading many rows at a time.
+//! Reads many rows without blocking other tasks of the thread.
 
 use super::StoreResult;
 use sqlx::sqlite::SqliteRow;
 use tokio::task::coop::consume_budget;
 
-/// What rows say, in their order. Reading thousands of rows with JSON in them takes as long as hundreds of requests: the
-/// other tasks of the thread have their turn in between.
+/// Converts rows in order, and yields to other tasks in between, because parsing thousands of rows with JSON takes
+/// long.
 pub(super) async fn read_many<T>(
     rows: &[SqliteRow],
     read: impl Fn(&SqliteRow) -> StoreResult<T>,

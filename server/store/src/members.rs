@@ -1,4 +1,4 @@
-//! Members of studies, and which studies are restricted to them.
+//! Stored members of studies, and restrictions of studies to them.
 
 use super::{Connection, Instant, MemberId, StoreError, StoreResult, StudyId, now};
 use crate::reach::{Principal, Reach};
@@ -8,7 +8,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use utoipa::ToSchema;
 
-/// SQL that holds where a caller reaches the study of a column. `?1`, `?2` and `?3` are what [`binds`] gives.
+/// SQL condition that a caller can access the study of a column. `?1`, `?2` and `?3` are the values of [`binds`].
 macro_rules! reached {
     ($study:literal) => {
         concat!(
@@ -22,8 +22,8 @@ macro_rules! reached {
 }
 pub(super) use reached;
 
-/// The first three values of a query with [`reached`]: whether every study is reached, whether open ones are, and whose
-/// memberships count.
+/// The first three values of a query with [`reached`]: whether every study is accessible, whether open ones are, and
+/// whose memberships count.
 pub(super) fn binds(reach: Reach) -> (bool, bool, Option<String>) {
     let principal = reach.principal().map(|principal| match principal {
         Principal::User(id) => id.to_string(),
@@ -32,42 +32,42 @@ pub(super) fn binds(reach: Reach) -> (bool, bool, Option<String>) {
     (reach.is_every(), reach.is_open(), principal)
 }
 
-/// People or programs.
+/// Kind of a member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MemberKind {
-    /// A person.
+    /// A user.
     User,
-    /// A program.
+    /// A token.
     Token,
 }
 
-/// A member of a study.
+/// Member of a study.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Member {
     /// Identifier of the membership.
     pub id: MemberId,
     /// The study.
     pub study_id: StudyId,
-    /// Person or program.
+    /// Whether it is a user or a token.
     pub kind: MemberKind,
     /// Name of the user or the token.
     pub name: String,
-    /// Role of a user.
+    /// Role of a user. Absent for a token.
     pub role: Option<Role>,
-    /// Who made it a member.
+    /// Who added the member.
     pub added_by: String,
-    /// Since when.
+    /// Time of addition.
     pub created_at: Instant,
 }
 
-/// What the trigger says of somebody who is a member.
+/// The message of the trigger that refuses a second membership.
 pub const MEMBER_ALREADY: &str = "a member of this study already";
 
-/// Whether a caller reaches a study. It does not reach one that does not exist.
+/// Whether a caller can access a study. `false` for a study that does not exist.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn reaches(db: &mut Connection, reach: Reach, study: StudyId) -> StoreResult<bool> {
     let (every, open, principal) = binds(reach);
     let found = sqlx::query(concat!("select 1 from studies s where s.id = ?4 and ", reached!("s.id")))
@@ -80,10 +80,10 @@ pub async fn reaches(db: &mut Connection, reach: Reach, study: StudyId) -> Store
     Ok(found.is_some())
 }
 
-/// Whether a caller reaches any study.
+/// Whether a caller can access any study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn reaches_any(db: &mut Connection, reach: Reach) -> StoreResult<bool> {
     let (every, open, principal) = binds(reach);
     let found = sqlx::query(concat!("select 1 from studies s where ", reached!("s.id"), " limit 1"))
@@ -98,10 +98,10 @@ pub async fn reaches_any(db: &mut Connection, reach: Reach) -> StoreResult<bool>
 const MEMBERS: &str = "select m.*, coalesce(u.name, t.name) as name, u.role as role from study_members m \
                        left join users u on u.id = m.user_id left join tokens t on t.id = m.token_id ";
 
-/// The present members of a study, in the order in which they were added.
+/// The current members of a study, in the order in which they were added.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Member>> {
     let sql =
         format!("{MEMBERS} where m.study_id = ? and m.id in (select id from current_study_members) order by m.id");
@@ -109,10 +109,10 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Me
     rows.iter().map(from_row).collect()
 }
 
-/// A membership, also one that has ended.
+/// A membership, even if it has ended.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: MemberId) -> StoreResult<Member> {
     let row = sqlx::query(AssertSqlSafe(format!("{MEMBERS} where m.id = ?"))).bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "member", id: id.to_string() })
@@ -121,7 +121,7 @@ pub async fn get(db: &mut Connection, id: MemberId) -> StoreResult<Member> {
 /// Adds a member.
 ///
 /// # Errors
-/// [`MEMBER_ALREADY`], or what the database reports.
+/// [`MEMBER_ALREADY`]; errors of the database.
 pub async fn insert(db: &mut Connection, study: StudyId, who: Principal, actor: &str) -> StoreResult<MemberId> {
     let (user, token) = match who {
         Principal::User(id) => (Some(id), None),
@@ -142,10 +142,10 @@ pub async fn insert(db: &mut Connection, study: StudyId, who: Principal, actor: 
     Ok(id)
 }
 
-/// Ends a membership. `false`: it had ended already.
+/// Ends a membership. Returns `false` if it has already ended.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn end(db: &mut Connection, id: MemberId, actor: &str) -> StoreResult<bool> {
     let sql = "insert into study_member_ends (member_id, actor, created_at) values (?, ?, ?) on conflict do nothing";
     Ok(sqlx::query(sql).bind(id).bind(actor).bind(now()).execute(db).await?.rows_affected() == 1)
@@ -154,17 +154,17 @@ pub async fn end(db: &mut Connection, id: MemberId, actor: &str) -> StoreResult<
 /// Whether a study is restricted to its members.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_restricted(db: &mut Connection, study: StudyId) -> StoreResult<bool> {
     let found =
         sqlx::query("select 1 from restricted_studies where study_id = ?").bind(study).fetch_optional(db).await?;
     Ok(found.is_some())
 }
 
-/// Restricts a study to its members, or opens it to staff.
+/// Restricts a study to its members, or opens it to all staff.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set_restricted(db: &mut Connection, study: StudyId, restricted: bool, actor: &str) -> StoreResult<()> {
     sqlx::query("insert into study_restrictions (study_id, restricted, actor, created_at) values (?, ?, ?, ?)")
         .bind(study)
@@ -176,11 +176,11 @@ pub async fn set_restricted(db: &mut Connection, study: StudyId, restricted: boo
     Ok(())
 }
 
-/// Makes the members of a restricted study, other than raters, members of another one, which is restricted, too. Nothing
-/// happens where the study is open.
+/// Copies the restriction and the members, except raters, of a restricted study to another one. Does nothing for an
+/// open study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn inherit(db: &mut Connection, from: StudyId, to: StudyId, actor: &str) -> StoreResult<()> {
     if !is_restricted(db, from).await? {
         return Ok(());

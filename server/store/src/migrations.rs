@@ -1,4 +1,4 @@
-//! The schema: numbered SQL files, embedded, applied at start in one go.
+//! Migrations of the schema: numbered SQL files, embedded and applied at start in one transaction.
 
 use super::{Connection, StoreError, StoreResult, backup, beside, seals};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
@@ -6,7 +6,7 @@ use sqlx::{Row, SqlSafeStr, SqlitePool};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Version, description and text of each migration. An applied file is never edited: add the next one.
+/// Version, description and text of each migration. Never edit a file; add the next one.
 const FILES: &[(i64, &str, &str)] = &[
     (1, "baseline", include_str!("../../../migrations/0001_baseline.sql")),
     (2, "checksums", include_str!("../../../migrations/0002_checksums.sql")),
@@ -17,14 +17,14 @@ const FILES: &[(i64, &str, &str)] = &[
     (7, "study members", include_str!("../../../migrations/0007_study_members.sql")),
 ];
 
-/// Version of the form of a record that this program writes.
+/// Newest schema version.
 pub const FORM: i64 = FILES[FILES.len() - 1].0;
 
 /// Length of the header of an SQLite file.
 const SQLITE_HEADER_BYTES: usize = 100;
 
-/// Brings a record up to date. The schema, and the seals of what the migrations wrote, change together or not at all; a
-/// record with a row that this program did not write is refused and left as it is.
+/// Migrates a record and seals the rows that the migrations wrote, in one transaction. Refuses a record with a row that
+/// this program did not write, and leaves it unchanged.
 pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     let found = check_version(pool, path).await?;
     back_up_before(pool, path, found).await?;
@@ -37,7 +37,7 @@ pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
     Ok(change.commit().await?)
 }
 
-/// Makes the tables of a record in an empty database.
+/// Creates the schema in an empty database.
 pub(super) async fn fresh(db: &mut Connection) -> StoreResult<()> {
     Ok(up_to(FORM).run_direct(None, db, false).await?)
 }
@@ -55,13 +55,13 @@ pub(super) fn up_to(newest: i64) -> Migrator {
     Migrator::with_migrations(migrations)
 }
 
-/// Refuses a file of another program and one that a newer version of this one wrote; otherwise its version.
+/// The schema version of a file. Refuses files of other programs and of newer versions.
 pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult<i64> {
     let known = FILES[FILES.len() - 1].0;
     let found = version(pool).await?;
     let foreign = |reason| Err(StoreError::NotADatabase { path: path.to_owned(), reason });
     if found == 0 {
-        // The list of migrations alone is what a process leaves that was killed while it made the file.
+        // A process that was killed while creating the file may leave only the list of migrations.
         let other = "select name from sqlite_master where type = 'table' and name not glob '_sqlx*' limit 1";
         if let Some(row) = sqlx::query(other).fetch_optional(pool).await? {
             return foreign(format!("it is another program's, with a table {:?}", row.try_get::<String, _>(0)?));
@@ -79,7 +79,7 @@ pub(super) async fn check_version(pool: &SqlitePool, path: &Path) -> StoreResult
     Ok(found)
 }
 
-/// A file that is about to be changed is copied first: `gaitwright.db.v1`.
+/// Backs up a file before a migration, as `gaitwright.db.v1`.
 async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
     if found == 0 || found == FILES[FILES.len() - 1].0 {
         return Ok(());
@@ -93,9 +93,9 @@ async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResu
     }
 }
 
-/// The name itself, or with a number where another record has it; `None`: this very record was copied already.
+/// The name itself, or with a number if another record has it; `None` if this record was already copied.
 fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
-    // The header of an SQLite file counts how often it was written; what it holds comes after.
+    // The header of an SQLite file has a change counter, so compare only what follows it.
     let content =
         |file: &Path| std::fs::read(file).map(|bytes| bytes.into_iter().skip(SQLITE_HEADER_BYTES).collect::<Vec<u8>>());
     let mut candidate = name.to_owned();
@@ -110,7 +110,7 @@ fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
     Ok(Some(candidate))
 }
 
-/// The newest migration that was applied; 0 for a fresh file.
+/// The newest applied migration; 0 for a new file.
 async fn version(pool: &SqlitePool) -> StoreResult<i64> {
     let table = sqlx::query("select 1 from sqlite_master where type = 'table' and name = '_sqlx_migrations'")
         .fetch_optional(pool)

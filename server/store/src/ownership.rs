@@ -1,5 +1,5 @@
-//! One process owns a record. It holds a lock on a file beside it and one on the database file itself: the first lasts
-//! while the database file is put in place or replaced, the second whatever becomes of the first.
+//! Exclusive ownership of the record by one process, through a lock file and a lock on the database file. The lock file
+//! stays while the database file is created or replaced; the second lock holds even if the lock file is deleted.
 
 use super::files::FileId;
 use super::whole_file::private;
@@ -7,22 +7,22 @@ use super::{StoreError, StoreResult, beside};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// Held as long as the record is.
+/// The locks of an open record.
 #[derive(Debug)]
 pub(super) struct Ownership {
     lock: PathBuf,
-    /// The file beside it was made for this.
+    /// Whether the lock file was created by this process.
     made: bool,
     _beside: File,
-    /// Never closed while a connection is open: closing it takes away the locks that SQLite has on the file.
+    /// The locked database file. Closing it while a connection is open would release SQLite's locks.
     database: Option<File>,
 }
 
 impl Ownership {
-    /// Of a record that is there, or of the place for one.
+    /// Takes ownership of an existing or future record.
     pub(super) fn take(path: &Path) -> StoreResult<Self> {
         refuse_second_name(path)?;
-        // One file has one lock, whatever link it is opened through.
+        // Resolve links, so that each file has one lock.
         let lock = beside(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
         let made = !lock.exists();
         let open = private().create(true).truncate(false).write(true).open(&lock);
@@ -32,7 +32,7 @@ impl Ownership {
         Ok(Self { lock, made, _beside: file, database })
     }
 
-    /// Makes the database file where there is none, for its owner alone.
+    /// Creates the database file if it is missing, readable by its owner only.
     pub(super) fn make_database(&mut self, path: &Path) -> StoreResult<()> {
         if self.database.is_none() {
             self.database = Some(lock_database(path, true)?);
@@ -40,7 +40,7 @@ impl Ownership {
         Ok(())
     }
 
-    /// Leaves nothing beside a file that is no record.
+    /// Removes the lock file of a path that is not a record.
     pub(super) fn withdraw(self) {
         if self.made {
             let _ = std::fs::remove_file(&self.lock);
@@ -48,7 +48,7 @@ impl Ownership {
     }
 }
 
-/// SQLite finds its log by the name of the file, and so is our lock found: a file with two names has two of each.
+/// Refuses a file with hard links, because SQLite's log and our lock file would exist once for each name.
 fn refuse_second_name(path: &Path) -> StoreResult<()> {
     #[cfg(unix)]
     if std::fs::metadata(path).is_ok_and(|file| std::os::unix::fs::MetadataExt::nlink(&file) > 1) {
@@ -57,14 +57,14 @@ fn refuse_second_name(path: &Path) -> StoreResult<()> {
     Ok(())
 }
 
-/// The database file, locked where a lock does not keep others from reading it.
+/// Locks the database file, on systems where locks do not prevent reading.
 fn lock_database(path: &Path, create: bool) -> StoreResult<File> {
     let open = private().read(true).write(true).create(create).truncate(false).open(path);
     let file = open.map_err(|source| StoreError::Open { path: path.to_owned(), source })?;
     if cfg!(unix) {
         locked(path, &file)?;
     }
-    // Put in place between the two: whoever did that owns it.
+    // The file was replaced in between, by another owner.
     let (opened, there) = (file.metadata(), std::fs::metadata(path));
     if opened.is_ok_and(|opened| there.is_ok_and(|there| FileId::of(&opened) != FileId::of(&there))) {
         return Err(StoreError::InUse { path: path.to_owned() });

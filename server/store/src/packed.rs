@@ -1,4 +1,4 @@
-//! Compressed columns as they are read: bytes. What they hold is unpacked on a pool, and so never inside a connection.
+//! Compressed columns, which are decompressed on the thread pool and therefore never while a connection is held.
 
 use super::{StoreError, StoreResult, json};
 use gaitwright_compute::OnPool;
@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 pub struct PackedText {
     what: &'static str,
     bytes: Vec<u8>,
-    /// SHA-256 of the text, where the record keeps it.
+    /// SHA-256 of the text, if the record has it.
     sha256: Option<String>,
 }
 
@@ -19,21 +19,21 @@ impl PackedText {
         Self { what, bytes, sha256 }
     }
 
-    /// The text.
+    /// Decompresses the text.
     ///
     /// # Errors
-    /// [`StoreError::Damaged`] when it cannot be unpacked or its hash is wrong.
+    /// [`StoreError::Damaged`] if it cannot be decompressed or does not match its hash.
     pub fn text(&self, pool: &OnPool) -> StoreResult<String> {
         let what = self.what;
         let bytes = json::decompress(pool, what, &self.bytes)?;
         if self.sha256.as_ref().is_some_and(|sha256| json::sha256(&bytes) != *sha256) {
-            return Err(StoreError::Damaged { what, reason: "it has changed".to_owned() });
+            return Err(StoreError::Damaged { what, reason: "it does not match its hash".to_owned() });
         }
         String::from_utf8(bytes).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
     }
 }
 
-/// A value as compressed JSON.
+/// A value in compressed JSON.
 #[derive(Debug, Clone)]
 pub struct Packed<T> {
     json: PackedText,
@@ -45,7 +45,7 @@ impl<T: DeserializeOwned> Packed<T> {
         Self { json, holds: PhantomData }
     }
 
-    /// The JSON text.
+    /// Decompresses the JSON text.
     ///
     /// # Errors
     /// As [`PackedText::text`].
@@ -53,10 +53,10 @@ impl<T: DeserializeOwned> Packed<T> {
         self.json.text(pool)
     }
 
-    /// The value.
+    /// Decompresses and parses the value.
     ///
     /// # Errors
-    /// As [`PackedText::text`], and when the text is not the JSON of such a value.
+    /// As [`PackedText::text`], and if the text is not the JSON of such a value.
     pub fn unpack(&self, pool: &OnPool) -> StoreResult<T> {
         json::from_text(self.json.what, &self.json.text(pool)?)
     }

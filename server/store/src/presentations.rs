@@ -1,7 +1,7 @@
-//! Presentations: which two gaits a rater was shown, and what the rater said of them.
+//! Stored presentations: the pairs shown to raters, and their answers.
 //!
-//! Which of the two was on which side is an allocation (`super::allocations`): rows and answers here are about the pair, the
-//! newer gait first.
+//! The sides are an allocation (`super::allocations`). Rows and answers here refer to the pair, with the newer gait
+//! first.
 
 use super::{
     Connection, FeedbackId, Instant, PresentationId, StoreError, StoreResult, StudyId, TrialId, feedback, now,
@@ -16,16 +16,16 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// The study asks for it.
+    /// The pending comparison of the study.
     New,
-    /// An earlier pair again: does the rater agree with itself?
+    /// Repetition of an earlier pair, to measure the agreement of the rater.
     Repeat,
-    /// The same gait twice. Only earlier versions showed these; the learner heard nothing of them.
+    /// The same gait twice, in older records only. The learner does not use it.
     Null,
 }
 
 impl Kind {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::New => "new",
@@ -45,7 +45,7 @@ impl FromStr for Kind {
     }
 }
 
-/// What a rater says of two gaits.
+/// Judgement of two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
@@ -55,7 +55,7 @@ pub enum Judgement {
     Second,
     /// There is no difference.
     NoDifference,
-    /// The rater cannot say.
+    /// The person cannot tell.
     CannotTell,
     /// The first gait must not be walked.
     UnsafeFirst,
@@ -63,12 +63,12 @@ pub enum Judgement {
     UnsafeSecond,
     /// Neither gait may be walked.
     UnsafeBoth,
-    /// Taken away by the program: one of the gaits was found unsafe meanwhile.
+    /// Withdrawn by the service, because a gait was reported as unsafe in the meantime, or the answer was retracted.
     Withdrawn,
 }
 
 impl Judgement {
-    /// Every answer.
+    /// Every judgement.
     pub const ALL: [Self; 8] = [
         Self::First,
         Self::Second,
@@ -80,7 +80,7 @@ impl Judgement {
         Self::Withdrawn,
     ];
 
-    /// What the learner hears of it. That a gait is unsafe says that the other is better.
+    /// The entry for the learner, if any. An unsafe gait loses against the other one.
     pub fn heard(self, (first, second): (TrialId, TrialId)) -> Option<feedback::FeedbackContent> {
         match self {
             Self::First | Self::UnsafeSecond => {
@@ -94,7 +94,7 @@ impl Judgement {
         }
     }
 
-    /// The same of a pair with its two gaits exchanged.
+    /// The judgement with the two gaits exchanged.
     #[must_use]
     pub fn swapped(self) -> Self {
         match self {
@@ -106,7 +106,7 @@ impl Judgement {
         }
     }
 
-    /// Whether it says that a gait must not be walked.
+    /// Whether it is a safety report.
     pub fn is_about_safety(self) -> bool {
         matches!(self, Self::UnsafeFirst | Self::UnsafeSecond | Self::UnsafeBoth)
     }
@@ -126,7 +126,7 @@ impl Judgement {
         }
     }
 
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::First => "first",
@@ -151,59 +151,59 @@ impl FromStr for Judgement {
     }
 }
 
-/// A presentation of the record, without its sides.
+/// A presentation, without its sides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Presentation {
     /// Identifier.
     pub id: PresentationId,
-    /// What the rater knows it by.
+    /// Token by which the rater knows the pair.
     pub token: String,
     /// The study.
     pub study_id: StudyId,
-    /// Who was shown it.
+    /// Name of the rater.
     pub rater: String,
-    /// 1, 2, ... of this rater in this study.
+    /// Number for this rater in this study, from 1.
     pub number: u32,
     /// Why it was shown.
     pub kind: Kind,
-    /// One of the two gaits: the newer one, whichever side it was on.
+    /// The newer gait, independent of its side.
     pub one: TrialId,
-    /// The other one.
+    /// The other gait.
     pub other: TrialId,
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// Whether the rater could have known which gait is which, when it was drawn or when it was answered.
+    /// Whether the rater could have known the allocation.
     pub unblinded: bool,
-    /// When it was drawn.
+    /// Time of the draw.
     pub created_at: Instant,
-    /// What the rater said of the pair: `First` is `one`. None: nothing yet.
+    /// The answer about the pair, where `First` is `one`; `None` if there is none yet.
     pub answer: Option<Judgement>,
-    /// When.
+    /// Time of the answer.
     pub answered_at: Option<Instant>,
 }
 
 impl Presentation {
-    /// The two gaits; in which order they were shown is not said.
+    /// The two gaits, in an order that does not reveal the sides.
     pub fn pair(&self) -> (TrialId, TrialId) {
         (self.one, self.other)
     }
 
-    /// Whether one of its gaits is among these.
+    /// Whether one of the two gaits is among these trials.
     pub fn has_one_of(&self, trials: &[TrialId]) -> bool {
         trials.contains(&self.one) || trials.contains(&self.other)
     }
 }
 
-/// A presentation to write.
+/// A presentation to add.
 #[derive(Debug, Clone)]
 pub struct NewPresentation {
-    /// What the rater knows it by.
+    /// Token by which the rater knows the pair.
     pub token: String,
     /// The study.
     pub study_id: StudyId,
-    /// Who is shown it.
+    /// Name of the rater.
     pub rater: String,
-    /// 1, 2, ... of this rater in this study.
+    /// Number for this rater in this study, from 1.
     pub number: u32,
     /// Why it is shown.
     pub kind: Kind,
@@ -211,14 +211,14 @@ pub struct NewPresentation {
     pub pair: (TrialId, TrialId),
     /// The presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// Whether the rater could know which is which.
+    /// Whether the rater could know the allocation.
     pub unblinded: bool,
 }
 
 /// Adds a presentation.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<PresentationId> {
     let id = PresentationId::fresh();
     sqlx::query(
@@ -241,25 +241,25 @@ pub async fn insert(db: &mut Connection, new: &NewPresentation) -> StoreResult<P
     Ok(id)
 }
 
-/// An answer to write.
+/// An answer to record.
 #[derive(Debug, Clone, Copy)]
 pub struct NewAnswer<'a> {
-    /// What the rater says of the pair.
+    /// The judgement of the pair.
     pub said: Judgement,
-    /// How long it took by the rater's clock, ms.
+    /// Response time by the rater's clock, ms.
     pub response_ms: Option<i64>,
     /// Free text.
     pub note: &'a str,
-    /// What the learner hears of it.
+    /// The derived entry of the feedback log.
     pub feedback: Option<FeedbackId>,
-    /// Whether the rater could have known which gait is which.
+    /// Whether the rater could have known the allocation.
     pub could_have_known: bool,
 }
 
-/// Writes the answer of a presentation. `false`: it has one already.
+/// Records the answer of a presentation. Returns `false` if it has one already.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into presentation_answers (presentation_id, answer, response_ms, note, feedback_id, could_have_known, \
@@ -277,10 +277,10 @@ pub async fn answer(db: &mut Connection, id: PresentationId, new: NewAnswer<'_>)
     Ok(done.rows_affected() == 1)
 }
 
-/// Takes the answer of a presentation back. `false`: it was taken back before.
+/// Retracts the answer of a presentation. Returns `false` if it was already retracted.
 ///
 /// # Errors
-/// A violated constraint when there is no answer, or what the database reports.
+/// A violated constraint if there is no answer; errors of the database.
 pub async fn take_back(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
     let done = sqlx::query(
         "insert into presentation_retractions (presentation_id, created_at) values (?, ?) \
@@ -293,10 +293,10 @@ pub async fn take_back(db: &mut Connection, id: PresentationId) -> StoreResult<b
     Ok(done.rows_affected() == 1)
 }
 
-/// What the learner heard of a presentation's answer.
+/// The entry of the feedback log derived from a presentation's answer.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Option<FeedbackId>> {
     let row = sqlx::query("select feedback_id from presentation_answers where presentation_id = ?")
         .bind(id)
@@ -305,24 +305,24 @@ pub async fn heard_of(db: &mut Connection, id: PresentationId) -> StoreResult<Op
     Ok(row.map(|row| row.try_get(0)).transpose()?.flatten())
 }
 
-/// An answer that was taken back reads as withdrawn: asked, and not counted.
+/// Selects presentations. A retracted answer reads as withdrawn.
 pub(super) const SELECT: &str = "select p.*, iif(r.presentation_id is null, a.answer, 'withdrawn') as answer, \
                       a.created_at as answered_at, \
                       p.unblinded = 1 or coalesce(a.could_have_known, 0) = 1 as could_have_known from presentations p \
                       left join presentation_answers a on a.presentation_id = p.id \
                       left join presentation_retractions r on r.presentation_id = p.id ";
 
-/// Every presentation of a study, in the order in which they were drawn.
+/// Every presentation of a study, in the order of the draws.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Presentation>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where p.study_id = ? order by p.id"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
     rows.iter().map(Presentation::from_row).collect()
 }
 
-/// Those presentations of a study whose answer stands and is no preference, in the order in which they were drawn.
+/// The presentations of a study whose answer is an assessment and was not retracted, in the order of the draws.
 ///
 /// # Errors
 /// What the database reports.
@@ -336,10 +336,10 @@ pub async fn remarks_of_study(db: &mut Connection, study: StudyId) -> StoreResul
     rows.iter().map(Presentation::from_row).collect()
 }
 
-/// Notes that a rater was unblinded.
+/// Records that a rater was unblinded.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &str, reason: &str) -> StoreResult<()> {
     sqlx::query("insert into unblindings (study_id, rater, actor, reason, created_at) values (?, ?, ?, ?, ?)")
         .bind(study)
@@ -355,7 +355,7 @@ pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &s
 /// Whether a rater was unblinded in a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_unblinded(db: &mut Connection, study: StudyId, rater: &str) -> StoreResult<bool> {
     let row = sqlx::query("select 1 from unblindings where study_id = ? and rater = ? limit 1")
         .bind(study)

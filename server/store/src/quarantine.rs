@@ -1,6 +1,5 @@
-//! Where an archive is unpacked to be looked at: a record of its own, in a temporary file that has no name and is gone
-//! with the connection. Every constraint, trigger and reference of the schema holds there, and no other study is there to
-//! refer to.
+//! The quarantine: a temporary record into which an archive is unpacked and checked. It has the constraints, triggers
+//! and foreign keys of the real schema, and contains no other study.
 
 use super::archive::Unpacking;
 use super::row::{Cell, Row};
@@ -8,26 +7,26 @@ use super::{Connection, StoreResult, migrations};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, SqliteConnection};
 
-/// Rows that a read hands over before they are asked for: few, because a row may be large.
+/// Length of the queue of rows that are read ahead. Short, because rows can be large.
 pub(super) const ROWS_AHEAD: usize = 2;
 
-/// A record with nothing in it but one study.
+/// A temporary record with one study.
 #[derive(Debug)]
 pub struct Quarantine {
     db: SqliteConnection,
     unpacking: Unpacking,
-    /// The study whose set-up it was made from, which an archive does not hold.
+    /// The parent of a fork, which an archive does not contain.
     forked_from: Option<String>,
 }
 
 impl Quarantine {
-    /// An empty one.
+    /// Creates an empty quarantine.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn new() -> StoreResult<Self> {
         let options = SqliteConnectOptions::new()
-            // SQLite's name for a temporary file.
+            // The empty name denotes a temporary file.
             .filename("")
             .foreign_keys(true)
             .synchronous(SqliteSynchronous::Off)
@@ -41,7 +40,7 @@ impl Quarantine {
     /// Adds a row.
     ///
     /// # Errors
-    /// A violated constraint, trigger or reference, or what the database reports.
+    /// A violated constraint, trigger or reference; errors of the database.
     pub async fn add(&mut self, table: &'static str, mut row: Row) -> StoreResult<()> {
         if table == "studies" {
             self.forked_from = row.text("forked_from").map(str::to_owned);
@@ -51,21 +50,21 @@ impl Quarantine {
         Ok(())
     }
 
-    /// Ends writing: what follows reads.
+    /// Ends writing, and checks foreign keys.
     ///
     /// # Errors
-    /// A reference that points at nothing, or what the database reports.
+    /// A reference to a missing row; errors of the database.
     pub async fn settle(&mut self) -> StoreResult<()> {
         sqlx::query("commit").execute(&mut self.db).await?;
         Ok(())
     }
 
-    /// The study whose set-up the one in it was made from.
+    /// The parent of the study, if it is a fork.
     pub fn forked_from(&self) -> Option<&str> {
         self.forked_from.as_deref()
     }
 
-    /// A connection to read what is in it.
+    /// A connection for reading.
     pub fn db(&mut self) -> &mut Connection {
         &mut self.db
     }

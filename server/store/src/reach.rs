@@ -1,26 +1,26 @@
-//! Which studies a caller reaches. What the caller may do there is said by its rights.
+//! Which studies a caller can access. What it may do with them depends on its rights.
 
 use crate::{TokenId, UserId};
 
-/// Whoever can be a member of a study.
+/// A user or token that can be a member of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Principal {
-    /// A person.
+    /// A user.
     User(UserId),
-    /// A program.
+    /// A token.
     Token(TokenId),
 }
 
-/// Which studies a caller reaches.
+/// Which studies a caller can access.
 ///
-/// Every function of the store that lists studies, or finds one for a caller, takes it.
+/// Every function of the store that lists studies, or finds one for a caller, takes this.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// Every study: administrators, and whoever uses a service without sign-in.
+    /// Every study: administrators, and callers of a service without sign-in.
     Every,
-    /// Every study that is not restricted, and those that it is a member of: staff and their programs.
+    /// Every unrestricted study, and restricted ones as a member: staff and their programs.
     Open(Principal),
-    /// The studies that it is a member of: raters.
+    /// Studies with membership only: raters.
     Assigned(Principal),
 }
 
@@ -30,12 +30,12 @@ impl Reach {
         self == Self::Every
     }
 
-    /// Whether studies that are not restricted are reached without membership.
+    /// Whether unrestricted studies are accessible without membership.
     pub fn is_open(self) -> bool {
         matches!(self, Self::Open(_))
     }
 
-    /// Whose memberships count; none: membership does not matter.
+    /// Whose memberships count; `None` if membership does not matter.
     pub fn principal(self) -> Option<Principal> {
         match self {
             Self::Every => None,

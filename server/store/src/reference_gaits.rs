@@ -1,4 +1,4 @@
-//! Reference gaits: what Gait RMSE is measured against.
+//! Stored reference gaits, which Gait RMSE is measured against.
 
 use super::{Connection, Instant, ReferenceGaitId, StoreError, StoreResult, json, now};
 use gait_optimizer::ReferenceGait as Definition;
@@ -7,7 +7,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A reference gait of the record. A changed definition is a new row: studies keep what they used.
+/// Reference gait. A changed definition is a new reference gait, so that studies keep theirs.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ReferenceGait {
     /// Identifier.
@@ -17,14 +17,14 @@ pub struct ReferenceGait {
     /// The reference gait itself.
     #[schema(value_type = Object)]
     pub definition: Definition,
-    /// When the row was written.
+    /// Time of creation.
     pub created_at: Instant,
 }
 
-/// The row with this very definition, and whether it was added now.
+/// Finds the row with this definition, or adds it. Returns whether it was added.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(ReferenceGait, bool)> {
     let text = json::to_text("reference gait", definition)?;
     let hash = json::sha256(text.as_bytes());
@@ -53,7 +53,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
 /// The reference gait with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: ReferenceGaitId) -> StoreResult<ReferenceGait> {
     let row = sqlx::query("select * from reference_gaits where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref()
@@ -65,7 +65,7 @@ pub async fn get(db: &mut Connection, id: ReferenceGaitId) -> StoreResult<Refere
 /// Every reference gait, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<ReferenceGait>> {
     let rows = sqlx::query("select * from reference_gaits order by id desc").fetch_all(db).await?;
     rows.iter().map(from_row).collect()

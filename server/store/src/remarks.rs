@@ -15,23 +15,23 @@ pub struct Remark {
     pub id: RemarkId,
     /// The study.
     pub study_id: StudyId,
-    /// One gait.
+    /// Trial of one gait.
     pub first: TrialId,
-    /// The other one.
+    /// Trial of the other gait.
     pub second: TrialId,
     /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`.
     pub answer: Judgement,
-    /// Where it comes from.
+    /// Source.
     pub source: Source,
-    /// Who said it.
+    /// Author.
     pub author: String,
     /// Free text.
     pub note: String,
-    /// What the learner hears of it; none: nothing.
+    /// Preference that was derived from it, if any.
     pub feedback_id: Option<FeedbackId>,
-    /// When.
+    /// Time of recording.
     pub created_at: Instant,
-    /// Set when it was taken back.
+    /// Retraction, if it was retracted.
     pub retraction: Option<Retraction>,
 }
 
@@ -49,15 +49,15 @@ pub struct NewRemark<'a> {
     pub study: StudyId,
     /// The two gaits.
     pub pair: (TrialId, TrialId),
-    /// What is said of them.
+    /// The judgement.
     pub said: Judgement,
-    /// Who says so.
+    /// Source, author and note.
     pub attribution: Attribution<'a>,
-    /// What the learner hears of it.
+    /// The derived preference, if any.
     pub feedback: Option<FeedbackId>,
 }
 
-/// Adds a remark.
+/// Adds an assessment.
 ///
 /// # Errors
 /// A violated constraint or trigger, or what the database reports.
@@ -104,14 +104,14 @@ const SELECT: &str = "select m.*, r.author as retracted_by, r.reason as retracte
                       r.created_at as retracted_at from remarks m \
                       left join remark_retractions r on r.remark_id = m.id ";
 
-/// The remark with this identifier.
+/// The assessment with this identifier.
 ///
 /// # Errors
 /// [`StoreError::Missing`], or what the database reports.
 pub async fn get(db: &mut Connection, id: RemarkId) -> StoreResult<Remark> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.id = ?"));
     let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
-    let missing = || StoreError::Missing { what: "remark", id: id.to_string() };
+    let missing = || StoreError::Missing { what: "assessment", id: id.to_string() };
     row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
 }
 

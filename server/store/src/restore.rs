@@ -1,5 +1,4 @@
-//! Putting a copy in place of a record. That is done when the record is damaged, or of a newer version: nothing here
-//! opens it.
+//! Replaces a record with a backup. The old record may be damaged or of a newer version, so it is never opened.
 
 use super::ownership::Ownership;
 use super::whole_file::{WholeFile, sync_folder};
@@ -7,20 +6,19 @@ use super::{StoreError, StoreResult, anchor, backup, beside, free_name};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What SQLite keeps beside the file of a record.
+/// SQLite's companion files.
 const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
 
-/// Puts a copy in place of a record and returns where the record that was there is kept. The anchors then hold what the
-/// copy ends with: that an earlier state took the place of a later one was meant.
+/// Replaces a record with a backup, and updates the anchors to it. Returns where the old record is kept.
 ///
 /// # Errors
-/// [`StoreError::InUse`] while a process owns the record, what [`backup::check`] finds in the copy, or that a file cannot
-/// be written; the record is as it was then.
+/// [`StoreError::InUse`] while a process owns the record, errors of [`backup::check`] for the backup, or a file that
+/// cannot be written. The record is unchanged then.
 pub async fn from_file(from: &Path, to: &Path, elsewhere: Option<&Path>) -> StoreResult<Option<PathBuf>> {
     backup::check(from).await?;
     let _owner = Ownership::take(to)?;
     let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
-    // Not a copy of the file: a part of the record may be in the log beside it.
+    // Copy through SQLite, because part of the backup may be in its log.
     let pool = backup::open_read_only(from).await?;
     let copied = async {
         let ends = anchor::ends(&mut *pool.acquire().await?).await?;
@@ -39,7 +37,7 @@ pub async fn from_file(from: &Path, to: &Path, elsewhere: Option<&Path>) -> Stor
 }
 
 fn put(copy: WholeFile, to: &Path, kept: Option<&Path>, anchor: &Path) -> std::io::Result<()> {
-    // Until the last step there is a record in its place, whenever this is killed.
+    // If the process is killed before the last step, the old record is still in place.
     if let Some(kept) = kept {
         let family = to.file_name().unwrap_or_default().to_string_lossy();
         for ending in ["", COMPANIONS[0], ".anchor"] {
@@ -53,7 +51,7 @@ fn put(copy: WholeFile, to: &Path, kept: Option<&Path>, anchor: &Path) -> std::i
         }
         like(to, copy.part());
     }
-    // The log of another record would be taken for one of the copy, and so would its anchor.
+    // The log and the anchor of the old record must not be used with the backup.
     let others = COMPANIONS.map(|ending| beside(to, ending));
     for present in others.iter().map(PathBuf::as_path).chain([anchor]) {
         if present.exists() {
@@ -64,12 +62,12 @@ fn put(copy: WholeFile, to: &Path, kept: Option<&Path>, anchor: &Path) -> std::i
     copy.replace(to)
 }
 
-/// Whoever could use the record that was there can use the one in its place.
+/// Gives the backup the owner and the permissions of the old record.
 fn like(present: &Path, copy: &Path) {
     #[cfg(unix)]
     if let Ok(about) = std::fs::metadata(present) {
         use std::os::unix::fs::MetadataExt;
-        // Refused unless root restores for somebody else; then the copy belongs to who made it, as before.
+        // Only root can change the owner. Otherwise the file keeps its current owner.
         let _ = std::os::unix::fs::chown(copy, Some(about.uid()), Some(about.gid()));
     }
     #[cfg(not(unix))]

@@ -1,4 +1,4 @@
-//! Results as workers brought them: each attempt once, those that came too late included.
+//! Stored results of attempts, including results that arrived too late.
 
 use super::{Connection, Instant, StoreResult, TrialId, json, now};
 use gait_optimizer::{SolveReport, SolveStatus};
@@ -6,14 +6,14 @@ use serde::Serialize;
 use sqlx::Row;
 use utoipa::ToSchema;
 
-/// What a worker brought.
+/// Result of an attempt.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AttemptResult {
     /// Number of the attempt, from 1.
     pub attempt: u32,
-    /// Who ran it.
+    /// Name of the worker.
     pub worker: String,
-    /// Whether it is the result of the trial; else it came too late and is evidence only.
+    /// Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
     pub taken: bool,
     /// How the solve ended.
     #[schema(value_type = String)]
@@ -21,14 +21,14 @@ pub struct AttemptResult {
     /// All figures of the solve, where they are finite.
     #[schema(value_type = Option<Object>)]
     pub report: Option<SolveReport>,
-    /// When it came.
+    /// Time of arrival.
     pub received_at: Instant,
 }
 
-/// Keeps what was brought. `false`: this attempt brought its result already.
+/// Stores a result. Returns `false` if the attempt already has one.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn keep(
     db: &mut Connection,
     (trial, attempt): (TrialId, u32),
@@ -52,10 +52,10 @@ pub async fn keep(
     Ok(done.rows_affected() == 1)
 }
 
-/// What was brought for a trial, by attempt.
+/// The results of a trial, by attempt.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_trial(db: &mut Connection, trial: TrialId) -> StoreResult<Vec<AttemptResult>> {
     let rows =
         sqlx::query("select * from results where trial_id = ? order by attempt").bind(trial).fetch_all(db).await?;

@@ -1,26 +1,26 @@
-//! Rights, and which of them a role or a token has.
+//! Rights, and which of them each role has.
 
 use crate::StoreError;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Something that may be allowed. A token has some of these as its scopes.
+/// A right. The scopes of a token are rights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Right {
-    /// See everything but blind sessions.
+    /// Read everything except blinded data.
     Read,
-    /// Make, start, hold and end studies; ask for trials and tell what they gave.
+    /// Create, start, pause and stop studies; evaluate trials by scripts.
     Run,
-    /// Say which gait is better, knowing which is which; decide about gaits that were called unsafe.
+    /// Give preferences without blinding; review safety reports.
     Answer,
-    /// Compare gaits blindly.
+    /// Compare gaits blind.
     Rate,
-    /// Fetch the controller files of lab walks: for the device in the lab. Somebody who may read and fetches one is
-    /// recorded as knowing which gait the walk is with.
+    /// Fetch controller files of lab walks, for the device in the lab. A user who can read and fetches one no longer
+    /// counts as blind.
     Device,
-    /// Users, tokens, unblinding, the audit trail, backups.
+    /// Manage users and tokens, unblind, read the audit trail, make backups.
     Administer,
 }
 
@@ -28,7 +28,7 @@ impl Right {
     /// Every right.
     pub const ALL: [Self; 6] = [Self::Read, Self::Run, Self::Answer, Self::Rate, Self::Device, Self::Administer];
 
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Read => "read",
@@ -51,31 +51,31 @@ impl Rights {
         Self(Right::ALL.to_vec())
     }
 
-    /// These rights.
+    /// The set of these rights.
     pub fn of(rights: &[Right]) -> Self {
         Self(rights.to_vec())
     }
 
-    /// Whether it is the only one of them.
+    /// Whether it is the only right of the set.
     pub fn is_only(&self, right: Right) -> bool {
         self.0 == [right]
     }
 
-    /// Whether it is one of them.
+    /// Whether the set has it.
     pub fn has(&self, right: Right) -> bool {
         self.0.contains(&right)
     }
 }
 
-/// What a person is here.
+/// Role of a user.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// May do everything.
+    /// Has every right.
     Admin,
-    /// Runs studies and answers.
+    /// Runs studies and gives preferences.
     Clinician,
-    /// Compares gaits blindly, and sees nothing else.
+    /// Compares gaits blind and sees nothing else.
     Rater,
 }
 
@@ -83,7 +83,7 @@ impl Role {
     /// Every role.
     pub const ALL: [Self; 3] = [Self::Admin, Self::Clinician, Self::Rater];
 
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Admin => "admin",
@@ -92,7 +92,7 @@ impl Role {
         }
     }
 
-    /// What it may do.
+    /// The rights of the role.
     pub fn rights(self) -> Rights {
         match self {
             Self::Admin => Rights::all(),

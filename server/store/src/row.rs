@@ -1,4 +1,4 @@
-//! A row of any table, as written: what archives hold.
+//! A row of any table with its columns, as archives contain it.
 
 use super::{Connection, StoreError, StoreResult};
 use serde::de::{Error as _, MapAccess, Visitor};
@@ -10,24 +10,23 @@ use sqlx::{AssertSqlSafe, Column, Row as _, TypeInfo, ValueRef};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Largest text that an archive may hold in one column, bytes. The largest that the program writes are reports and
-/// results of electromyograms, some hundred kilobytes.
+/// Largest text in a column of an archive, bytes. The program writes at most some hundred kilobytes.
 pub const LARGEST_TEXT_BYTES: usize = 4 << 20;
-/// Largest compressed value that an archive may hold in one column, bytes. An uploaded recording has at most 16 MiB.
+/// Largest compressed value in a column of an archive, bytes. An uploaded file has at most 16 MiB.
 pub const LARGEST_BLOB_BYTES: usize = 16 << 20;
-/// More columns than any table has.
+/// Maximum number of columns.
 const MOST_COLUMNS: usize = 64;
-/// Names the bytes of a value that is no text.
+/// JSON key of a binary value.
 const HEXADECIMAL: &str = "hexadecimal";
 
 /// A value of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
-    /// Nothing.
+    /// Null.
     Null,
     /// An integer.
     Integer(i64),
-    /// A number.
+    /// A floating-point number.
     Real(f64),
     /// A text.
     Text(String),
@@ -66,7 +65,7 @@ impl Row {
         self.0.insert(column.to_owned(), cell);
     }
 
-    /// Takes a column out.
+    /// Removes a column.
     pub fn remove(&mut self, column: &str) -> Option<Cell> {
         self.0.remove(column)
     }
@@ -76,8 +75,8 @@ impl Row {
         self.0.iter().map(|(name, cell)| (name.as_str(), cell))
     }
 
-    /// Hash of the row, as its seal has it (`store::seals`): name, kind, length and bytes of each column that is not
-    /// null, by name.
+    /// The hash of the row, as in its seal (`store::seals`): over name, type, length and bytes of each column that is
+    /// not null, sorted by name.
     pub fn sha256(&self) -> String {
         let mut hash = Sha256::new();
         for (name, cell) in &self.0 {
@@ -94,7 +93,7 @@ impl Row {
         hex::encode(hash.finalize())
     }
 
-    /// A row that was selected; `None` in a column that is `skipped`.
+    /// Reads a row of a query, without the column `skipped`.
     pub(super) fn from_sqlite(row: &SqliteRow, skipped: &str) -> StoreResult<Self> {
         let mut cells = BTreeMap::new();
         for (index, column) in row.columns().iter().enumerate().filter(|(_, column)| column.name() != skipped) {
@@ -114,7 +113,8 @@ impl Row {
         Ok(Self(cells))
     }
 
-    /// Writes the row into a table that has these columns: its rowid. Only their names are ever part of a statement.
+    /// Inserts the row into a table with the `known` columns, and returns its rowid. Only known names become part of
+    /// the statement.
     pub(super) async fn insert(self, db: &mut Connection, table: &str, known: &[String]) -> StoreResult<i64> {
         if let Some(unknown) = self.0.keys().find(|name| !known.contains(name)) {
             let reason = format!("a row of {table} has an unknown column {unknown:?}");
@@ -143,7 +143,7 @@ impl Serialize for Cell {
             Self::Null => serializer.serialize_unit(),
             Self::Integer(number) => serializer.serialize_i64(*number),
             Self::Real(number) if number.is_finite() => serializer.serialize_f64(*number),
-            Self::Real(number) => Err(S::Error::custom(format!("{number} is no number of JSON"))),
+            Self::Real(number) => Err(S::Error::custom(format!("{number} is not a JSON number"))),
             Self::Text(text) => serializer.serialize_str(text),
             Self::Blob(bytes) => {
                 let mut map = serializer.serialize_map(Some(1))?;
@@ -187,7 +187,10 @@ impl<'de> Visitor<'de> for CellVisitor {
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Cell, E> {
         if text.len() > LARGEST_TEXT_BYTES {
-            return Err(E::custom(format!("a text of {} bytes; at most {LARGEST_TEXT_BYTES}", text.len())));
+            return Err(E::custom(format!(
+                "a text has {} bytes, but at most {LARGEST_TEXT_BYTES} are allowed",
+                text.len()
+            )));
         }
         Ok(Cell::Text(text.to_owned()))
     }
@@ -195,11 +198,11 @@ impl<'de> Visitor<'de> for CellVisitor {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Cell, A::Error> {
         let bytes = match map.next_entry::<Name, Hexadecimal>()? {
             Some((name, bytes)) if name.0 == HEXADECIMAL => bytes.0,
-            _ => return Err(A::Error::custom("an object that does not hold bytes")),
+            _ => return Err(A::Error::custom("an object is not a binary value")),
         };
         match map.next_key::<Name>()? {
             None => Ok(Cell::Blob(bytes)),
-            Some(_) => Err(A::Error::custom("an object that holds more than bytes")),
+            Some(_) => Err(A::Error::custom("an object has more than a binary value")),
         }
     }
 }
@@ -291,7 +294,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_comes_back_bit_for_bit_and_has_the_same_hash() {
+    fn rows_survive_a_round_trip_bit_for_bit() {
         let mut row = Row::default();
         row.set("a", Cell::Integer(i64::MIN));
         row.set("b", Cell::Real(-0.0));
@@ -312,12 +315,12 @@ mod tests {
             (r#"{"a": [1]}"#.to_owned(), "invalid type: sequence"),
             (r#"{"a": true}"#.to_owned(), "invalid type: boolean"),
             (r#"{"a": {"b": 1}}"#.to_owned(), "invalid type: integer"),
-            (r#"{"a": {"b": "00"}}"#.to_owned(), "does not hold bytes"),
+            (r#"{"a": {"b": "00"}}"#.to_owned(), "is not a binary value"),
             (r#"{"a": {"hexadecimal": "0"}}"#.to_owned(), "not hexadecimal"),
-            (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "more than bytes"),
+            (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "more than a binary value"),
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
             (r#"{"a": 18446744073709551615}"#.to_owned(), "too large"),
-            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a text of"),
+            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a text has"),
             (format!(r#"{{"{}": 1}}"#, "x".repeat(101)), "a name of more than"),
             ("[".repeat(100_000), "invalid type"),
         ] {

@@ -1,4 +1,4 @@
-//! Safety reviews: what staff say who looked at a gait that was called unsafe.
+//! Stored safety reviews: decisions of staff about safety reports.
 
 use super::{Connection, Instant, SafetyReviewId, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::{Deserialize, Serialize};
@@ -7,18 +7,18 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// What came of it.
+/// Decision of a review.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SafetyVerdict {
-    /// The gait may be walked with again.
+    /// The gait may be walked again.
     Walkable,
-    /// It stays unsafe.
+    /// The gait stays unsafe.
     Unsafe,
 }
 
 impl SafetyVerdict {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Walkable => "walkable",
@@ -37,44 +37,44 @@ impl FromStr for SafetyVerdict {
     }
 }
 
-/// A review of the record.
+/// Safety review.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct SafetyReview {
     /// Identifier.
     pub id: SafetyReviewId,
-    /// The trial whose gait was looked at.
+    /// Trial of the reviewed gait.
     pub trial_id: TrialId,
-    /// What was said of it until then is decided.
+    /// The review covers reports up to this time.
     pub said_until: Instant,
-    /// What came of it.
+    /// Decision.
     pub verdict: SafetyVerdict,
-    /// Who says so.
+    /// Reviewer.
     pub author: String,
-    /// Why.
+    /// Reason.
     pub reason: String,
-    /// When.
+    /// Time of the review.
     pub created_at: Instant,
 }
 
-/// A review to write.
+/// A review to add.
 #[derive(Debug, Clone, Copy)]
 pub struct NewSafetyReview<'a> {
-    /// The trial whose gait was looked at.
+    /// Trial of the reviewed gait.
     pub trial: TrialId,
-    /// What was said of it until then is decided.
+    /// The review covers reports up to this time.
     pub said_until: Instant,
-    /// What came of it.
+    /// Decision.
     pub verdict: SafetyVerdict,
-    /// Who says so.
+    /// Reviewer.
     pub author: &'a str,
-    /// Why.
+    /// Reason.
     pub reason: &'a str,
 }
 
 /// Adds a review.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
+/// A violated constraint or trigger; errors of the database.
 pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResult<SafetyReviewId> {
     let id = SafetyReviewId::fresh();
     sqlx::query(
@@ -96,17 +96,17 @@ pub async fn insert(db: &mut Connection, new: NewSafetyReview<'_>) -> StoreResul
 /// The review with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: SafetyReviewId) -> StoreResult<SafetyReview> {
     let row = sqlx::query("select * from safety_reviews where id = ?").bind(id).fetch_optional(db).await?;
     let missing = || StoreError::Missing { what: "safety review", id: id.to_string() };
     row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
 }
 
-/// Every review in a study, by time.
+/// Every review of a study, by time.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<SafetyReview>> {
     let sql =
         "select r.* from safety_reviews r cross join trials t on t.id = r.trial_id where t.study_id = ? order by r.id";
@@ -126,15 +126,15 @@ fn from_row(row: &SqliteRow) -> StoreResult<SafetyReview> {
     })
 }
 
-/// How many safety reports, answers, retractions, unblindings and reviews a study has. All of these tables are append-only,
-/// so equal versions mean that nothing was said about safety in between.
+/// The numbers of assessments, answers, retractions, unblindings and reviews of a study. These tables are append-only,
+/// so equal versions mean that no safety report or review came in between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SafetyVersion([i64; 8]);
 
-/// The present version.
+/// The current version.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyVersion> {
     let row = sqlx::query(
         "select (select count(*) from presentation_answers a join presentations p on p.id = a.presentation_id

@@ -1,4 +1,4 @@
-//! Shapes of what other crates define, for the description of the REST interface. Types here are never built.
+//! OpenAPI schemas of types of other crates. These types are never constructed.
 
 use utoipa::ToSchema;
 
@@ -14,28 +14,28 @@ pub struct Body {
 /// The tuned bounds of one action.
 #[derive(Debug, ToSchema)]
 pub struct Bounds {
-    /// Every coordinate velocity, rad/s.
+    /// Maximum of all coordinate velocities, rad/s.
     pub a1: f64,
-    /// Every coordinate acceleration, rad/s².
+    /// Maximum of all coordinate accelerations, rad/s².
     pub a2: f64,
-    /// Hip velocity from below, m/s.
+    /// Minimum hip velocity, m/s.
     pub a3: f64,
-    /// Hip velocity from above, m/s.
+    /// Maximum hip velocity, m/s.
     pub a4: f64,
-    /// Swing-foot clearance, m.
+    /// Minimum clearance of the swing foot, m.
     pub a5: f64,
-    /// Torso lean, rad.
+    /// Maximum torso lean, rad.
     pub a6: f64,
-    /// Hip angles, degrees.
+    /// Maximum hip angle, degrees.
     pub a7: f64,
-    /// Ankle angles, degrees.
+    /// Maximum ankle angle, degrees.
     pub a8: f64,
 }
 
 /// A grid of actions.
 #[derive(Debug, ToSchema)]
 pub struct SearchSpace {
-    /// One per tuned bound.
+    /// One dimension for each tuned bound.
     pub dimensions: Vec<Dimension>,
 }
 
@@ -46,117 +46,117 @@ pub struct Dimension {
     pub name: String,
     /// Its values, ascending.
     pub values: Vec<f64>,
-    /// Over which distance values are alike.
+    /// Difference between values up to which gaits of similar utility are expected.
     pub lengthscale: f64,
 }
 
-/// A row of the gait problem that was not met.
+/// A violated row of the gait problem.
 #[derive(Debug, ToSchema)]
 pub struct Violation {
     /// The row in words: domain, node, constraint, component.
     pub row: String,
-    /// By how much.
+    /// Amount of the violation.
     pub amount: f64,
-    /// In which unit.
+    /// Unit of the amount.
     pub unit: String,
 }
 
-/// A tuned bound that the last iterate of a solve runs into.
+/// A tuned bound that is active at the last iterate of a solve.
 #[derive(Debug, ToSchema)]
 pub struct BoundAtLimit {
     /// `a1` to `a8`.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
-    /// Its value.
+    /// Given value.
     pub value: f64,
-    /// Where it is reached: domains, or `stride`.
+    /// Domains in which it is active, or `stride`.
     pub domains: Vec<String>,
 }
 
-/// A tuned bound as it is given.
+/// A tuned bound with its given value.
 #[derive(Debug, ToSchema)]
 pub struct GivenBound {
     /// `a1` to `a8`.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
-    /// Its value.
+    /// Given value.
     pub value: f64,
 }
 
-/// Tuned bounds that contradict each other: no gait was found with all of them, one was without any one of them, every
-/// other tuned bound being at its loosest.
+/// Tuned bounds that conflict. With all other tuned bounds at their loosest, no gait was found with all of them, and
+/// one was found without any single one of them.
 #[derive(Debug, ToSchema)]
 pub struct Conflict {
-    /// Those bounds; none: what is fixed contradicts itself.
+    /// The bounds. Empty if the fixed constraints conflict with each other.
     pub bounds: Vec<GivenBound>,
-    /// Bounds of the other conflicts that had given way when this one was left; absent: none.
+    /// Bounds of other conflicts that were relaxed when this one was found.
     pub without: Option<Vec<String>>,
     /// Wishes that are part of what is fixed, where that contradicts itself; absent: none.
     pub wishes: Option<Vec<String>>,
     /// What is violated where the search for a gait came nearest, all other tuned bounds at their loosest, worst first.
     pub violations: Vec<Violation>,
-    /// From how many starts a gait was looked for.
+    /// Number of starting points of the search.
     pub starts: u64,
-    /// A solve gave up: that there is no gait is not known then.
+    /// Whether a solve gave up, so that infeasibility is not certain.
     pub undecided: bool,
 }
 
-/// What relaxing one tuned bound alone achieves.
+/// Effect of relaxing one tuned bound alone.
 #[derive(Debug, ToSchema)]
 pub struct Relaxation {
     /// `a1` to `a8`.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
-    /// Its value.
+    /// Given value.
     pub from: f64,
-    /// The value nearest to it, of those tried, with which a gait converged; null: not even with the loosest.
+    /// The tried value nearest to it that gives a gait. Null if not even the loosest one does.
     pub to: Option<f64>,
-    /// The loosest value tried with which none did.
+    /// The loosest tried value that gives none.
     pub not_with: f64,
-    /// A solve with it gave up: that there is no gait is not known then.
+    /// Whether a solve with that value gave up, so that infeasibility is not certain.
     pub undecided: bool,
-    /// Solves that this took.
+    /// Number of solves.
     pub solves: u64,
-    /// From how many starts a gait with `not_with` was looked for; 0: unknown.
+    /// Number of starting points of the search with `not_with`. 0 if unknown.
     pub starts: u64,
 }
 
-/// How far one of several bounds gives way.
+/// Relaxation of one of several bounds.
 #[derive(Debug, ToSchema)]
 pub struct RelaxedBound {
     /// `a1` to `a8`.
     pub bound: String,
     /// What it limits, with its unit.
     pub meaning: String,
-    /// Its value.
+    /// Given value.
     pub from: f64,
-    /// The value nearest to it, of those tried together, with which a gait converged; null: not even with the loosest.
+    /// The value nearest to it that gives a gait together with the others. Null if not even the loosest one does.
     pub to: Option<f64>,
-    /// The loosest value tried, together with those of the others, with which none did.
+    /// The loosest value that gives none together with the others.
     pub not_with: f64,
 }
 
-/// What relaxing several tuned bounds together achieves, where no single one helps: each by the same share of the way to
-/// its loosest.
+/// Effect of relaxing several tuned bounds together, each by the same fraction of the way to its loosest value.
+/// Computed if no single relaxation gives a gait.
 #[derive(Debug, ToSchema)]
 pub struct JointRelaxation {
-    /// Those bounds, one of each conflict.
+    /// The bounds, one of each conflict.
     pub bounds: Vec<RelaxedBound>,
-    /// A solve with `not_with` gave up: that there is no gait is not known then.
+    /// Whether a solve with `not_with` gave up, so that infeasibility is not certain.
     pub undecided: bool,
-    /// Solves that this took.
+    /// Number of solves.
     pub solves: u64,
-    /// From how many starts a gait with `not_with` was looked for.
+    /// Number of starting points of the search with `not_with`.
     pub starts: u64,
 }
 
 /// One iteration of a solve.
 #[derive(Debug, ToSchema)]
 pub struct Iteration {
-    /// Number over all phases.
+    /// Number of the iteration over all phases.
     pub iteration: u64,
     /// Phase of the solve.
     pub phase: String,

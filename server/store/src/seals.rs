@@ -1,8 +1,8 @@
-//! Seals: a hash of each row of the record, chained, so that a row that another hand touched is found. Rows that come and go
-//! with the work have a hash too, a checksum that changes with them, so that the chain does not grow with each lease.
+//! Seals: a chained hash of each row, which detects rows that another program changed, added or deleted. Rows that
+//! change often, such as leases, have a replaceable checksum instead, so that the chain does not grow with them.
 //!
-//! Triggers of the writing connection note which rows a change writes, and they are sealed before the change is
-//! made durable: no way in can forget it. The triggers are temporary, so what another program writes is not noted.
+//! Temporary triggers of the writing connection note which rows a change writes, and the rows are sealed before the
+//! commit. So no code can forget a seal, and writes of other programs get none.
 
 use super::audit::ORIGIN;
 use super::{Connection, StoreError, StoreResult, json};
@@ -11,9 +11,9 @@ use sha2::{Digest, Sha256};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
 
-/// Seals read at a time when the chain is walked.
+/// Number of seals read at a time during verification.
 const BATCH: i64 = 1000;
-/// Between the columns of a key.
+/// Separator between the columns of a key.
 const JOINT: char = '/';
 
 /// A table whose rows are sealed.
@@ -23,7 +23,7 @@ pub struct Sealed {
     pub table: &'static str,
     /// Its primary key.
     pub key: &'static [&'static str],
-    /// The columns of the key may hold any text, so they are joined in hexadecimal digits.
+    /// Whether the columns of the key may contain any text, so that they are joined in hexadecimal.
     hex: bool,
 }
 
@@ -31,8 +31,8 @@ const fn sealed(table: &'static str, key: &'static [&'static str]) -> Sealed {
     Sealed { table, key, hex: false }
 }
 
-/// Every table that says what was measured, answered, decided or allowed. A column that is added later must be null in
-/// the rows that are there, or their seals are renewed by writing them.
+/// Tables with seals: everything that was measured, answered, decided or permitted. A column that is added later must
+/// be null in existing rows, or the rows must be written again.
 pub const TABLES: &[Sealed] = &[
     sealed("subjects", &["id"]),
     sealed("consents", &["seq"]),
@@ -75,7 +75,7 @@ pub const TABLES: &[Sealed] = &[
     sealed("imports", &["seq"]),
 ];
 
-/// Every other table: its rows come and go with the work, or only repeat what others say. Each row has a checksum.
+/// Tables with checksums: their rows change often, or only repeat other data.
 pub const CHECKED: &[Sealed] = &[
     sealed("events", &["seq"]),
     sealed("jobs", &["id"]),
@@ -88,14 +88,14 @@ pub const CHECKED: &[Sealed] = &[
     sealed(MIGRATIONS, &["version"]),
 ];
 
-/// Tables that are chains of hashes themselves, and the one that holds the checksums.
+/// Tables without either: the chains themselves, and the table of checksums.
 pub const NOT_SEALED: &[&str] = &["audit", "seals", "checksums"];
 
-/// The table of the migrations that were applied.
+/// The table of applied migrations.
 const MIGRATIONS: &str = "_sqlx_migrations";
 
 impl Sealed {
-    /// The key of a row as text, in SQL; `row` is `new.`, `old.`, or the table and a dot.
+    /// SQL for the key of a row as text; `row` is `new.`, `old.`, or the table and a dot.
     fn key_of(&self, row: &str) -> String {
         let column = |column| if self.hex { format!("hex({row}{column})") } else { format!("{row}{column}") };
         let columns: Vec<String> = self.key.iter().map(column).collect();
@@ -106,7 +106,8 @@ impl Sealed {
         CHECKED.iter().any(|checked| checked.table == self.table)
     }
 
-    /// Notes the rows that `event` (`after insert`) touches. A checksum goes with its row at once: much is pruned together.
+    /// SQL of the trigger that notes rows touched by `event` (such as `after insert`). Deleting a row deletes its
+    /// checksum immediately, because many rows are pruned together.
     fn trigger(&self, event: &str) -> String {
         let (table, old, new) = (self.table, self.key_of("old."), self.key_of("new."));
         let forget = format!("delete from checksums where evidence = '{table}' and key = {old};");
@@ -121,7 +122,7 @@ impl Sealed {
         format!("create temp trigger if not exists {name} {event} on main.{table} begin {act} end")
     }
 
-    /// Hash of a row as it stands; empty when there is none.
+    /// The hash of the current row; empty if it was deleted.
     async fn hash_of(&self, db: &mut Connection, key: &str) -> StoreResult<String> {
         let columns: Vec<String> = self.key.iter().map(|column| format!("{column} = ?")).collect();
         let sql = format!("select * from {} where {}", self.table, columns.join(" and "));
@@ -135,7 +136,7 @@ impl Sealed {
     }
 }
 
-/// The hash of a row in its newest seal, in SQL; `None` where rows of the table are not sealed.
+/// SQL for the hash in the newest seal of a row; `None` if the table has no seals.
 pub(super) fn newest_of(table: &str) -> Option<String> {
     let sealed = TABLES.iter().find(|sealed| sealed.table == table)?;
     let key = sealed.key_of(&format!("{table}."));
@@ -145,9 +146,9 @@ pub(super) fn newest_of(table: &str) -> Option<String> {
     ))
 }
 
-/// Makes a connection note what it writes into the tables that there are.
+/// Installs the triggers on a connection.
 pub(super) async fn watch(db: &mut Connection) -> StoreResult<()> {
-    // The order of writing is the order of the seals.
+    // Seals follow the order of writing.
     let notes = "create temp table if not exists unsealed \
                  (place integer primary key, evidence text not null, key text not null)";
     sqlx::query(notes).execute(&mut *db).await?;
@@ -159,7 +160,7 @@ pub(super) async fn watch(db: &mut Connection) -> StoreResult<()> {
     Ok(())
 }
 
-/// The tables of this program that there are and whose rows can be sealed.
+/// The existing tables whose rows have seals or checksums.
 pub(super) async fn present(db: &mut Connection) -> StoreResult<Vec<Sealed>> {
     let names: Vec<String> =
         sqlx::query_scalar("select name from sqlite_master where type = 'table'").fetch_all(db).await?;
@@ -168,8 +169,8 @@ pub(super) async fn present(db: &mut Connection) -> StoreResult<Vec<Sealed>> {
     Ok(all.filter(|sealed| is_there(sealed.table)).copied().collect())
 }
 
-/// Seals what the migrations wrote that were applied in the present transaction: the rows of every table that could not be
-/// sealed `before`. The only way in for rows that are there already.
+/// Seals the rows of tables that did not exist `before` the migrations of the current transaction. Existing rows are
+/// sealed nowhere else.
 pub(super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> StoreResult<()> {
     watch(db).await?;
     let added = present(db).await?.into_iter().filter(|sealed| !before.iter().any(|known| known.table == sealed.table));
@@ -181,7 +182,7 @@ pub(super) async fn adopt(db: &mut Connection, before: &[Sealed]) -> StoreResult
     seal(db).await
 }
 
-/// Refuses a record with a row that was not written by this program: one that has no seal and no checksum.
+/// Refuses a record with a row that has neither a seal nor a checksum, because this program did not write it.
 pub(super) async fn refuse_unsealed(db: &mut Connection) -> StoreResult<()> {
     for sealed in present(db).await? {
         if let Some(key) = without_seal(db, sealed).await? {
@@ -191,9 +192,9 @@ pub(super) async fn refuse_unsealed(db: &mut Connection) -> StoreResult<()> {
     Ok(())
 }
 
-/// Seals what was written since the last time.
+/// Seals the noted rows.
 pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
-    // One question and not two: every change waits for this.
+    // A single query, because every change waits for it.
     let noted = "select evidence, key, (select hash from seals order by seq desc limit 1) from unsealed \
                  group by evidence, key order by min(place)";
     let noted = sqlx::query(noted).fetch_all(&mut *db).await?;
@@ -226,36 +227,36 @@ pub(super) async fn seal(db: &mut Connection) -> StoreResult<()> {
     Ok(())
 }
 
-/// What comparing the record with its seals found.
+/// The result of verifying the seals.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SealCheck {
-    /// Every row is as it was sealed.
+    /// Every row matches its seal.
     Whole {
-        /// How many seals.
+        /// Number of seals.
         seals: u64,
-        /// Hash of the last one.
+        /// Hash of the last seal.
         last: String,
     },
-    /// The record is of a version that had no seals.
+    /// The record has a schema version without seals.
     None,
-    /// This seal does not follow from the one before.
+    /// A seal does not match the previous one.
     Broken {
-        /// Its sequence number.
+        /// Sequence number of the seal.
         seq: i64,
     },
-    /// This row is not as it was sealed: changed, added or taken away.
+    /// A row was changed, added or deleted outside the program.
     Touched {
-        /// Its table.
+        /// The table.
         table: String,
-        /// Its primary key.
+        /// The primary key.
         key: String,
     },
 }
 
-/// Walks the whole chain and compares every row with its newest seal.
+/// Verifies the whole chain, and compares every row with its newest seal.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
     let table = "select name from sqlite_master where type = 'table' and name = 'seals'";
     if sqlx::query(table).fetch_optional(&mut *db).await?.is_none() {
@@ -282,7 +283,7 @@ pub async fn verify(db: &mut Connection) -> StoreResult<SealCheck> {
     })
 }
 
-/// A seal or checksum of a row in a table that there is not.
+/// A seal or checksum of an unknown table.
 async fn of_no_table(db: &mut Connection, known: &[Sealed]) -> StoreResult<Option<(String, String)>> {
     let checksums =
         if known.iter().any(Sealed::is_checked) { "union all select evidence, key from checksums" } else { "" };
@@ -318,14 +319,14 @@ async fn walk(db: &mut Connection) -> StoreResult<SealCheck> {
             (last, after) = (hash, seq);
         }
     }
-    // The database counts for itself how many there were.
+    // SQLite keeps the largest number ever used.
     if super::audit::last_ever(db, "seals").await? != after {
         return Ok(SealCheck::Broken { seq: after + 1 });
     }
     Ok(SealCheck::Whole { seals: after.unsigned_abs(), last })
 }
 
-/// The key of a row that nobody sealed.
+/// The key of a row without a seal.
 async fn without_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<String>> {
     let (table, key) = (sealed.table, sealed.key_of(&format!("{}.", sealed.table)));
     let seals = if sealed.is_checked() { "checksums" } else { "seals" };
@@ -383,13 +384,13 @@ async fn unlike_seal(db: &mut Connection, sealed: Sealed) -> StoreResult<Option<
     }
 }
 
-/// Hash of a seal and the one before.
+/// The hash of a seal and the previous one.
 fn chained(previous: &str, table: &str, key: &str, sha256: &str) -> String {
-    // None of the parts can hold a line break but the key, which comes last.
+    // Only the key can contain a line break, so it comes last.
     json::sha256(format!("{previous}\n{sha256}\n{table}\n{key}").as_bytes())
 }
 
-/// Hash of a row: name, kind, length and bytes of each column that is not null, by name.
+/// The hash of a row: over name, type, length and bytes of each column that is not null, sorted by name.
 fn hash_of_row(row: &SqliteRow) -> StoreResult<String> {
     let mut columns: Vec<(&str, usize)> =
         row.columns().iter().map(|c| (c.name(), c.ordinal())).filter(|(name, _)| !name.starts_with(JOINT)).collect();
@@ -404,7 +405,7 @@ fn hash_of_row(row: &SqliteRow) -> StoreResult<String> {
         let bytes = match kind.as_str() {
             "INTEGER" | "BOOLEAN" => row.try_get::<i64, _>(place)?.to_be_bytes().to_vec(),
             "REAL" => row.try_get::<f64, _>(place)?.to_bits().to_be_bytes().to_vec(),
-            // Also what is no text any more.
+            // Read as bytes, because damaged text may not be valid UTF-8.
             _ => row.try_get_unchecked::<Vec<u8>, _>(place)?,
         };
         hash.update(format!("{name}\n{kind}\n{}\n", bytes.len()));

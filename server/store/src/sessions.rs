@@ -1,4 +1,4 @@
-//! Sessions of people who signed in, and the one-time links they come by. Secrets are here as hashes alone.
+//! Stored sessions of users and one-time sign-in links. Only hashes of their secrets are stored.
 
 use super::{Connection, Instant, SessionId, StoreResult, UserId};
 use serde::Serialize;
@@ -6,35 +6,35 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A session.
+/// Session of a user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Session {
-    /// Identifier. It lets nobody in.
+    /// Identifier, which is not the secret.
     pub id: SessionId,
-    /// Whose.
+    /// Identifier of the user.
     pub user_id: UserId,
-    /// The same, by name.
+    /// Name of the user.
     pub user_name: String,
-    /// When it was begun.
+    /// Time of sign-in.
     pub created_at: Instant,
-    /// When the person last did something.
+    /// Time of the last activity.
     pub seen_at: Instant,
-    /// Whether it was begun with a one-time link, and not with a password.
+    /// Whether the user signed in with a one-time link rather than a password.
     pub by_link: bool,
-    /// Address of the client that began it.
+    /// Client address at sign-in.
     pub address: Option<String>,
-    /// What the browser said of itself.
+    /// User agent of the browser.
     pub browser: Option<String>,
 }
 
-/// Where a session is begun.
+/// The origin of a sign-in.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct From {
     /// Address of the client.
     pub address: Option<String>,
-    /// What the browser says of itself.
+    /// User agent of the browser.
     pub browser: Option<String>,
-    /// Hash of the cookie that stays in it.
+    /// Hash of the cookie that identifies the browser.
     pub browser_hash: Option<String>,
 }
 
@@ -43,7 +43,7 @@ const SELECT: &str = "select s.*, u.name from sessions s join users u on u.id = 
 /// Begins a session.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn begin(
     db: &mut Connection,
     hash: &str,
@@ -70,49 +70,49 @@ pub async fn begin(
     Ok(())
 }
 
-/// The session with this hash, unless it was ended.
+/// The session with this hash, unless it has ended.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, hash: &str) -> StoreResult<Option<Session>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} and s.hash = ?"));
     let row = sqlx::query(sql).bind(hash).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
 }
 
-/// The session with this identifier, unless it was ended.
+/// The session with this identifier, unless it has ended.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn get(db: &mut Connection, id: SessionId) -> StoreResult<Option<Session>> {
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} and s.id = ?"));
     let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
 }
 
-/// Whether a user has signed in before in the browser with this hash of its cookie.
+/// Whether a user has signed in earlier in the browser with this cookie hash.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_known_browser(db: &mut Connection, user: UserId, browser_hash: &str) -> StoreResult<bool> {
     let sql = "select 1 from sessions where browser_hash = ? and user_id = ? limit 1";
     Ok(sqlx::query(sql).bind(browser_hash).bind(user).fetch_optional(db).await?.is_some())
 }
 
-/// Sessions that were not ended: those of a user, or all. The newest first.
+/// The sessions of a user or of all users that have not ended, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn live(db: &mut Connection, user: Option<UserId>) -> StoreResult<Vec<Session>> {
     let sql = format!("{SELECT} and (?1 is null or s.user_id = ?1) order by s.created_at desc, s.id");
     let rows = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(user).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
-/// Notes that the person did something.
+/// Records the last activity.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn seen(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult<()> {
     sqlx::query("update sessions set seen_at = ? where id = ? and ended_at is null")
         .bind(at)
@@ -122,10 +122,10 @@ pub async fn seen(db: &mut Connection, id: SessionId, at: Instant) -> StoreResul
     Ok(())
 }
 
-/// Ends a session. `false`: it had ended already.
+/// Ends a session. Returns `false` if it has already ended.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn end(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult<bool> {
     let done = sqlx::query("update sessions set ended_at = ? where id = ? and ended_at is null")
         .bind(at)
@@ -135,10 +135,10 @@ pub async fn end(db: &mut Connection, id: SessionId, at: Instant) -> StoreResult
     Ok(done.rows_affected() == 1)
 }
 
-/// Ends every session of a user and makes the user's links useless.
+/// Ends every session of a user, and invalidates the user's links.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn end_all(db: &mut Connection, user: UserId, at: Instant) -> StoreResult<()> {
     for sql in [
         "update sessions set ended_at = ? where user_id = ? and ended_at is null",
@@ -152,7 +152,7 @@ pub async fn end_all(db: &mut Connection, user: UserId, at: Instant) -> StoreRes
 /// Adds a one-time link.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn add_link(
     db: &mut Connection,
     hash: &str,
@@ -170,10 +170,10 @@ pub async fn add_link(
     Ok(())
 }
 
-/// Whose link it is and until when it can be used, unless it was used.
+/// The user and the expiry of a link, unless it was used.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn link(db: &mut Connection, hash: &str) -> StoreResult<Option<(UserId, Instant)>> {
     let row = sqlx::query("select user_id, expires_at from sign_in_links where hash = ? and used_at is null")
         .bind(hash)
@@ -182,28 +182,28 @@ pub async fn link(db: &mut Connection, hash: &str) -> StoreResult<Option<(UserId
     Ok(row.map(|row| Ok::<_, sqlx::Error>((row.try_get(0)?, row.try_get(1)?))).transpose()?)
 }
 
-/// Uses a link up.
+/// Marks a link as used.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn use_link(db: &mut Connection, hash: &str, at: Instant) -> StoreResult<()> {
     sqlx::query("update sign_in_links set used_at = ? where hash = ?").bind(at).bind(hash).execute(db).await?;
     Ok(())
 }
 
-/// Drops sessions that ended before an instant, or in which nothing was done since: how many.
+/// Deletes sessions that ended or were last active before an instant, and returns their number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn drop_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
     let done = sqlx::query("delete from sessions where coalesce(ended_at, seen_at) < ?").bind(at).execute(db).await?;
     Ok(done.rows_affected())
 }
 
-/// Drops links that were used or expired before an instant: how many.
+/// Deletes links that were used or expired before an instant, and returns their number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn drop_links_before(db: &mut Connection, at: Instant) -> StoreResult<u64> {
     let sql = "delete from sign_in_links where min(coalesce(used_at, expires_at), expires_at) < ?";
     Ok(sqlx::query(sql).bind(at).execute(db).await?.rows_affected())

@@ -1,4 +1,4 @@
-//! Failed sign-ins: by name and source, which makes the next one wait; by network, which is shown.
+//! Stored counts of failed sign-ins: by name and source, for the back-off, and by network, for display.
 
 use super::{Connection, Instant, StoreResult};
 use sqlx::Row;
@@ -7,9 +7,9 @@ use sqlx::sqlite::SqliteRow;
 /// Failed sign-ins of one name from one source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Failures {
-    /// How many.
+    /// Number of failures.
     pub count: u32,
-    /// Until when the next one waits.
+    /// Time before which the next attempt is refused.
     pub waits_until: Instant,
 }
 
@@ -18,20 +18,20 @@ pub struct Failures {
 pub struct Source {
     /// The network.
     pub network: String,
-    /// How many, with those that were refused without a look at the password.
+    /// Number of attempts, including those refused without checking the password.
     pub attempts: u32,
-    /// With how many different names; those beyond a limit are not counted apart.
+    /// Number of different names, up to a limit.
     pub names: u32,
-    /// The first one.
+    /// Time of the first attempt.
     pub first_at: Instant,
-    /// The last one.
+    /// Time of the last attempt.
     pub last_at: Instant,
 }
 
 /// Failed sign-ins of this name from this source.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn find(db: &mut Connection, name: &str, source: &str) -> StoreResult<Option<Failures>> {
     let row = sqlx::query("select failures, waits_until from sign_in_failures where name = ? and source = ?")
         .bind(name)
@@ -43,10 +43,10 @@ pub async fn find(db: &mut Connection, name: &str, source: &str) -> StoreResult<
     row.map(failures).transpose()
 }
 
-/// Sets what is known of this name and source.
+/// Sets the failures of this name and source.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set(db: &mut Connection, name: &str, source: &str, at: Instant, failures: Failures) -> StoreResult<()> {
     sqlx::query(
         "insert into sign_in_failures (name, source, failures, last_at, waits_until) values (?1, ?2, ?3, ?4, ?5) \
@@ -62,10 +62,10 @@ pub async fn set(db: &mut Connection, name: &str, source: &str, at: Instant, fai
     Ok(())
 }
 
-/// Forgets this name and source.
+/// Deletes the failures of this name and source.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn forget(db: &mut Connection, name: &str, source: &str) -> StoreResult<()> {
     let sql = "delete from sign_in_failures where name = ? and source = ?";
     sqlx::query(sql).bind(name).bind(source).execute(db).await?;
@@ -75,25 +75,25 @@ pub async fn forget(db: &mut Connection, name: &str, source: &str) -> StoreResul
 /// All failed sign-ins from this network.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_network(db: &mut Connection, network: &str) -> StoreResult<Option<Source>> {
     let row = sqlx::query("select * from sign_in_sources where network = ?").bind(network).fetch_optional(db).await?;
     row.as_ref().map(source).transpose()
 }
 
-/// The networks with most failed sign-ins.
+/// The networks with the most failed sign-ins.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn most(db: &mut Connection, limit: u32) -> StoreResult<Vec<Source>> {
     let sql = "select * from sign_in_sources where attempts > 0 order by attempts desc, network limit ?";
     sqlx::query(sql).bind(limit).fetch_all(db).await?.iter().map(source).collect()
 }
 
-/// Counts one attempt from this network, with a name that it did not try before or with a known one: how many there are.
+/// Counts an attempt from this network, with a new or a known name. Returns the number of attempts.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn count(db: &mut Connection, network: &str, at: Instant, new_name: bool) -> StoreResult<u32> {
     let row = sqlx::query(
         "insert into sign_in_sources (network, attempts, names, first_at, last_at) values (?1, 1, ?2, ?3, ?3) \
@@ -107,20 +107,20 @@ pub async fn count(db: &mut Connection, network: &str, at: Instant, new_name: bo
     Ok(row.try_get(0)?)
 }
 
-/// Takes one attempt back: it succeeded, and its name has no failures any more.
+/// Subtracts an attempt that succeeded, and its name.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn uncount(db: &mut Connection, network: &str) -> StoreResult<()> {
     let sql = "update sign_in_sources set attempts = max(attempts - 1, 0), names = max(names - 1, 0) where network = ?";
     sqlx::query(sql).bind(network).execute(db).await?;
     Ok(())
 }
 
-/// Removes what is older than an instant, some of it at a time: the networks that were removed.
+/// Deletes some entries older than an instant, and returns the deleted networks.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn prune(db: &mut Connection, before: Instant) -> StoreResult<Vec<Source>> {
     let old = "delete from sign_in_failures where (name, source) in \
                (select name, source from sign_in_failures where last_at < ? limit 1000)";

@@ -1,10 +1,11 @@
-//! Free space on the disk of the record. Where it runs short, nothing large is begun, so that answers of people still fit.
+//! Free space on the disk of the record. Below a reserve, nothing large is started, so that answers of people still
+//! fit.
 
 use super::{StoreError, StoreResult};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Below so many free bytes nothing large is begun, unless a setting says otherwise.
+/// Default reserve.
 pub const DEFAULT_RESERVE_BYTES: u64 = 500 << 20;
 
 /// The disk of the record.
@@ -24,7 +25,7 @@ impl Space {
         self.reserve.store(bytes, Ordering::Relaxed);
     }
 
-    /// Refuses where less is free than is kept in reserve.
+    /// Fails if less space is free than the reserve.
     pub(super) fn room(&self) -> StoreResult<()> {
         let reserve = self.reserve.load(Ordering::Relaxed);
         match free_bytes(&self.folder) {
@@ -36,14 +37,14 @@ impl Space {
     }
 }
 
-/// Free bytes for this process; none: the system does not say.
+/// Free bytes for this process, if the system reports them.
 #[cfg(target_os = "linux")]
 fn free_bytes(folder: &Path) -> Option<u64> {
     let found = rustix::fs::statvfs(folder).ok()?;
     Some(found.f_bavail.saturating_mul(found.f_frsize))
 }
 
-/// Free bytes for this process; none: the system does not say.
+/// Free bytes for this process, if the system reports them.
 #[cfg(not(target_os = "linux"))]
 fn free_bytes(_: &Path) -> Option<u64> {
     None

@@ -1,4 +1,4 @@
-//! Studies: one tuning each.
+//! Stored studies and their plans.
 
 use super::members::{binds, reached};
 use super::{
@@ -14,26 +14,26 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Where a study stands. Which change is allowed is decided in `studies::lifecycle`.
+/// State of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StudyState {
-    /// Being set up: nothing runs.
+    /// Not started yet.
     Draft,
-    /// Proposing and evaluating.
+    /// Proposing and evaluating trials.
     Running,
-    /// Waiting for a person's answer.
+    /// Waiting for a preference of a person.
     Waiting,
-    /// Held by a person.
+    /// Paused by a person.
     Paused,
-    /// Reached its budget or its stopping rule.
+    /// The budget is used up, or a stopping rule applied.
     Finished,
-    /// Ended by a person before that.
+    /// Stopped by a person.
     Stopped,
 }
 
 impl StudyState {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Draft => "draft",
@@ -45,7 +45,7 @@ impl StudyState {
         }
     }
 
-    /// Finished or stopped.
+    /// Whether the study is finished or stopped.
     pub fn has_ended(self) -> bool {
         matches!(self, Self::Finished | Self::Stopped)
     }
@@ -61,20 +61,20 @@ impl FromStr for StudyState {
     }
 }
 
-/// Who answers the comparisons.
+/// Who answers comparisons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FeedbackMode {
     /// Gait RMSE answers every comparison.
     Automatic,
-    /// People answer; the study waits for them.
+    /// People answer, and the study waits for them.
     Human,
-    /// Gait RMSE answers, people may add answers of their own.
+    /// Gait RMSE answers, and people can add answers.
     Mixed,
 }
 
 impl FeedbackMode {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Automatic => "automatic",
@@ -94,18 +94,18 @@ impl FromStr for FeedbackMode {
     }
 }
 
-/// Who evaluates the trials.
+/// Who evaluates trials.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Evaluation {
-    /// The program: each trial is an optimisation.
+    /// The service, by optimisation.
     Optimizer,
-    /// Scripts of the lab: they ask for trials and tell what these gave.
+    /// Scripts of the lab, which ask for trials and tell their outcomes.
     Script,
 }
 
 impl Evaluation {
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Optimizer => "optimizer",
@@ -124,21 +124,22 @@ impl FromStr for Evaluation {
     }
 }
 
-/// What a study is made of; fixed once it has left `draft`.
+/// Set-up of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct StudyPlan {
     /// Name shown to people.
     pub name: String,
-    /// Who walks.
+    /// Subject of the study.
     pub subject_id: SubjectId,
-    /// Height and mass that it solves with, also after a correction; none: those that were entered first.
+    /// Height and mass used by solves, independent of later corrections. Absent in older studies, which use the values
+    /// entered first.
     #[schema(value_type = Option<schema::Body>)]
     pub body: Option<Body>,
-    /// With which device.
+    /// Device.
     pub device_id: DeviceId,
-    /// What Gait RMSE is measured against.
+    /// Reference gait for Gait RMSE.
     pub reference_gait_id: ReferenceGaitId,
-    /// With muscles (C1-C12) or without (C1-C4).
+    /// Whether to solve with muscles (C1-C12) or without (C1-C4).
     pub muscles: bool,
     /// Settings of the gait problem; boxed, as plans pass through many futures.
     #[schema(value_type = Object)]
@@ -146,38 +147,38 @@ pub struct StudyPlan {
     /// Limits of one solve.
     #[schema(value_type = Object)]
     pub solve_options: SolveOptions,
-    /// Values of the bounds that are not tuned.
+    /// Values of bounds that are not tuned.
     #[schema(value_type = schema::Bounds)]
     pub base_bounds: TunedBounds,
-    /// What is tuned: dimensions named `a1`..`a8`.
+    /// Tuned bounds and their values, with dimensions named `a1` to `a8`.
     #[schema(value_type = schema::SearchSpace)]
     pub search_space: SearchSpace,
     /// Settings of the learner.
     #[schema(value_type = Object)]
     pub learner: LearnerSettings,
-    /// Who answers the comparisons.
+    /// Who answers comparisons.
     pub feedback_mode: FeedbackMode,
-    /// Who evaluates the trials.
+    /// Who evaluates trials.
     pub evaluation: Evaluation,
-    /// How many trials.
+    /// Number of trials.
     pub trial_budget: u32,
-    /// No new trial once the solves so far took so many seconds together.
+    /// Total solve time, s, after which no new trial starts.
     pub solve_seconds_budget: Option<f64>,
-    /// Done when the best action stayed the same over so many results in a row.
+    /// The study finishes when the best action has not changed over this many results.
     pub unchanged_limit: Option<u32>,
-    /// How many trials at the same time; 1 is the published, reproducible order.
+    /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,
-    /// Higher runs first.
+    /// Priority, -10 to 10. Higher values run first.
     pub priority: i32,
-    /// Every random draw of the study derives from it.
+    /// Seed of every random draw except allocations.
     pub seed: u64,
 }
 
 impl StudyPlan {
-    /// Whether a study of the other plan would try the same: same person, problem, learner and draws. Name, priority
-    /// and how many trials run at the same time do not matter.
+    /// Whether a study with the other plan would try the same trials: same subject, problem, learner and seed. Name,
+    /// priority and parallel trials do not matter.
     pub fn tries_the_same_as(&self, other: &Self) -> bool {
-        // Studies from before there were corrections do not say what they solve with: it is what was entered.
+        // Older studies without a body use the values entered first.
         let bodies_differ = self.body.is_some() && other.body.is_some() && self.body != other.body;
         if bodies_differ {
             return false;
@@ -188,30 +189,30 @@ impl StudyPlan {
     }
 }
 
-/// A study of the record.
+/// Study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Study {
     /// Identifier.
     pub id: StudyId,
-    /// What it is made of.
+    /// Set-up.
     #[serde(flatten)]
     pub plan: StudyPlan,
-    /// The study whose set-up it was made from.
+    /// Parent, if the study is a fork.
     pub forked_from: Option<StudyId>,
-    /// Where it stands.
+    /// State.
     pub state: StudyState,
-    /// Why it stands there, in words; may be empty.
+    /// Reason for the state; may be empty.
     pub state_reason: String,
-    /// Counts the changes of the row.
+    /// Revision, which grows with each change.
     pub revision: i64,
-    /// When it was made.
+    /// Time of creation.
     pub created_at: Instant,
-    /// When it last changed.
+    /// Time of the last change.
     pub updated_at: Instant,
 }
 
-/// Settings as a study recorded them, with every weight there was. Before there was one on the bend of activations, none
-/// was meant; a new study that does not name it has the default instead.
+/// Reads stored settings. Older settings without a weight on the curvature of activations mean 0, while new studies
+/// without it get the default.
 fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
     let mut document: Value = json::from_text("gait_settings", text)?;
     if let Some(weights) = document.get_mut("regularisation").and_then(Value::as_object_mut) {
@@ -223,7 +224,7 @@ fn recorded_settings(text: &str) -> StoreResult<GaitSettings> {
 /// Adds a study.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn insert(
     db: &mut Connection,
     plan: &StudyPlan,
@@ -280,7 +281,7 @@ pub async fn insert(
 /// The study with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: StudyId) -> StoreResult<Study> {
     let row = sqlx::query("select * from studies where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "study", id: id.to_string() })
@@ -301,10 +302,10 @@ pub async fn page(db: &mut Connection, reach: Reach, before: Option<StudyId>, li
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 
-/// The studies that ask raters for comparisons and that a caller reaches, oldest first.
+/// The accessible studies with comparisons for raters, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn asking_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(
@@ -315,10 +316,10 @@ pub async fn asking_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec
     sqlx::query(sql).bind(every).bind(open).bind(principal).fetch_all(db).await?.iter().map(from_row).collect()
 }
 
-/// Every study that proposes trials by itself, oldest first.
+/// Every study that the scheduler runs, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     let rows = sqlx::query("select * from studies where state in ('running', 'waiting') order by priority desc, id")
         .fetch_all(db)
@@ -326,10 +327,10 @@ pub async fn active(db: &mut Connection) -> StoreResult<Vec<Study>> {
     rows.iter().map(from_row).collect()
 }
 
-/// The newest studies that a caller reaches and that go on only when a person does something.
+/// The newest accessible studies that wait for an action of a person.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!(
@@ -341,11 +342,11 @@ pub async fn waiting_for_people(db: &mut Connection, reach: Reach, limit: u32) -
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 
-/// The newest studies that a caller reaches in which somebody called a gait unsafe and did not take it back, of subjects
-/// who did not withdraw.
+/// The newest accessible studies with a safety report that was not retracted, without those of subjects who withdrew
+/// consent.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let rows = sqlx::query(concat!(
@@ -368,10 +369,10 @@ pub async fn with_safety_reports(db: &mut Connection, reach: Reach, limit: u32) 
     rows.iter().map(from_row).collect()
 }
 
-/// The newest studies of a subject that a caller reaches.
+/// The newest accessible studies of a subject.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, limit: u32) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = binds(reach);
     let sql = concat!("select * from studies where subject_id = ?4 and ", reached!("id"), " order by id desc limit ?5");
@@ -379,10 +380,10 @@ pub async fn of_subject(db: &mut Connection, reach: Reach, subject: SubjectId, l
     query.bind(subject).bind(limit).fetch_all(db).await?.iter().map(from_row).collect()
 }
 
-/// Studies of a subject that did not end.
+/// The studies of a subject that have not ended.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn open_of(db: &mut Connection, subject: SubjectId) -> StoreResult<Vec<Study>> {
     let rows =
         sqlx::query("select * from studies where subject_id = ? and state not in ('finished', 'stopped') order by id")
@@ -395,7 +396,7 @@ pub async fn open_of(db: &mut Connection, subject: SubjectId) -> StoreResult<Vec
 /// Studies that ended before an instant.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<Study>> {
     let rows =
         sqlx::query("select * from studies where state in ('finished', 'stopped') and updated_at < ? order by id")
@@ -405,23 +406,23 @@ pub async fn ended_before(db: &mut Connection, at: Instant) -> StoreResult<Vec<S
     rows.iter().map(from_row).collect()
 }
 
-/// What can be changed of a study in place.
+/// The changeable fields of a study.
 #[derive(Debug, Clone)]
 pub struct Limits {
     /// Name shown to people.
     pub name: String,
-    /// Higher runs first.
+    /// Priority. Higher values run first.
     pub priority: i32,
-    /// How many trials at the same time.
+    /// Number of trials that run in parallel.
     pub parallel_trials: u32,
-    /// How many trials.
+    /// Number of trials.
     pub trial_budget: u32,
 }
 
-/// Changes a study in place.
+/// Updates the changeable fields.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &Limits) -> StoreResult<()> {
     sqlx::query(
         "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
@@ -438,10 +439,10 @@ pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &Limits) -> St
     Ok(())
 }
 
-/// Moves a study to another state, if it still is in the state it was read in. `false`: it was not.
+/// Changes the state of a study. Returns `false` if the state has changed since it was read.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set_state(db: &mut Connection, study: &Study, state: StudyState, reason: &str) -> StoreResult<bool> {
     let done = sqlx::query(
         "update studies set state = ?, state_reason = ?, revision = revision + 1, updated_at = ? \
@@ -500,7 +501,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_of_before_the_weight_on_bends_mean_none() {
+    fn older_settings_without_curvature_weight_mean_zero() {
         let old = r#"{"mesh": {"ds2": 4, "ds3": 4, "ss2": 6, "ss1": 6}, "regularisation": {"power_smoothing_w": 1,
             "torque": 0.003, "acceleration": 0.0001, "contact_force": 0.0001, "activation": 0.003, "fibre_velocity": 0.01}}"#;
         assert_eq!(recorded_settings(old).unwrap(), GaitSettings::reference_problem());

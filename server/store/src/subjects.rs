@@ -1,4 +1,4 @@
-//! Subjects: people, by pseudonym only.
+//! Stored subjects, under pseudonyms only, with corrections and muscle measurements.
 
 use super::audit::Actor;
 use super::{Connection, Instant, StoreError, StoreResult, SubjectId, json, now};
@@ -9,12 +9,12 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A person who walks, under a pseudonym that the site gives.
+/// Subject, known by a pseudonym only.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Subject {
     /// Identifier.
     pub id: SubjectId,
-    /// Site-given pseudonym, unique.
+    /// Unique pseudonym assigned by the site.
     pub pseudonym: String,
     /// Body height, m.
     pub height_m: f64,
@@ -22,18 +22,18 @@ pub struct Subject {
     pub body_mass_kg: f64,
     /// Free text.
     pub notes: String,
-    /// When the row was written.
+    /// Time of creation.
     pub created_at: Instant,
 }
 
 impl Subject {
-    /// What the walking model is scaled by.
+    /// Height and mass for the walking model.
     pub fn body(&self) -> Body {
         Body { height_m: self.height_m, body_mass_kg: self.body_mass_kg }
     }
 }
 
-/// A row as it stands: the newest correction in place of what was entered first.
+/// Selects subjects with their newest correction.
 macro_rules! select {
     ($rest:literal) => {
         concat!(
@@ -45,20 +45,20 @@ macro_rules! select {
     };
 }
 
-/// A correction of height and mass.
+/// Correction of height and mass.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Correction {
-    /// Order.
+    /// Sequence number.
     pub seq: i64,
-    /// Body height from then on, m.
+    /// Corrected body height, m.
     pub height_m: f64,
-    /// Body mass from then on, kg.
+    /// Corrected body mass, kg.
     pub body_mass_kg: f64,
-    /// Why.
+    /// Reason.
     pub reason: String,
-    /// By whom.
+    /// Who corrected it.
     pub actor: String,
-    /// When.
+    /// Time of the correction.
     pub created_at: Instant,
 }
 
@@ -68,7 +68,7 @@ pub const PSEUDONYM_UNIQUE: &str = "subjects.pseudonym";
 /// Adds a subject.
 ///
 /// # Errors
-/// A violated constraint ([`PSEUDONYM_UNIQUE`]), or what the database reports.
+/// A violated constraint ([`PSEUDONYM_UNIQUE`]); errors of the database.
 pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &str) -> StoreResult<Subject> {
     let subject = Subject {
         id: SubjectId::fresh(),
@@ -95,7 +95,7 @@ pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &st
 /// The subject with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
     let row = sqlx::query(select!("where s.id = ?")).bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "subject", id: id.to_string() })
@@ -104,7 +104,7 @@ pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
 /// The subject with this pseudonym, if there is one.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<Option<Subject>> {
     let row = sqlx::query(select!("where s.pseudonym = ?")).bind(pseudonym).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
@@ -113,7 +113,7 @@ pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<O
 /// Every subject, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
     let rows = sqlx::query(select!("order by s.id desc")).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
@@ -122,7 +122,7 @@ pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
 /// At most `limit` subjects added before `before`, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) -> StoreResult<Vec<Subject>> {
     let rows = sqlx::query(select!("where ? is null or s.id < ? order by s.id desc limit ?"))
         .bind(before)
@@ -133,10 +133,10 @@ pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) ->
     rows.iter().map(from_row).collect()
 }
 
-/// Height and mass as they were entered first: what studies solve with that were made before there were corrections.
+/// Height and mass as entered first, which older studies without a body use.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn body_as_entered(db: &mut Connection, id: SubjectId) -> StoreResult<Body> {
     let row =
         sqlx::query("select height_m, body_mass_kg from subjects where id = ?").bind(id).fetch_optional(db).await?;
@@ -144,10 +144,10 @@ pub async fn body_as_entered(db: &mut Connection, id: SubjectId) -> StoreResult<
     Ok(Body { height_m: row.try_get("height_m")?, body_mass_kg: row.try_get("body_mass_kg")? })
 }
 
-/// Writes down the right height and mass of a subject.
+/// Records a correction.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn correct(
     db: &mut Connection,
     actor: &Actor,
@@ -181,7 +181,7 @@ pub async fn correct(
 /// Every correction of a subject, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<Correction>> {
     let rows = sqlx::query("select * from subject_corrections where subject_id = ? order by seq").bind(id);
     let correction = |row: &SqliteRow| {
@@ -197,10 +197,10 @@ pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<
     rows.fetch_all(db).await?.iter().map(correction).collect()
 }
 
-/// How the muscles of a subject differ from the published table; the table, where nothing is written down.
+/// The measured muscle values of a subject, which override the published table.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn muscles(db: &mut Connection, id: SubjectId) -> StoreResult<MuscleParameters> {
     let row = sqlx::query("select definition from subject_muscles where subject_id = ? order by seq desc limit 1")
         .bind(id)
@@ -209,10 +209,10 @@ pub async fn muscles(db: &mut Connection, id: SubjectId) -> StoreResult<MusclePa
     Ok(row.as_ref().map(|row| json::column(row, "definition")).transpose()?.unwrap_or_default())
 }
 
-/// Writes down how the muscles of a subject differ.
+/// Records measured muscle values.
 ///
 /// # Errors
-/// A violated constraint, or what the database reports.
+/// A violated constraint; errors of the database.
 pub async fn set_muscles(
     db: &mut Connection,
     actor: &Actor,

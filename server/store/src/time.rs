@@ -1,4 +1,4 @@
-//! Instants in the record: RFC 3339, UTC, milliseconds; sortable as text.
+//! Instants of the record: RFC 3339 in UTC with milliseconds, sortable as text.
 
 use serde::{Deserialize, Serialize};
 use sqlx::encode::IsNull;
@@ -15,19 +15,19 @@ use utoipa::ToSchema;
 #[serde(try_from = "String", into = "String")]
 pub struct Instant(jiff::Timestamp);
 
-/// The server's clock: the only one that dates a row.
+/// The current time of the server, for all rows.
 pub fn now() -> Instant {
     Instant(jiff::Timestamp::now())
 }
 
 impl Instant {
-    /// This instant moved by whole seconds; at the end of time it stays where it is.
+    /// Adds seconds, without change on overflow.
     #[must_use]
     pub fn plus_seconds(self, seconds: i64) -> Self {
         Self(self.0.checked_add(jiff::SignedDuration::from_secs(seconds)).unwrap_or(self.0))
     }
 
-    /// This instant moved into the future; at the end of time it stays where it is.
+    /// Adds a duration, without change on overflow.
     #[must_use]
     pub fn after(self, time: Duration) -> Self {
         Self(self.0.checked_add(time).unwrap_or(self.0))

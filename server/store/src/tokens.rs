@@ -1,4 +1,4 @@
-//! Tokens: how programs of the lab say who they are. Stored as hashes.
+//! Stored tokens of programs. Only hashes of their secrets are stored.
 
 use super::audit::Actor;
 use super::{Connection, Instant, StoreError, StoreResult, TokenId, UserId, json, now};
@@ -8,27 +8,27 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A token; its secret was shown once.
+/// Token of a program, without its secret.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Token {
     /// Identifier.
     pub id: TokenId,
-    /// What it is for, unique.
+    /// Unique name that states its purpose.
     pub name: String,
-    /// What it allows.
+    /// Scopes.
     pub scopes: Vec<Right>,
-    /// Who made it. It ends when this user is disabled or is no administrator any more.
+    /// Who created it. The token is revoked when this user is disabled or is no longer an administrator.
     pub created_by: String,
-    /// When it was made.
+    /// Time of creation.
     pub created_at: Instant,
-    /// When it ends by itself.
+    /// Time of expiry. Absent if it does not expire.
     pub expires_at: Option<Instant>,
-    /// When it was ended.
+    /// Time of revocation, if it was revoked.
     pub revoked_at: Option<Instant>,
 }
 
 impl Token {
-    /// Whether it was not revoked and has not ended.
+    /// Whether it is valid: neither revoked nor expired.
     pub fn is_good(&self) -> bool {
         self.revoked_at.is_none() && self.expires_at.is_none_or(|at| at > now())
     }
@@ -40,7 +40,7 @@ pub const NAME_UNIQUE: &str = "tokens.name";
 /// Adds a token.
 ///
 /// # Errors
-/// A violated constraint ([`NAME_UNIQUE`]), or what the database reports.
+/// A violated constraint ([`NAME_UNIQUE`]); errors of the database.
 pub async fn insert(
     db: &mut Connection,
     name: &str,
@@ -78,17 +78,17 @@ pub async fn insert(
 /// The token with this hash, unless it was revoked.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn by_hash(db: &mut Connection, hash: &str) -> StoreResult<Option<Token>> {
     let row =
         sqlx::query("select * from tokens where hash = ? and revoked_at is null").bind(hash).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
 }
 
-/// The tokens that a user made and nobody revoked. Older versions kept the maker's name alone.
+/// The tokens of a user that were not revoked. Older rows have only the name of the user.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn made_by(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token>> {
     let rows = sqlx::query(
         "select t.* from tokens t join users u on u.id = ? where t.revoked_at is null and (t.maker = u.id or \
@@ -104,7 +104,7 @@ pub async fn made_by(db: &mut Connection, user: UserId) -> StoreResult<Vec<Token
 /// The token with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: TokenId) -> StoreResult<Token> {
     let row = sqlx::query("select * from tokens where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "token", id: id.to_string() })
@@ -113,16 +113,16 @@ pub async fn get(db: &mut Connection, id: TokenId) -> StoreResult<Token> {
 /// Every token, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<Token>> {
     let rows = sqlx::query("select * from tokens order by id").fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
-/// Ends a token. `false`: it had ended already.
+/// Revokes a token. Returns `false` if it was already revoked.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn revoke(db: &mut Connection, id: TokenId) -> StoreResult<bool> {
     let done = sqlx::query("update tokens set revoked_at = ? where id = ? and revoked_at is null")
         .bind(now())

@@ -1,4 +1,4 @@
-//! Totals over the whole record.
+//! Totals of the record for metrics: studies, trials and jobs by state, and the size of the file.
 
 use super::{Connection, Instant, StoreResult, now};
 use sqlx::Row;
@@ -14,14 +14,14 @@ pub struct Totals {
     pub jobs: Vec<(String, i64)>,
     /// Size of the file.
     pub bytes: i64,
-    /// How long the oldest queued job has waited, s.
+    /// Waiting time of the oldest queued job, s.
     pub oldest_queued_seconds: f64,
 }
 
-/// Reads them.
+/// Reads the totals.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn read(db: &mut Connection) -> StoreResult<Totals> {
     let bytes = sqlx::query("select page_count * page_size from pragma_page_count(), pragma_page_size()")
         .fetch_one(&mut *db)

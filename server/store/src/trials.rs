@@ -1,4 +1,4 @@
-//! Trials: one action of a study and what it gave.
+//! Stored trials: actions of a study and their results.
 
 use super::many_rows::read_many;
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json, now, schema};
@@ -10,23 +10,23 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Where a trial stands. Which change is allowed is decided in `studies::trial_state`.
+/// State of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TrialState {
     /// Waiting for a worker.
     Queued,
-    /// A worker solves it.
+    /// Being evaluated.
     Running,
-    /// The solver found a gait: a result.
+    /// The solve found a gait. A result.
     Converged,
-    /// The solver ended without a gait: also a result.
+    /// The solve ended without a gait. Also a result.
     NotConverged,
-    /// The program failed (panic, error, time limit): not a result, the learner never hears of it.
+    /// The program failed by a panic, an error or the time limit. Not a result.
     Failed,
-    /// Its workers were not heard of again: not a result.
+    /// The workers stopped responding. Not a result.
     Lost,
-    /// Ended by a person.
+    /// Cancelled by a person.
     Cancelled,
 }
 
@@ -35,7 +35,7 @@ impl TrialState {
     pub const ALL: [Self; 7] =
         [Self::Queued, Self::Running, Self::Converged, Self::NotConverged, Self::Failed, Self::Lost, Self::Cancelled];
 
-    /// As stored and shown.
+    /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Queued => "queued",
@@ -48,12 +48,12 @@ impl TrialState {
         }
     }
 
-    /// Waiting or being solved.
+    /// Whether it is queued or running.
     pub fn is_open(self) -> bool {
         matches!(self, Self::Queued | Self::Running)
     }
 
-    /// Converged or not converged: what the learner hears.
+    /// Whether it is a result for the learner: converged or not converged.
     pub fn is_result(self) -> bool {
         matches!(self, Self::Converged | Self::NotConverged)
     }
@@ -69,37 +69,37 @@ impl FromStr for TrialState {
     }
 }
 
-/// A trial of the record.
+/// Trial of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Trial {
     /// Identifier.
     pub id: TrialId,
     /// The study it belongs to.
     pub study_id: StudyId,
-    /// 1, 2, ... within the study, in the order of proposal.
+    /// Number within the study, from 1, in the order of proposal.
     pub number: u32,
-    /// The action as a grid index of the study's search space.
+    /// Index of the action in the search space.
     #[schema(value_type = u64)]
     pub action_index: ActionIndex,
-    /// The action as bounds.
+    /// Action as bounds.
     #[schema(value_type = schema::Bounds)]
     pub action: TunedBounds,
-    /// Why the learner chose it.
+    /// Reason for the trial.
     pub reason: String,
-    /// The best trial when this one was proposed.
+    /// Best trial when this one was proposed.
     pub best_before: Option<TrialId>,
-    /// The trial whose gait its solve starts from; `None`: cold start.
+    /// Trial that gives the warm start. Absent for a cold start.
     pub warm_started_from: Option<TrialId>,
-    /// Who asked for it and evaluates it; `None`: the program does.
+    /// Script that evaluates the trial. Absent if the service does.
     pub asked_by: Option<String>,
-    /// Where it stands.
+    /// State.
     pub state: TrialState,
     /// How the solve ended.
     #[schema(value_type = Option<String>)]
     pub status: Option<SolveStatus>,
-    /// Gait RMSE, rad; of a gait alone: where there is none, the last iterate's is in the report.
+    /// Gait RMSE of a converged gait, rad. The report has that of a last iterate.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport, dimensionless; of a gait alone.
+    /// Cost of transport of a converged gait, dimensionless.
     pub cost_of_transport: Option<f64>,
     /// Objective of the solve.
     pub objective: Option<f64>,
@@ -112,50 +112,50 @@ pub struct Trial {
     /// All figures of the solve.
     #[schema(value_type = Option<Object>)]
     pub report: Option<SolveReport>,
-    /// The most violated rows, worst first.
+    /// Most violated rows, worst first.
     #[schema(value_type = Vec<schema::Violation>)]
     pub violations: Vec<Violation>,
-    /// What to tell people about how it ended; may be empty.
+    /// Message for people about the end of the trial; may be empty.
     pub message: String,
-    /// When it was proposed.
+    /// Time of proposal.
     pub created_at: Instant,
-    /// When a worker first took it.
+    /// Time at which a worker first started it.
     pub started_at: Option<Instant>,
-    /// When it ended.
+    /// Time of its end.
     pub finished_at: Option<Instant>,
 }
 
-/// A proposal: what a new trial is.
+/// A proposed trial.
 #[derive(Debug, Clone)]
 pub struct NewTrial {
-    /// 1, 2, ... within the study.
+    /// Number within the study, from 1.
     pub number: u32,
-    /// The action as a grid index.
+    /// Index of the action in the search space.
     pub action_index: ActionIndex,
-    /// The action as bounds.
+    /// Action as bounds.
     pub action: TunedBounds,
-    /// Why the learner chose it.
+    /// Reason for the trial.
     pub reason: String,
-    /// The best trial so far.
+    /// Best trial so far.
     pub best_before: Option<TrialId>,
-    /// Whose gait to start from.
+    /// Trial that gives the warm start.
     pub warm_started_from: Option<TrialId>,
 }
 
-/// How a trial ended.
+/// The end of a trial.
 #[derive(Debug, Clone)]
 pub struct TrialEnd {
-    /// One of the states that are not open.
+    /// A state that is not open.
     pub state: TrialState,
-    /// The figures, for a finished solve.
+    /// Figures of a completed solve.
     pub report: Option<SolveReport>,
-    /// The most violated rows.
+    /// Most violated rows.
     pub violations: Vec<Violation>,
-    /// What to tell people; may be empty.
+    /// Message for people; may be empty.
     pub message: String,
 }
 
-/// What a script told of a trial.
+/// Outcome of a trial as told by a script.
 #[derive(Debug, Clone)]
 pub struct Told {
     /// Converged or not converged.
@@ -171,7 +171,7 @@ pub struct Told {
 /// Adds a trial in state `queued`.
 ///
 /// # Errors
-/// A violated constraint (`trials_number_unique`), or what the database reports.
+/// A violated constraint (`trials_number_unique`); errors of the database.
 pub async fn insert(db: &mut Connection, study: StudyId, new: &NewTrial) -> StoreResult<TrialId> {
     let id = TrialId::fresh();
     sqlx::query(
@@ -195,7 +195,7 @@ pub async fn insert(db: &mut Connection, study: StudyId, new: &NewTrial) -> Stor
 /// The trial with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: TrialId) -> StoreResult<Trial> {
     let row = sqlx::query("select * from trials where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "trial", id: id.to_string() })
@@ -204,7 +204,7 @@ pub async fn get(db: &mut Connection, id: TrialId) -> StoreResult<Trial> {
 /// Every trial of a study, by number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Trial>> {
     page(db, study, 0, u32::MAX).await
 }
@@ -212,7 +212,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Tr
 /// At most `limit` trials of a study with numbers above `after`, by number.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn page(db: &mut Connection, study: StudyId, after: u32, limit: u32) -> StoreResult<Vec<Trial>> {
     let rows = sqlx::query("select * from trials where study_id = ? and number > ? order by number limit ?")
         .bind(study)
@@ -226,7 +226,7 @@ pub async fn page(db: &mut Connection, study: StudyId, after: u32, limit: u32) -
 /// At most `limit` trials of a study with numbers below `before`, by number: the newest of them.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn newest(db: &mut Connection, study: StudyId, before: Option<u32>, limit: u32) -> StoreResult<Vec<Trial>> {
     let rows = sqlx::query(
         "select * from (select * from trials where study_id = ? and (? is null or number < ?) \
@@ -241,10 +241,10 @@ pub async fn newest(db: &mut Connection, study: StudyId, before: Option<u32>, li
     rows.iter().map(from_row).collect()
 }
 
-/// Moves a trial to `running`.
+/// Sets the state to `running`.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn start(db: &mut Connection, id: TrialId) -> StoreResult<()> {
     sqlx::query("update trials set state = 'running', started_at = coalesce(started_at, ?) where id = ?")
         .bind(now())
@@ -254,10 +254,10 @@ pub async fn start(db: &mut Connection, id: TrialId) -> StoreResult<()> {
     Ok(())
 }
 
-/// Puts a trial back into the queue.
+/// Queues a trial again.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn requeue(db: &mut Connection, id: TrialId, message: &str) -> StoreResult<()> {
     sqlx::query("update trials set state = 'queued', message = ?, finished_at = null where id = ?")
         .bind(message)
@@ -267,13 +267,13 @@ pub async fn requeue(db: &mut Connection, id: TrialId, message: &str) -> StoreRe
     Ok(())
 }
 
-/// Writes how a trial ended.
+/// Records the end of a trial.
 ///
 /// # Errors
-/// A trigger's refusal when the trial already has a result, or what the database reports.
+/// A refusal by a trigger if the trial already has a result; errors of the database.
 pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreResult<()> {
     let figures = end.report.as_ref();
-    // A figure that is not a number stays out of the record (the column is null).
+    // A figure that is not finite is stored as null.
     let finite = |f: fn(&SolveReport) -> f64| figures.map(f).filter(|x| x.is_finite());
     let status = figures.map(|r| json::to_text("status", &r.status)).transpose()?;
     let report = figures.map(|r| json::readable("report", r)).transpose()?.flatten();
@@ -301,10 +301,10 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     Ok(())
 }
 
-/// Gives a trial that was just added to a script to evaluate.
+/// Assigns a new trial to a script.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn give_to(db: &mut Connection, id: TrialId, worker: &str) -> StoreResult<()> {
     sqlx::query("update trials set state = 'running', started_at = ?, asked_by = ? where id = ?")
         .bind(now())
@@ -315,10 +315,10 @@ pub async fn give_to(db: &mut Connection, id: TrialId, worker: &str) -> StoreRes
     Ok(())
 }
 
-/// The open trial of a study that a worker asked for.
+/// The open trial of a script in a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> StoreResult<Option<TrialId>> {
     let row = sqlx::query("select id from trials where study_id = ? and state = 'running' and asked_by = ?")
         .bind(study)
@@ -328,10 +328,10 @@ pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> Store
     Ok(row.map(|row| row.try_get(0)).transpose()?)
 }
 
-/// Writes what a script told of a trial.
+/// Records the outcome told by a script.
 ///
 /// # Errors
-/// A trigger's refusal when the trial already has a result, or what the database reports.
+/// A refusal by a trigger if the trial already has a result; errors of the database.
 pub async fn tell(db: &mut Connection, id: TrialId, told: &Told) -> StoreResult<()> {
     sqlx::query(
         "update trials set state = ?, gait_rmse_rad = ?, cost_of_transport = ?, message = ?, finished_at = ? \
@@ -348,23 +348,23 @@ pub async fn tell(db: &mut Connection, id: TrialId, told: &Told) -> StoreResult<
     Ok(())
 }
 
-/// How many trials of a study are in each state.
+/// Numbers of trials of a study by state.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
 pub struct TrialCounts {
-    /// All of them.
+    /// All trials.
     pub total: u32,
-    /// Queued or running.
+    /// Queued or running trials.
     pub open: u32,
-    /// Converged.
+    /// Converged trials.
     pub converged: u32,
-    /// Not converged.
+    /// Trials that did not converge.
     pub not_converged: u32,
-    /// Failed, lost or cancelled.
+    /// Failed, lost or cancelled trials.
     pub without_result: u32,
 }
 
 impl TrialCounts {
-    /// How many gave a result: how far a study is.
+    /// Number of trials with a result.
     pub fn results(&self) -> u32 {
         self.converged + self.not_converged
     }
@@ -373,7 +373,7 @@ impl TrialCounts {
 /// Counts the trials of a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCounts> {
     let row = sqlx::query(
         "with counted as (select state, count(*) as trials from trials where study_id = ? group by state) \
@@ -396,10 +396,10 @@ pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCou
     })
 }
 
-/// The converged trials of a study that were nearer to the reference than every one before them: number, Gait RMSE, rad.
+/// The converged trials of a study with a lower Gait RMSE than all earlier ones: number and Gait RMSE, rad.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn improvements(db: &mut Connection, study: StudyId) -> StoreResult<Vec<(u32, f64)>> {
     let rows = sqlx::query(
         "select number, gait_rmse_rad from (select number, gait_rmse_rad, \
@@ -412,19 +412,19 @@ pub async fn improvements(db: &mut Connection, study: StudyId) -> StoreResult<Ve
     rows.iter().map(|row| Ok((row.try_get(0)?, row.try_get(1)?))).collect()
 }
 
-/// How long solves took.
+/// Solve times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// How many were measured.
+    /// Number of solves.
     pub solves: usize,
     /// Median of their wall times, s.
     pub median_seconds: f64,
 }
 
-/// The newest solves, at most 200, with or without muscles; none before the first.
+/// The times of the newest solves, at most 200, with or without muscles; `None` before the first solve.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<Measured>> {
     let rows = sqlx::query(
         "select seconds_total from (select t.seconds_total from trials t join studies s on s.id = t.study_id \
@@ -438,7 +438,7 @@ pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<
     Ok(Some(Measured { solves: rows.len(), median_seconds: middle.try_get(0)? }))
 }
 
-/// A figure that says something of a gait: what it was when the solve gave up says nothing of one.
+/// A figure of a converged gait; `None` for other trials, whose last iterate is not a gait.
 pub(super) fn of_a_gait(row: &SqliteRow, state: TrialState, column: &str) -> StoreResult<Option<f64>> {
     let figure: Option<f64> = row.try_get(column)?;
     Ok(figure.filter(|_| state == TrialState::Converged))

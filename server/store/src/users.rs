@@ -1,4 +1,4 @@
-//! Users: people who sign in.
+//! Stored users.
 
 use super::{Connection, Instant, StoreError, StoreResult, UserId, now};
 use crate::rights::Role;
@@ -7,22 +7,22 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// A person who signs in.
+/// User.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct User {
     /// Identifier.
     pub id: UserId,
-    /// Name or code, unique whatever the case of its letters.
+    /// Name or code, unique ignoring case.
     pub name: String,
-    /// What the person is here.
+    /// Role.
     pub role: Role,
-    /// Whether a password was set; without one, one-time links are the only way in.
+    /// Whether the user has a password. Otherwise only one-time links work.
     pub has_password: bool,
-    /// When the person was shut out.
+    /// Time at which the user was disabled, if disabled.
     pub disabled_at: Option<Instant>,
-    /// When the row was written.
+    /// Time of creation.
     pub created_at: Instant,
-    /// argon2id, in PHC form.
+    /// The argon2id hash in PHC format.
     #[serde(skip)]
     pub password: Option<String>,
 }
@@ -33,7 +33,7 @@ pub const NAME_UNIQUE: &str = "users.name";
 /// Adds a user.
 ///
 /// # Errors
-/// A violated constraint ([`NAME_UNIQUE`]), or what the database reports.
+/// A violated constraint ([`NAME_UNIQUE`]); errors of the database.
 pub async fn insert(db: &mut Connection, name: &str, role: Role) -> StoreResult<User> {
     let user = User {
         id: UserId::fresh(),
@@ -57,7 +57,7 @@ pub async fn insert(db: &mut Connection, name: &str, role: Role) -> StoreResult<
 /// The user with this identifier.
 ///
 /// # Errors
-/// [`StoreError::Missing`], or what the database reports.
+/// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: UserId) -> StoreResult<User> {
     let row = sqlx::query("select * from users where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "user", id: id.to_string() })
@@ -66,7 +66,7 @@ pub async fn get(db: &mut Connection, id: UserId) -> StoreResult<User> {
 /// The user with this name.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn by_name(db: &mut Connection, name: &str) -> StoreResult<Option<User>> {
     let row = sqlx::query("select * from users where name = ?").bind(name).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
@@ -75,7 +75,7 @@ pub async fn by_name(db: &mut Connection, name: &str) -> StoreResult<Option<User
 /// Every user, oldest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn all(db: &mut Connection) -> StoreResult<Vec<User>> {
     let rows = sqlx::query("select * from users order by id").fetch_all(db).await?;
     rows.iter().map(from_row).collect()
@@ -84,16 +84,16 @@ pub async fn all(db: &mut Connection) -> StoreResult<Vec<User>> {
 /// Sets the password of a user.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set_password(db: &mut Connection, id: UserId, password: &str) -> StoreResult<()> {
     sqlx::query("update users set password = ? where id = ?").bind(password).bind(id).execute(db).await?;
     Ok(())
 }
 
-/// Gives a user another role.
+/// Changes the role of a user.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set_role(db: &mut Connection, id: UserId, role: Role) -> StoreResult<()> {
     sqlx::query("update users set role = ? where id = ?").bind(role.as_str()).bind(id).execute(db).await?;
     Ok(())
@@ -102,7 +102,7 @@ pub async fn set_role(db: &mut Connection, id: UserId, role: Role) -> StoreResul
 /// Shuts a user out, or lets the user in again.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set_disabled(db: &mut Connection, id: UserId, disabled: bool) -> StoreResult<()> {
     sqlx::query("update users set disabled_at = ? where id = ?").bind(disabled.then(now)).bind(id).execute(db).await?;
     Ok(())

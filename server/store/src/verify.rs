@@ -1,4 +1,4 @@
-//! The whole verification of a record: its file, its schema, its chains, every row of every table, and its anchors.
+//! Verifies a record: its file, schema, hash chains, every row, and its anchors.
 
 use super::anchor::{self, Ends};
 use super::{Connection, StoreError, StoreResult, audit, backup, migrations, seals};
@@ -7,22 +7,22 @@ use sqlx::{AssertSqlSafe, Connection as _, Row, SqliteConnection, SqlitePool};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// What is known of a whole record.
+/// The result for an intact record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Whole {
-    /// Rows of the audit trail, and the hash of the last one.
+    /// Number of rows of the audit trail, and the hash of the last one.
     pub audit: (u64, String),
-    /// Seals, and the hash of the last one; `None`: an older version wrote the record, which had none.
+    /// Number of seals, and the hash of the last one; `None` for a schema version without seals.
     pub seals: Option<(u64, String)>,
-    /// The anchors that there are, with what they have seen.
+    /// The existing anchors and the rows that they list.
     pub anchors: Vec<(PathBuf, Ends)>,
 }
 
 /// Verifies a record that another process may own.
 ///
 /// # Errors
-/// [`StoreError::Damaged`], [`StoreError::CutOff`] or [`StoreError::Rewritten`] with the first thing that is not as this
-/// program left it, or what the database reports.
+/// [`StoreError::Damaged`], [`StoreError::CutOff`] or [`StoreError::Rewritten`] with the first discrepancy; errors of
+/// the database.
 pub async fn file(record: &Path, anchors: &[PathBuf]) -> StoreResult<Whole> {
     let pool = backup::open_read_only(record).await?;
     let found = verify_pool(&pool, record, anchors).await;
@@ -34,7 +34,7 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
     let damaged = |reason: String| StoreError::Damaged { what: "evidence", reason };
     backup::check_open(pool).await?;
     let version = migrations::check_version(pool, record).await?;
-    // One state for all that is compared.
+    // One consistent state for all comparisons.
     let mut db = pool.begin().await?;
     schema(&mut db, version).await?;
     let audit = match audit::verify(&mut db).await? {
@@ -46,7 +46,7 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
         seals::SealCheck::None => None,
         seals::SealCheck::Broken { seq } => return Err(damaged(format!("the seals are broken at number {seq}"))),
         seals::SealCheck::Touched { table, key } => {
-            return Err(damaged(format!("row {key} of {table} is not as this program wrote it")));
+            return Err(damaged(format!("row {key} of {table} was changed, added or deleted outside the program")));
         }
     };
     sequences(&mut db).await?;
@@ -63,7 +63,7 @@ async fn verify_pool(pool: &SqlitePool, record: &Path, anchors: &[PathBuf]) -> S
     Ok(Whole { audit, seals, anchors: seen })
 }
 
-/// Tables, indices, triggers and views are those that the migrations make: a trigger that is gone no longer protects.
+/// Checks that tables, indices, triggers and views match the migrations, because a missing trigger protects nothing.
 async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     let options = SqliteConnectOptions::new().filename(":memory:");
     let mut fresh = SqliteConnection::connect_with(&options).await?;
@@ -73,21 +73,21 @@ async fn schema(db: &mut Connection, version: i64) -> StoreResult<()> {
     match expected.symmetric_difference(&found).next() {
         None => Ok(()),
         Some((kind, name, ..)) => {
-            let reason = format!("{kind} {name} of the schema is not as this program made it");
+            let reason = format!("{kind} {name} of the schema differs from the one that this program creates");
             Err(StoreError::Damaged { what: "evidence", reason })
         }
     }
 }
 
-/// Kind, name, table and text of each part of a schema. The text of the list of migrations comes from a library: the tests of
-/// upgrades notice when a version of it writes another one.
+/// Kind, name, table and text of each part of a schema. A library writes the list of migrations; the tests of upgrades
+/// detect if a version of it changes the text.
 async fn parts(db: &mut Connection) -> StoreResult<BTreeSet<(String, String, String, Option<String>)>> {
     let sql = "select type, name, tbl_name, sql from sqlite_master";
     Ok(sqlx::query_as(sql).fetch_all(db).await?.into_iter().collect())
 }
 
-/// The database counts the rows that it ever gave a number to: no table has a later one, and a table of which nothing may be
-/// deleted has this one.
+/// Checks the largest sequence numbers that SQLite keeps: no table has a larger one, and append-only tables have
+/// exactly this one.
 async fn sequences(db: &mut Connection) -> StoreResult<()> {
     for row in sqlx::query("select name, seq from sqlite_sequence").fetch_all(&mut *db).await? {
         let (table, counted): (String, i64) = (row.try_get(0)?, row.try_get(1)?);
@@ -95,7 +95,7 @@ async fn sequences(db: &mut Connection) -> StoreResult<()> {
             || seals::CHECKED.iter().any(|checked| checked.table == table)
             || seals::NOT_SEALED.contains(&table.as_str());
         let damaged =
-            || StoreError::Damaged { what: "evidence", reason: format!("the count of rows of {table} is wrong") };
+            || StoreError::Damaged { what: "evidence", reason: format!("the number of rows of {table} is wrong") };
         if !is_known {
             return Err(damaged());
         }

@@ -1,15 +1,15 @@
-//! Files that get their name when they are whole, checked and on the disk. Until then they are hidden beside it.
+//! Files that get their final name only when they are complete and on the disk. Until then they are hidden.
 
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Ending of a file that is not whole yet.
+/// Suffix of an incomplete file.
 const PART: &str = ".copying";
-/// What SQLite keeps beside a database while it writes one.
+/// SQLite's companion files.
 const COMPANIONS: [&str; 3] = ["-journal", "-wal", "-shm"];
 
-/// A file that is being written. Dropped before it is kept, it is removed.
+/// An incomplete file. Dropping it deletes the file.
 #[derive(Debug)]
 pub(crate) struct WholeFile {
     part: PathBuf,
@@ -18,8 +18,8 @@ pub(crate) struct WholeFile {
 }
 
 impl WholeFile {
-    /// Begins an empty file beside `target`, for its owner alone. Removes the parts of `family` that killed processes left:
-    /// hidden files whose name begins with it.
+    /// Creates an empty hidden file next to `target`, readable by its owner only. Deletes hidden files of killed
+    /// processes whose names start with `family`.
     pub(crate) fn begin(target: &Path, family: &str) -> io::Result<Self> {
         let folder = folder_of(target);
         remove_left_over(folder, family);
@@ -28,7 +28,7 @@ impl WholeFile {
             let part = folder.join(format!(".{name}.{}-{number}{PART}", std::process::id()));
             match private().write(true).read(true).create_new(true).open(&part) {
                 Ok(file) => {
-                    // While this process lives. Where files cannot be locked, parts stay until somebody removes them.
+                    // Locked while this process lives. Without file locks, leftovers must be deleted by hand.
                     let _ = file.try_lock();
                     return Ok(Self { part, file, kept: false });
                 }
@@ -39,17 +39,17 @@ impl WholeFile {
         Err(io::ErrorKind::AlreadyExists.into())
     }
 
-    /// Where it is until it is kept.
+    /// The hidden path.
     pub(crate) fn part(&self) -> &Path {
         &self.part
     }
 
-    /// To write with.
+    /// The file, for writing.
     pub(crate) fn file(&mut self) -> &mut File {
         &mut self.file
     }
 
-    /// Gives it its name. A file that has the name already stays, and this one is removed.
+    /// Gives the file its final name. If that name is taken, the existing file stays and this one is deleted.
     pub(crate) fn keep_as(mut self, target: &Path) -> io::Result<()> {
         self.file.sync_all()?;
         rename_to_new(&self.part, target)?;
@@ -57,7 +57,7 @@ impl WholeFile {
         sync_folder(target)
     }
 
-    /// Gives it its name, also where another file has it; that one is gone then.
+    /// Gives the file its final name, and replaces an existing file.
     pub(crate) fn replace(mut self, target: &Path) -> io::Result<()> {
         self.file.sync_all()?;
         std::fs::rename(&self.part, target)?;
@@ -74,9 +74,9 @@ impl Drop for WholeFile {
     }
 }
 
-/// For a file that its owner alone may read.
+/// Options for a file that only its owner can read.
 pub(crate) fn private() -> OpenOptions {
-    #[allow(unused_mut, reason = "not where there are no permissions of this kind")]
+    #[allow(unused_mut, reason = "only mutated on Unix")]
     let mut options = OpenOptions::new();
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
@@ -104,14 +104,14 @@ fn remove_left_over(folder: &Path, family: &str) {
         let Some(name) = name.to_str().filter(|name| name.starts_with(&start)) else { continue };
         let name = COMPANIONS.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name);
         let part = folder.join(name);
-        // Without the part itself, its companion belongs to nobody.
+        // A companion file without its part is a leftover.
         if name.ends_with(PART) && File::open(&part).map_or(true, |part| part.try_lock().is_ok()) {
             remove(&part);
         }
     }
 }
 
-/// Removes a part and its companions. What cannot be removed now is removed as a left-over later.
+/// Deletes a part and its companions. A failure is handled as a leftover later.
 fn remove(part: &Path) {
     for ending in std::iter::once("").chain(COMPANIONS) {
         let mut name = part.as_os_str().to_owned();
@@ -126,7 +126,7 @@ fn rename_to_new(part: &Path, target: &Path) -> io::Result<()> {
         use rustix::fs::{CWD, RenameFlags, renameat_with};
         use rustix::io::Errno;
         match renameat_with(CWD, part, CWD, target, RenameFlags::NOREPLACE) {
-            // Not on every file system.
+            // Some file systems do not support this.
             Err(Errno::INVAL | Errno::NOSYS) => {}
             done => return Ok(done?),
         }
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_gets_its_name_only_when_it_is_kept_and_never_takes_one_in_use() {
+    fn file_gets_its_name_only_when_kept_and_never_replaces_another() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("a.db.backup-1");
         let mut first = WholeFile::begin(&target, "a.db").unwrap();
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_killed_processes_are_removed_and_those_in_use_stay() {
+    fn leftovers_of_killed_processes_are_deleted_but_not_files_in_use() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("a.db.backup-2");
         std::fs::write(folder.path().join(".a.db.backup-1.77-0.copying"), "half").unwrap();

@@ -1,8 +1,8 @@
-//! The one connection that writes.
+//! The only writing connection, with group commit.
 //!
-//! Making a change durable means waiting for the disk, which takes far longer than the change itself. Changes that
-//! are ready while the disk is busy are therefore made durable together: each is a savepoint of its own within one
-//! transaction, and each is acknowledged only when that transaction is on the disk.
+//! Waiting for the disk takes far longer than a change itself. Changes that are ready while the disk is busy are
+//! therefore committed together: each is a savepoint within one transaction, and is acknowledged only when that
+//! transaction is on the disk.
 
 use super::anchor::{self, Anchors};
 use super::files::Files;
@@ -16,19 +16,19 @@ use tokio::sync::{Notify, OwnedMappedMutexGuard, OwnedMutexGuard, watch};
 use tokio::task::JoinHandle;
 use tokio_util::task::AbortOnDropHandle;
 
-/// The connection; `None`: closed. Whoever waits for it gets it in the order of asking.
+/// The connection, which is lent in the order of requests; `None` after closing.
 type Line = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
 
 /// A log with so many frames goes into the database file.
 const LONGEST_LOG: u32 = 1000;
 
-/// Pause before the making durable is begun again.
+/// Pause before a restart of the flushing task.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// How the disk answered for a group of changes; `None`: not yet.
+/// The result of a group commit; `None` until it is known.
 type Outcome = Option<Result<(), Arc<StoreError>>>;
 
-/// The writing connection, and what makes its changes durable.
+/// The writing connection and the task that commits its changes.
 #[derive(Debug)]
 pub(super) struct Writing {
     line: Line,
@@ -36,7 +36,7 @@ pub(super) struct Writing {
     flusher: JoinHandle<()>,
 }
 
-/// A change: everything in it happens, or nothing. Dropped without [`super::commit`], it leaves no trace.
+/// An atomic change. Dropping it without [`super::commit`] rolls it back.
 #[derive(Debug)]
 pub struct Writer {
     connection: OwnedMappedMutexGuard<Option<SqliteConnection>, SqliteConnection>,
@@ -46,19 +46,19 @@ pub struct Writer {
 #[derive(Debug)]
 struct Shared {
     state: Mutex<State>,
-    /// A change ended: what is there is to be made durable.
+    /// Signals that a change has ended and must be committed.
     ended: Notify,
     space: Space,
-    /// What is outside the database.
+    /// Checks and anchors outside the database.
     outside: Outside,
 }
 
-/// What is outside the database and has a say in its changes; none of it: nobody asks.
+/// Checks and anchors outside the database, which take part in commits.
 #[derive(Debug, Default)]
 pub(super) struct Outside {
-    /// The files, which must be those that were opened.
+    /// The files of the record, which must not be replaced.
     pub(super) files: Option<Arc<Files>>,
-    /// What holds the newest hashes.
+    /// The anchors.
     pub(super) anchors: Option<Anchors>,
 }
 
@@ -67,7 +67,7 @@ impl Outside {
         self.files.as_ref().map_or(Ok(()), |files| files.check())
     }
 
-    /// [`Self::check`], and reads back what the commit wrote: how many frames the log has.
+    /// [`Self::check`], and verifies the log after a commit. Returns the number of frames.
     async fn check_log(&self, connection: &mut SqliteConnection) -> StoreResult<u32> {
         let frames = log_frames(connection).await?;
         self.files.as_ref().map_or(Ok(()), |files| files.check_log(frames))?;
@@ -75,17 +75,17 @@ impl Outside {
     }
 }
 
-/// Changes only while the connection is held.
+/// Changed only while the connection is held.
 #[derive(Debug, Default)]
 struct State {
-    /// A transaction is open; whoever has a change in it waits for its outcome.
+    /// The open transaction, on whose outcome its changes wait.
     group: Option<watch::Sender<Outcome>>,
-    /// A change was begun and did not end yet.
+    /// Whether a change has begun and not ended.
     begun: bool,
 }
 
 impl Writing {
-    /// Over a connection that nobody else writes with.
+    /// Takes over a connection that nothing else writes with.
     pub(super) fn new(connection: SqliteConnection, space: Space, outside: Outside) -> Self {
         let line = Line::new(Some(connection).into());
         let shared = Arc::new(Shared { state: Mutex::default(), ended: Notify::new(), space, outside });
@@ -98,14 +98,14 @@ impl Writing {
         &self.shared.space
     }
 
-    /// Begins a change when those before it have ended.
+    /// Begins a change after all earlier ones have ended.
     pub(super) async fn begin(&self) -> StoreResult<Writer> {
         let (line, shared) = (Arc::clone(&self.line), Arc::clone(&self.shared));
-        // A task of its own: whoever asked may go away between two statements, which belong together.
+        // A separate task, because the caller may go away between two statements that belong together.
         tokio::spawn(begin(line, shared)).await.map_err(|_| StoreError::Closed)?
     }
 
-    /// Makes durable what is there, and closes the connection.
+    /// Commits all changes and closes the connection.
     pub(super) async fn close(&self) {
         let mut line = self.line.lock().await;
         if let Some(mut connection) = line.take() {
@@ -114,12 +114,12 @@ impl Writing {
                 anchors.sync();
             }
             if self.shared.outside.check_log(&mut connection).await.is_err() {
-                // Closing would write a log with a hole in it into the database file.
+                // Closing would merge a damaged log into the database file.
                 std::mem::forget(connection);
                 return;
             }
             if let Err(error) = connection.close().await {
-                tracing::warn!(%error, "closing the database");
+                tracing::warn!(%error, "cannot close the database");
             }
         }
     }
@@ -132,7 +132,7 @@ impl Drop for Writing {
 }
 
 impl Writer {
-    /// Refuses where less space is free than is kept in reserve: whoever begins something large asks.
+    /// Fails if less space is free than the reserve. To be called before starting something large.
     ///
     /// # Errors
     /// [`StoreError::NearlyFull`].
@@ -140,7 +140,7 @@ impl Writer {
         self.shared.space.room()
     }
 
-    /// Ends the change and waits until the disk has it.
+    /// Ends the change and waits until it is on the disk.
     pub(super) async fn commit(self) -> StoreResult<()> {
         let ended = tokio::spawn(async move {
             let mut writer = self;
@@ -178,11 +178,11 @@ impl DerefMut for Writer {
 
 impl Shared {
     fn state(&self) -> MutexGuard<'_, State> {
-        // The state is whole between any two statements that hold the lock.
+        // The state is consistent between statements, so a poisoned lock is usable.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes back a change that was begun and dropped.
+    /// Rolls back a dropped change.
     async fn take_back(&self, connection: &mut SqliteConnection) {
         if !self.state().begun {
             return;
@@ -193,12 +193,12 @@ impl Shared {
         };
         match taken_back {
             Ok(()) => self.state().begun = false,
-            // The database gave up the whole transaction, as it does when the disk is full.
+            // SQLite rolled back the whole transaction, as it does when the disk is full.
             Err(error) => self.give_up(connection, &error).await,
         }
     }
 
-    /// Makes the open transaction durable and tells everybody who waits for it.
+    /// Commits the open transaction, and notifies all waiting changes.
     async fn flush(&self, connection: &mut SqliteConnection) {
         self.take_back(connection).await;
         if self.state().group.is_none() {
@@ -215,16 +215,16 @@ impl Shared {
         }
     }
 
-    /// How many frames the log has afterwards.
+    /// Returns the number of frames of the log.
     async fn make_durable(&self, connection: &mut SqliteConnection) -> StoreResult<u32> {
         let anchored = match &self.outside.anchors {
             Some(anchors) => Some((anchors, anchor::ends(connection).await?)),
             None => None,
         };
-        // The commit makes a log that was cut as long as before, with a hole in it: its length tells nothing afterwards.
+        // Check before the commit, which would restore the length of a truncated log and hide the loss.
         self.outside.check()?;
         run(connection, "commit").await?;
-        // A change that went into a deleted file, or into a log that was cut meanwhile, must not be acknowledged.
+        // A change that was written to a deleted file or a truncated log must not be acknowledged.
         let frames = self.outside.check_log(connection).await?;
         if let Some((anchors, ends)) = anchored {
             anchors.write(&ends);
@@ -233,20 +233,19 @@ impl Shared {
     }
 
     async fn give_up(&self, connection: &mut SqliteConnection, error: &StoreError) {
-        // Fails when the database did so already.
+        // Fails if SQLite has already rolled back.
         let _ = run(connection, "rollback").await;
         self.save(connection, error).await;
         self.tell(Err(Arc::new(error.for_all())));
     }
 
-    /// A log that has no name any more is lost with the process. As long as the database file is there, what is in the log
-    /// can go where it belongs.
+    /// Saves the content of a deleted log to the database file, because it would be lost with the process.
     async fn save(&self, connection: &mut SqliteConnection, error: &StoreError) {
         let vanished = matches!(error, StoreError::RecordVanished { .. });
         let Ok(frames) = log_frames(connection).await else { return };
         if vanished && self.outside.files.as_ref().is_some_and(|files| files.log_is_to_be_saved(frames)) {
             fold(connection).await;
-            tracing::warn!("what was in the write-ahead log was written into the database file");
+            tracing::warn!("the content of the write-ahead log was saved to the database file");
         }
     }
 
@@ -279,20 +278,20 @@ async fn begin(line: Line, shared: Arc<Shared>) -> StoreResult<Writer> {
     Ok(Writer { connection, shared })
 }
 
-/// Begins [`keep_flushing`] again where it panicked: every change waits for it.
+/// Restarts [`keep_flushing`] after a panic, because every change waits for it.
 async fn supervise_flushing(line: Line, shared: Arc<Shared>) {
     loop {
         let flushing = keep_flushing(Arc::clone(&line), Arc::clone(&shared));
         match AbortOnDropHandle::new(tokio::spawn(flushing)).await {
             Ok(()) => return,
-            Err(error) => tracing::error!(%error, "making changes durable failed; it is begun again"),
+            Err(error) => tracing::error!(%error, "committing changes failed; restarting"),
         }
         shared.ended.notify_one();
         tokio::time::sleep(PAUSE).await;
     }
 }
 
-/// Makes changes durable as they end: those that stand in line by then come first, and into the same transaction.
+/// Commits changes as they end. Changes that are already waiting join the same transaction.
 async fn keep_flushing(line: Line, shared: Arc<Shared>) {
     loop {
         shared.ended.notified().await;
@@ -303,16 +302,16 @@ async fn keep_flushing(line: Line, shared: Arc<Shared>) {
     }
 }
 
-/// Frames in the write-ahead log.
+/// Number of frames in the write-ahead log.
 async fn log_frames(connection: &mut SqliteConnection) -> StoreResult<u32> {
     let row = sqlx::query("pragma wal_checkpoint(noop)").fetch_one(connection).await?;
     Ok(row.try_get("log")?)
 }
 
-/// Writes the log into the database file.
+/// Merges the log into the database file.
 async fn fold(connection: &mut SqliteConnection) {
     if let Err(error) = run(connection, "pragma wal_checkpoint(passive)").await {
-        tracing::error!(%error, "the write-ahead log cannot be written into the database file");
+        tracing::error!(%error, "cannot save the write-ahead log to the database file");
     }
 }
 
@@ -341,14 +340,14 @@ mod tests {
         sqlx::query("insert into t (x) values (?)").bind(x).execute(&mut **writer).await.map(drop)
     }
 
-    /// What another connection sees: what is durable.
+    /// The rows that another connection sees.
     async fn rows(file: &std::path::Path) -> Vec<i64> {
         let rows = sqlx::query("select x from t order by x").fetch_all(&mut open(file).await).await.unwrap();
         rows.iter().map(|row| row.get(0)).collect()
     }
 
     #[tokio::test]
-    async fn a_change_is_there_for_others_when_it_is_acknowledged_and_a_dropped_one_never() {
+    async fn acknowledged_change_is_visible_and_dropped_change_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.db");
         let writing = table(&file).await;
@@ -369,7 +368,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn many_at_once_all_happen_and_those_that_fail_take_nothing_with_them() {
+    async fn parallel_changes_all_happen_and_failed_ones_affect_no_others() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.db");
         let writing = Arc::new(table(&file).await);
@@ -389,13 +388,13 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn whoever_shares_a_transaction_that_the_database_gives_up_is_told_so() {
+    async fn all_changes_of_a_rolled_back_transaction_fail() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.db");
         let writing = table(&file).await;
         let mut first = writing.begin().await.unwrap();
         insert(&mut first, 1).await.unwrap();
-        // As when the disk is full: the whole transaction is gone.
+        // As when the disk is full, the whole transaction is rolled back.
         run(&mut first, "rollback").await.unwrap();
         assert!(first.commit().await.is_err());
         let mut second = writing.begin().await.unwrap();

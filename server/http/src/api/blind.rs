@@ -156,8 +156,8 @@ pub(super) async fn answer(
     once.finish(&app, writer, StatusCode::CREATED, None, &answered).await
 }
 
-/// `GET /studies/{id}/raters`: agreement with themselves, position bias of those who were unblinded, answers that were not
-/// blind.
+/// `GET /studies/{id}/raters`: agreement with themselves, position bias of those who were unblinded, answers that were
+/// not blind.
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",

@@ -49,8 +49,8 @@ pub(super) async fn of_study(
     answer(&mut app, figures, file).await
 }
 
-/// `GET /trials/{id}/figures/{file}`: those of the page of a gait; while its solve runs, how far that is. With another trial
-/// beside it, the joint angles of both.
+/// `GET /trials/{id}/figures/{file}`: those of the page of a gait; while its solve runs, how far that is. With another
+/// trial beside it, the joint angles of both.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",

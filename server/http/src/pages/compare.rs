@@ -307,7 +307,7 @@ impl Said {
 impl Submitted {
     fn read(&self) -> Result<(Said, FeedbackId), Error> {
         let source = Source::from_str(&self.source)
-            .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician, script"))?;
+            .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
         let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
         let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
         let preference = |answer| {

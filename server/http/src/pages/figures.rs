@@ -97,7 +97,7 @@ impl Best {
 /// The paper's figures of a study, with another one beside it where that is asked for.
 ///
 /// # Errors
-/// A conflict when the subject of one of them withdrew, [`Error::NotFound`], or what the database reports.
+/// A conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
 pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
     let mut shown = vec![Best::read(app, id).await?];
     if let Some(other) = other.filter(|other| *other != id) {
@@ -158,7 +158,7 @@ fn sections(shown: &[Best], reference: &ReferenceGait) -> Result<Vec<Section>, E
 /// Every figure of the page of a gait; while its solve runs, how far that is.
 ///
 /// # Errors
-/// [`Error::NotFound`], or what the database reports.
+/// [`Error::NotFound`]; errors of the database.
 pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figure>, Error> {
     if let Some(running) = app.scheduler.board().track(id) {
         return Ok(gait_charts::solve(&running.records).into_iter().collect());
@@ -185,7 +185,7 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
 /// The joint angles of two gaits of a study, as on the page that compares them.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] for a trial of another study, or what the database reports.
+/// [`Error::NotFound`], [`Error::Invalid`] for a trial of another study; errors of the database.
 pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, a).await?;
@@ -219,7 +219,7 @@ pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
 /// Every figure of a lab session.
 ///
 /// # Errors
-/// [`Error::NotFound`], or what the database reports.
+/// [`Error::NotFound`]; errors of the database.
 pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<Vec<Figure>, Error> {
     let (emg, cycles) = (lab::emg(app.store_mut(), id).await?, measured_cycles(app.store_mut(), id).await?);
     let mut reader = app.read().await?;

@@ -21,6 +21,6 @@ pub(super) async fn list() -> Page {
 
 /// `GET /problems/{name}`.
 pub(super) async fn get(Path(name): Path<String>) -> Page {
-    let kind = Kind::named(&name).ok_or(Error::NotFound { what: "the kind of problem".to_owned(), id: name })?;
+    let kind = Kind::named(&name).ok_or(Error::NotFound { what: "kind of problem".to_owned(), id: name })?;
     page(&ProblemsPage { entries: vec![kind.entry()], one: true })
 }

@@ -1,6 +1,6 @@
-//! Sign-in back-off: each failed attempt doubles the wait before the next password of the same name from the same source
-//! is compared. Others who sign in by that name from elsewhere do not wait, so that nobody can be kept out. Counts are in
-//! the record: a restart forgets none, and none gives way to fresh names.
+//! Sign-in back-off: each failed attempt doubles the wait before another password for the same name and network is
+//! checked. Other networks are not affected, so an attacker cannot lock a user out. Counts are in the record, so they
+//! survive a restart.
 
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
@@ -9,23 +9,23 @@ use gaitwright_store::{Instant, UserId, Writer};
 use serde_json::json;
 use std::time::Duration;
 
-/// Failures that cost nothing: people mistype.
+/// Number of failures without a wait, because people mistype.
 const FREE: u32 = 3;
 /// The longest wait.
 const LONGEST: Duration = Duration::from_mins(15);
-/// Names of one network that have a count each in a day; the others share one.
+/// Number of names of one network that are counted separately; further names share a count.
 const MOST_NAMES: u32 = 1000;
-/// Failures are remembered for so long after the last one.
+/// Time after the last failure until failures are forgotten.
 const REMEMBERED_SECONDS: i64 = 24 * 3600;
-/// Stands for the names that share a count; no name has a line break.
+/// Key of the shared count. No name contains a line break.
 const OTHER_NAMES: &str = "\n";
 
-/// Where somebody signs in from.
+/// Where a sign-in comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Origin {
     /// The network of the client.
     pub network: String,
-    /// The user who signed in before in the same browser: others in the same network do not make this one wait.
+    /// The user who signed in earlier in the same browser. Failures of others in the network do not affect this user.
     pub known: Option<UserId>,
 }
 
@@ -38,7 +38,7 @@ impl Origin {
     }
 }
 
-/// An attempt whose password may be compared.
+/// An attempt whose password may be checked.
 #[derive(Debug)]
 #[must_use]
 pub struct Attempt {
@@ -48,12 +48,11 @@ pub struct Attempt {
     attempts: u32,
 }
 
-/// Begins an attempt, which counts as failed until it has succeeded: many at once, and those that are broken off, are as
-/// many as one after the other. `Err` of the inner result: how long this name must still wait here. Either is to be
-/// committed.
+/// Begins an attempt, which counts as failed until it succeeds, so that parallel and aborted attempts count too. The
+/// inner `Err` is the remaining wait. The caller must commit in both cases.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn begin(
     writer: &mut Writer,
     now: Instant,
@@ -83,10 +82,10 @@ pub async fn begin(
 }
 
 impl Attempt {
-    /// The password was wrong: the wait begins now.
+    /// Records a wrong password and starts the wait.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn failed(self, writer: &mut Writer, now: Instant) -> Result<(), Error> {
         let source = self.origin.source();
         let count = failures::find(writer, &self.counted_as, &source).await?.map_or(1, |found| found.count);
@@ -94,17 +93,17 @@ impl Attempt {
         note(writer, "session.refuse", &self.name, &self.origin, self.attempts).await
     }
 
-    /// The password was right.
+    /// Records a correct password and clears the count.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn succeeded(self, writer: &mut Writer) -> Result<(), Error> {
         failures::forget(writer, &self.counted_as, &self.origin.source()).await?;
         Ok(failures::uncount(writer, &self.origin.network).await?)
     }
 }
 
-/// As counted and shown: whatever the case of its letters, without what no name has.
+/// Normalises a name for counting: lower case, without characters that names cannot have.
 fn normal(name: &str) -> String {
     name.to_lowercase().chars().filter(|c| !c.is_control()).take(80).collect()
 }
@@ -114,8 +113,8 @@ async fn set(writer: &mut Writer, name: &str, source: &str, now: Instant, count:
     Ok(failures::set(writer, name, source, now, Failures { count, waits_until }).await?)
 }
 
-/// A row of the audit trail for the first attempts of a network, and then for every 10th, 20th, 50th, 100th and so on:
-/// who sends thousands does not fill the trail, and their number is there.
+/// Writes a row of the audit trail for the first attempts of a network, then for the 10th, 20th, 50th, 100th and so on,
+/// so that thousands of attempts do not fill the trail.
 async fn note(writer: &mut Writer, action: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
     if !is_noted(attempts) {
         return Ok(());
@@ -124,7 +123,7 @@ async fn note(writer: &mut Writer, action: &str, name: &str, origin: &Origin, at
     Ok(audit::append(writer, &Actor::anonymous(), action, "session", &detail).await?)
 }
 
-/// Forgets what is a day old; the number of attempts stays in the audit trail.
+/// Deletes counts that are a day old. The audit trail keeps the number of attempts.
 async fn prune(writer: &mut Writer, now: Instant) -> Result<(), Error> {
     for source in failures::prune(writer, now.plus_seconds(-REMEMBERED_SECONDS)).await? {
         let detail = json!({
@@ -165,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn thirty_thousand_attempts_leave_some_rows_and_their_number() {
+    fn thirty_thousand_attempts_leave_few_rows_with_their_number() {
         let noted: Vec<u32> = (1..=30_000).filter(|attempts| is_noted(*attempts)).collect();
         assert_eq!(noted.len(), 16);
         assert_eq!(noted.last(), Some(&20_000));

@@ -1,4 +1,4 @@
-//! Who makes a request.
+//! The caller of a request: a user, a token or nobody, with rights and accessible studies.
 
 use gaitwright_store::audit::Actor;
 use gaitwright_store::feedback::Source;
@@ -6,14 +6,14 @@ use gaitwright_store::reach::{Principal, Reach};
 use gaitwright_store::rights::{Right, Rights, Role};
 use gaitwright_store::{TokenId, UserId};
 
-/// Who makes a request, and what they may do.
+/// The caller of a request and its rights.
 #[derive(Debug, Clone)]
 pub struct Caller {
-    /// As written into the audit trail.
+    /// The actor in the audit trail.
     pub actor: Actor,
     /// Name shown to people.
     pub name: String,
-    /// The user, unless it is a token or nobody signed in.
+    /// The user, unless the caller is a token or not signed in.
     pub user: Option<UserId>,
     /// The role of the user.
     pub role: Option<Role>,
@@ -22,7 +22,7 @@ pub struct Caller {
 }
 
 impl Caller {
-    /// A person who signed in.
+    /// A signed-in user.
     pub fn person(id: UserId, name: &str, role: Role) -> Self {
         let principal = Principal::User(id);
         Self {
@@ -39,7 +39,7 @@ impl Caller {
         }
     }
 
-    /// A program with a token. One that may compare gaits blindly and nothing else is a rater.
+    /// A program with a token. A token with the scope `rate` only is a rater.
     pub fn token(id: TokenId, name: &str, scopes: &[Right]) -> Self {
         let principal = Principal::Token(id);
         let rates_only = scopes.iter().all(|scope| *scope == Right::Rate);
@@ -53,7 +53,7 @@ impl Caller {
         }
     }
 
-    /// Whoever reaches a service that asks nobody to sign in.
+    /// Any caller of a service without sign-in.
     pub fn without_sign_in() -> Self {
         let actor = Actor::anonymous();
         Self {
@@ -66,27 +66,27 @@ impl Caller {
         }
     }
 
-    /// Whether it may; none: what asks for no right.
+    /// Whether the caller has a right; `None` needs none.
     pub fn may(&self, right: impl Into<Option<Right>>) -> bool {
         right.into().is_none_or(|right| self.rights.has(right))
     }
 
-    /// Which studies it reaches.
+    /// The studies that the caller can access.
     pub fn reach(&self) -> Reach {
         self.reach
     }
 
-    /// Whether it is the device in the lab: a program that can fetch controller files and nothing else.
+    /// Whether the caller is the device in the lab: a token with the scope `device` only.
     pub fn is_device(&self) -> bool {
         self.user.is_none() && self.is_known() && self.rights.is_only(Right::Device)
     }
 
-    /// Whether the name is known: then it, and not what a form says, is the author of what is said.
+    /// Whether the caller has a name, which then is the author of its answers.
     pub fn is_known(&self) -> bool {
         self.role.is_some() || self.actor != Actor::anonymous()
     }
 
-    /// Where an answer of this caller comes from when it does not say so itself.
+    /// The default source of this caller's answers.
     pub fn source(&self) -> Source {
         match self.role {
             Some(Role::Rater) => Source::Subject,

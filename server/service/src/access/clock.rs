@@ -1,5 +1,5 @@
-//! The clock that access is decided by. It never runs backwards, so that a session or token that has ended stays ended
-//! when the machine's clock is set back.
+//! The clock for sessions and tokens. It never runs backwards, so that they stay expired when the machine's clock is
+//! set back.
 
 use crate::error::Error;
 use gaitwright_store::{Connection, Instant, clock};
@@ -7,24 +7,24 @@ use std::fmt;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant as Steady;
 
-/// The machine's clock, or the latest instant that was seen and the time that has passed since: whichever is later.
+/// The later of the machine's clock and the latest known instant plus the time passed since.
 pub struct Clock {
     machine: Box<dyn Fn() -> Instant + Send + Sync>,
-    /// The latest instant, and when it was seen by a clock that nobody sets.
+    /// The latest instant, and the monotonic time at which it was read.
     latest: Mutex<(Instant, Steady)>,
 }
 
 impl Clock {
-    /// Over another clock than the machine's.
+    /// Uses another clock in place of the machine's.
     pub fn over(machine: impl Fn() -> Instant + Send + Sync + 'static) -> Self {
         let latest = Mutex::new((machine(), Steady::now()));
         Self { machine: Box::new(machine), latest }
     }
 
-    /// The present instant; not before the latest one in the record.
+    /// The current instant, never before the latest one in the record.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn now(&self, db: &mut Connection) -> Result<Instant, Error> {
         let recorded = clock::latest(db).await?;
         Ok(self.at_least(recorded))
@@ -55,10 +55,10 @@ impl fmt::Debug for Clock {
     }
 }
 
-/// The machine's clock, or the latest instant in the record: whichever is later.
+/// The later of the machine's clock and the latest instant in the record.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn recorded(db: &mut Connection) -> Result<Instant, Error> {
     let latest = clock::latest(db).await?;
     Ok(latest.map_or_else(gaitwright_store::now, |latest| latest.max(gaitwright_store::now())))

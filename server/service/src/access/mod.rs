@@ -1,7 +1,7 @@
-//! Access: who is there, and what they may do. Says nothing of HTTP.
+//! Access control: users, roles, tokens, sessions, passwords and rights. Knows nothing of HTTP.
 //!
-//! People sign in with a one-time link or a password and have a role; programs of the lab carry a token and have
-//! scopes. Either gives [`Rights`], the only thing that is ever asked for.
+//! Users sign in with a one-time link or a password and have a role. Programs send a token with scopes. Both give
+//! [`Rights`], which every check uses.
 
 pub mod back_off;
 mod caller;

@@ -1,15 +1,15 @@
-//! Which passwords are refused: short ones, and long ones that are guessed like short ones.
+//! The password policy: refuses passwords that are short or easy to guess.
 
 use crate::error::Error;
 
-/// Shortest password, characters.
+/// Minimum length, characters.
 pub const SHORTEST: usize = 10;
-/// Longest password, bytes.
+/// Maximum length, bytes.
 const LONGEST_BYTES: usize = 1000;
-/// Characters that are left when everything predictable counts for as little as it adds.
+/// Minimum number of unpredictable characters.
 const LEAST_UNPREDICTABLE: usize = 8;
 
-/// Parts of passwords that are tried first. Lower case, without digits in place of letters.
+/// Common parts of passwords, in lower case and without digits in place of letters.
 const COMMON: &[&str] = &[
     "aaliyah",
     "abc",
@@ -189,7 +189,7 @@ const COMMON: &[&str] = &[
     "zaqwsx",
 ];
 
-/// Rows of keyboards, and keys that are struck one beside the other.
+/// Sequences of neighbouring keys.
 const KEYBOARD: &[&str] = &[
     "qwertyuiop",
     "qwertzuiop",
@@ -206,25 +206,25 @@ const KEYBOARD: &[&str] = &[
     "!\"§$%&/()=",
 ];
 
-/// Refuses a password that is short, long beyond reason, or predictable to somebody who knows the name of its user.
+/// Refuses a password that is too short, too long, or predictable for somebody who knows the name of the user.
 ///
 /// # Errors
-/// [`Error::Invalid`]; it does not hold the password.
+/// [`Error::Invalid`], which does not contain the password.
 pub fn check(password: &str, name: &str) -> Result<(), Error> {
     let length = password.chars().count();
     if length < SHORTEST || password.len() > LONGEST_BYTES {
-        let allowed = format!("{SHORTEST} characters or more, at most {LONGEST_BYTES} bytes");
-        return Err(Error::invalid("password", format!("{length} characters"), &allowed));
+        let allowed = format!("at least {SHORTEST} characters and at most {LONGEST_BYTES} bytes long");
+        return Err(Error::invalid("password", format!("{length} characters long"), &allowed));
     }
     if unpredictable(password, name) < LEAST_UNPREDICTABLE {
-        let allowed = "one that is hard to guess: three words that do not belong together, say; your name, common words, \
-                       keyboard rows, sequences such as 1234 and repetitions hardly count";
-        return Err(Error::invalid("password", "an easily guessed password", allowed));
+        let allowed = "hard to guess, such as three unrelated words. Your name, common words, keyboard rows, sequences such as \
+                       1234 and repetitions hardly count";
+        return Err(Error::invalid("password", "easy to guess", allowed));
     }
     Ok(())
 }
 
-/// How many characters of a password are not predictable: a repetition counts as one, a sequence or a common word as two.
+/// Number of unpredictable characters. A repetition counts as one, a sequence or a common word as two.
 fn unpredictable(password: &str, name: &str) -> usize {
     let typed: Vec<char> = password.to_lowercase().chars().collect();
     let letters: Vec<char> = typed.iter().map(|c| letter(*c)).collect();
@@ -250,7 +250,7 @@ fn unpredictable(password: &str, name: &str) -> usize {
     count
 }
 
-/// The letter that a digit or sign stands for.
+/// The letter that a digit or symbol replaces.
 fn letter(c: char) -> char {
     match c {
         '0' => 'o',
@@ -263,13 +263,13 @@ fn letter(c: char) -> char {
     }
 }
 
-/// Length of what stands at `at` and stood before it, at any place.
+/// Length of the text at `at` that occurred earlier.
 fn repeated(text: &[char], at: usize) -> usize {
     let alike = |from: usize| (0..text.len() - at).take_while(|i| text[from + i] == text[at + i]).count();
     (0..at).map(alike).max().unwrap_or(0)
 }
 
-/// Length of a run of neighbours in alphabet or digits, up or down, or of the same character.
+/// Length of an ascending, descending or constant run of letters or digits.
 fn sequence(text: &[char]) -> usize {
     let run = |step: i64| {
         1 + text
@@ -280,7 +280,7 @@ fn sequence(text: &[char]) -> usize {
     [-1, 0, 1].map(run).into_iter().max().unwrap_or(1)
 }
 
-/// Length of a run on a row of the keyboard, in either direction.
+/// Length of a run of neighbouring keys, in either direction.
 fn keyboard(text: &[char]) -> usize {
     let on_row = |row: Vec<char>| {
         let from = |start: usize| row[start..].iter().zip(text).take_while(|(key, c)| key == c).count();
@@ -294,7 +294,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn passwords_that_are_guessed_first_are_refused_however_long_they_are() {
+    fn easily_guessed_passwords_are_refused_at_any_length() {
         for weak in [
             "aaaaaaaaaa",
             "          ",

@@ -1,5 +1,5 @@
-//! Users: adding them, shutting them out, their passwords and one-time links. One way in for pages, REST and the
-//! command line.
+//! Administration of users: adds and disables them, sets roles and passwords, creates sign-in links. For pages, REST
+//! and the command line.
 
 use super::{clock, secret, tokens};
 use crate::error::Error;
@@ -12,41 +12,41 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// A one-time link can be used for this long.
+/// Validity of a one-time sign-in link.
 const LINK_SECONDS: i64 = 24 * 3600;
-/// The first user: whoever started the service.
+/// Name of the first user.
 pub const FIRST: &str = "admin";
 
 /// A user to add.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewUser {
-    /// Name or code: 1 to 80 characters.
+    /// Name or code, 1 to 80 characters.
     #[schema(min_length = 1, max_length = 80)]
     pub name: String,
-    /// What the person is here.
+    /// Role of the user.
     pub role: Role,
 }
 
 /// Adds a user.
 ///
 /// # Errors
-/// [`Error::Invalid`], [`Error::Conflict`] when the name is taken.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the name is taken.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewUser) -> Result<User, Error> {
     let name = printable::name("name", &new.name, 80)?;
-    let user = users::insert(writer, name, new.role)
-        .await
-        .on_constraint(NAME_UNIQUE, || Error::conflict(format!("there is a user {name:?} already")))?;
+    let user = users::insert(writer, name, new.role).await.on_constraint(NAME_UNIQUE, || {
+        Error::conflict(format!("There is already a user {name:?}. Choose another name."))
+    })?;
     let detail = json!({ "name": name, "role": new.role });
     audit::append(writer, actor, "user.add", &format!("user {}", user.id), &detail).await?;
     Ok(user)
 }
 
-/// An administrator for whoever starts the service: the first one who is not disabled, or a new one. A disabled one is
-/// not let in again, because the old password would be, too.
+/// The administrator for the operator of the service: the first one who is not disabled, or a new one. A disabled one
+/// stays disabled, because enabling would make the old password valid again.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn way_in(writer: &mut Writer) -> Result<User, Error> {
     let all = users::all(writer).await?;
     let mut admins: Vec<&User> =
@@ -61,14 +61,14 @@ pub async fn way_in(writer: &mut Writer) -> Result<User, Error> {
     add(writer, &Actor::program(), &NewUser { name, role: Role::Admin }).await
 }
 
-/// Makes a one-time link for a user: its secret, which is not stored.
+/// Creates a one-time sign-in link and returns its secret, which is not stored.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when the user is shut out.
+/// [`Error::NotFound`], [`Error::Conflict`] if the user is disabled.
 pub async fn link(writer: &mut Writer, actor: &Actor, id: UserId) -> Result<String, Error> {
     let user = users::get(writer, id).await?;
     if user.disabled_at.is_some() {
-        return Err(Error::conflict("this user is disabled"));
+        return Err(Error::conflict("This user is disabled. Enable the user first."));
     }
     let secret = secret::fresh()?;
     let now = clock::recorded(writer).await?;
@@ -77,10 +77,10 @@ pub async fn link(writer: &mut Writer, actor: &Actor, id: UserId) -> Result<Stri
     Ok(secret)
 }
 
-/// Sets a password that was hashed outside of any transaction, and ends the other sessions of the user.
+/// Sets a password and ends the other sessions of the user. `hashed` is computed outside any transaction.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn set_password(writer: &mut Writer, actor: &Actor, id: UserId, hashed: &str) -> Result<User, Error> {
     users::set_password(writer, id, hashed).await?;
     let now = clock::recorded(writer).await?;
@@ -89,10 +89,11 @@ pub async fn set_password(writer: &mut Writer, actor: &Actor, id: UserId, hashed
     Ok(users::get(writer, id).await?)
 }
 
-/// Shuts a user out and ends the user's sessions, links and tokens, or lets the user in again. What has ended stays ended.
+/// Disables a user and ends the user's sessions, links and tokens, or enables the user again. Enabling does not restore
+/// them.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when nobody would be left who can sign in and administer.
+/// [`Error::NotFound`], [`Error::Conflict`] if no administrator who can sign in would be left.
 pub async fn set_disabled(writer: &mut Writer, actor: &Actor, id: UserId, disabled: bool) -> Result<User, Error> {
     let user = users::get(writer, id).await?;
     if disabled && user.disabled_at.is_none() {
@@ -109,11 +110,10 @@ pub async fn set_disabled(writer: &mut Writer, actor: &Actor, id: UserId, disabl
     Ok(users::get(writer, id).await?)
 }
 
-/// Gives a user another role, which holds from the next request on. Tokens are made by administrators: those of one who is
-/// none any more end.
+/// Changes the role of a user, from the next request on. Tokens that a former administrator created are revoked.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when nobody would be left who can sign in and administer.
+/// [`Error::NotFound`], [`Error::Conflict`] if no administrator who can sign in would be left.
 pub async fn set_role(writer: &mut Writer, actor: &Actor, id: UserId, role: Role) -> Result<User, Error> {
     let user = users::get(writer, id).await?;
     if user.role == role {
@@ -134,16 +134,16 @@ pub async fn set_role(writer: &mut Writer, actor: &Actor, id: UserId, role: Role
 /// How an administrator can sign in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum WayIn {
-    /// Not yet: no link was used.
+    /// With an unused link only.
     Never,
-    /// In a session that goes on; after it, with another link.
+    /// In the current session; later with another link.
     Session,
-    /// Whenever wanted.
+    /// With a password.
     Password,
 }
 
-/// Refuses to lose an administrator when the others have less of a way in: one who never signed in does not count beside
-/// one who did, and one in a session does not beside one with a password.
+/// Refuses to lose an administrator if every other one has a weaker way to sign in: an unused link is weaker than a
+/// session, and a session is weaker than a password.
 async fn keep_an_administrator(db: &mut Connection, lost: UserId) -> Result<(), Error> {
     let (mut own, mut others) = (WayIn::Never, None);
     for user in users::all(db).await?.iter().filter(|user| user.role == Role::Admin && user.disabled_at.is_none()) {
@@ -164,16 +164,18 @@ async fn keep_an_administrator(db: &mut Connection, lost: UserId) -> Result<(), 
         return Ok(());
     }
     let reason = match others {
-        None => "this is the last administrator: add another one first",
-        Some(_) => "this is the last administrator who can sign in: another one must sign in and set a password first",
+        None => "This is the last administrator. Make another user an administrator first.",
+        Some(_) => {
+            "This is the last administrator who can sign in. Another administrator must sign in and set a password first."
+        }
     };
     Err(Error::conflict(reason))
 }
 
-/// Whether somebody can administer the service from afar: an administrator with a password.
+/// Whether there is an administrator with a password.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn has_admin(db: &mut Connection) -> Result<bool, Error> {
     let all = users::all(db).await?;
     Ok(all.iter().any(|user| user.role == Role::Admin && user.has_password && user.disabled_at.is_none()))

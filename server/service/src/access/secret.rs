@@ -1,4 +1,4 @@
-//! Secrets: drawn by the system, shown once, stored as SHA-256. Passwords as argon2id.
+//! Random secrets, stored as SHA-256, and password hashing with argon2id.
 
 use super::password;
 use crate::error::Error;
@@ -10,34 +10,34 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::Semaphore;
 
-/// A fresh secret of 256 bits, as hexadecimal digits.
+/// A new random secret of 256 bits, in hexadecimal.
 ///
 /// # Errors
-/// When the system has no random numbers.
+/// When the operating system gives no random numbers.
 pub fn fresh() -> Result<String, Error> {
     let mut bytes = [0_u8; 32];
-    getrandom::fill(&mut bytes).map_err(|e| Error::Internal(format!("no random numbers: {e}")))?;
+    getrandom::fill(&mut bytes)
+        .map_err(|e| Error::Internal(format!("the operating system gives no random numbers: {e}")))?;
     Ok(hex::encode(bytes))
 }
 
-/// What is stored of a random secret. It has too many bits to be guessed, so a fast hash is enough.
+/// The stored hash of a secret. A fast hash is enough, because a random secret cannot be guessed.
 pub fn hash(secret: &str) -> String {
     hex::encode(Sha256::digest(secret.as_bytes()))
 }
 
-/// Each takes a core and 19 MiB: whoever asks for many waits.
+/// Limits parallel password hashes, each of which takes a core and 19 MiB.
 static AT_ONCE: Semaphore = Semaphore::const_new(2);
 
-/// The passwords of one network are compared one after the other: whoever sends many waits behind their own, and others
-/// wait for one of them at most.
+/// Queues of password checks, one for each network, so that many attempts from one network do not delay others.
 #[derive(Debug, Default)]
 pub struct Turns(Mutex<HashMap<String, Arc<Semaphore>>>);
 
 impl Turns {
-    /// Works on a password [`aside`], when those of this network before it are done.
+    /// Runs [`aside`] after earlier checks of the same network.
     ///
     /// # Errors
-    /// When the work panics.
+    /// If the work panics.
     pub async fn aside<T: Send + 'static>(
         &self,
         network: &str,
@@ -51,7 +51,7 @@ impl Turns {
         })
         .await;
         drop(line);
-        // A network that nobody waits for is forgotten.
+        // Forget networks without waiting checks.
         self.networks().retain(|_, line| Arc::strong_count(line) > 1);
         done
     }
@@ -62,39 +62,40 @@ impl Turns {
     }
 }
 
-/// Works on a password where that holds up nothing else.
+/// Runs password hashing on a blocking thread, within the limit of parallel hashes.
 ///
 /// # Errors
-/// When the work panics.
+/// If the work panics.
 pub async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
-    let failed = |reason: String| Error::Internal(format!("working on a password: {reason}"));
+    let failed = |reason: String| Error::Internal(format!("password hashing failed: {reason}"));
     let turn = AT_ONCE.acquire().await.map_err(|e| failed(e.to_string()))?;
-    // The turn ends with the work: whoever asked may go away before.
+    // The permit ends with the work, even if the caller goes away earlier.
     let work = move || {
         let _turn = turn;
         work()
     };
-    // Bounded by the turn.
+    // The semaphore bounds the number of threads.
     #[allow(clippy::disallowed_methods)]
     let done = tokio::task::spawn_blocking(work);
     done.await.map_err(|e| failed(e.to_string()))
 }
 
-/// What is stored of a password of the user with this name. Takes tens of milliseconds on purpose: call it [`aside`].
+/// The stored hash of a user's password. Takes tens of milliseconds on purpose, so call it in [`aside`].
 ///
 /// # Errors
 /// [`Error::Invalid`] for a password that is too short, too long or easily guessed.
 pub fn hash_password_of(name: &str, password: &str) -> Result<String, Error> {
     password::check(password, name)?;
     let mut salt = [0_u8; 16];
-    getrandom::fill(&mut salt).map_err(|e| Error::Internal(format!("no random numbers: {e}")))?;
+    getrandom::fill(&mut salt)
+        .map_err(|e| Error::Internal(format!("the operating system gives no random numbers: {e}")))?;
     let hash = Argon2::default()
         .hash_password_with_salt(password.as_bytes(), &salt)
         .map_err(|e| Error::Internal(format!("cannot hash a password: {e}")))?;
     Ok(hash.to_string())
 }
 
-/// [`hash_password_of`] somebody whose name does not matter.
+/// [`hash_password_of`] without a name to check against.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a password that is too short, too long or easily guessed.
@@ -102,13 +103,13 @@ pub fn hash_password(password: &str) -> Result<String, Error> {
     hash_password_of("", password)
 }
 
-/// Whether a password is the one that was stored. Takes as long when nothing was stored.
+/// Whether a password matches the stored hash. Takes the same time without a stored hash.
 pub fn is_password(password: &str, stored: Option<&str>) -> bool {
     let parsed = stored.and_then(|text| PasswordHash::new(text).ok());
     if let Some(hash) = parsed {
         return Argon2::default().verify_password(password.as_bytes(), &hash).is_ok();
     }
-    // As much work as a real comparison: the time says nothing about who exists.
+    // The same work as a real check, so that timing does not reveal which users exist.
     let _ = Argon2::default().hash_password_with_salt(password.as_bytes(), b"nobody is there!");
     false
 }
@@ -118,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn secrets_differ_and_their_hashes_do_not_show_them() {
+    fn secrets_differ_and_hashes_do_not_contain_them() {
         let (a, b) = (fresh().unwrap(), fresh().unwrap());
         assert_ne!(a, b);
         assert_eq!((a.len(), hash(&a).len()), (64, 64));
@@ -127,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_password_is_recognised_and_salted() {
+    fn passwords_are_salted_and_verified() {
         let stored = hash_password("correct horse").unwrap();
         assert!(stored.starts_with("$argon2id$"));
         assert_ne!(stored, hash_password("correct horse").unwrap());

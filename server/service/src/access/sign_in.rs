@@ -1,4 +1,4 @@
-//! Signing in and out, and recognising who was signed in.
+//! Sessions: sign-in, sign-out, expiry, and the caller of a session or token.
 
 use super::caller::Caller;
 use super::{clock, secret};
@@ -10,18 +10,19 @@ use gaitwright_store::{Connection, Instant, SessionId, UserId, Writer, sessions,
 use serde::Serialize;
 use serde_json::json;
 
-/// An instant at which the person did something is written at most this often.
+/// The least time between two writes of a session's last activity.
 const SEEN_EVERY_SECONDS: f64 = 60.0;
 
-/// For so long after coming in by a one-time link a password can be set without the present one, which may be forgotten.
+/// Time after a sign-in by link in which a password can be set without the current one, which the user may have
+/// forgotten.
 const LINK_IS_FRESH_SECONDS: f64 = 3600.0;
 
-/// When sessions end by themselves.
+/// When sessions expire.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// A session without a sign of life for so long has ended.
+    /// Time without a request after which a session expires.
     pub idle_seconds: f64,
-    /// A session has ended so long after it was begun, used or not.
+    /// Time after which a session expires in any case.
     pub lifetime_seconds: f64,
 }
 
@@ -32,20 +33,24 @@ impl Limits {
     }
 }
 
-/// Signs in with a one-time link: the user and the secret of the session.
+/// Signs in with a one-time link. Returns the user and the secret of the session.
 ///
 /// # Errors
-/// [`Error::NotSignedIn`] when the link is unknown, used, too old, or of a user who was shut out.
+/// [`Error::NotSignedIn`] if the link is unknown, used or expired, or its user is disabled.
 pub async fn with_link(writer: &mut Writer, link: &str) -> Result<(User, String), Error> {
     with_link_from(writer, link, &From::default()).await
 }
 
-/// [`with_link`], noting where it was.
+/// [`with_link`], and records the origin.
 ///
 /// # Errors
-/// As [`with_link`]; that it was too old is to be committed.
+/// As [`with_link`]. The caller must commit even then, to record the expiry.
 pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Result<(User, String), Error> {
-    let refused = || Error::NotSignedIn("this link was used or is too old; ask for another one".to_owned());
+    let refused = || {
+        Error::NotSignedIn(
+            "This link was already used or has expired. Ask an administrator for another one.".to_owned(),
+        )
+    };
     let hash = secret::hash(link);
     let (id, expires_at) = sessions::link(writer, &hash).await?.ok_or_else(refused)?;
     let now = clock::recorded(writer).await?;
@@ -62,15 +67,15 @@ pub async fn with_link_from(writer: &mut Writer, link: &str, from: &From) -> Res
     Ok((user, secret))
 }
 
-/// Begins a session of a user whose password was found right.
+/// Begins a session after a correct password.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn with_password(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
     begin(writer, user, By::Password, from).await
 }
 
-/// What somebody came in by.
+/// How a user signed in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum By {
@@ -86,10 +91,10 @@ async fn begin(writer: &mut Writer, user: &User, by: By, from: &From) -> Result<
     Ok(secret)
 }
 
-/// A session in place of those that ended when the user set a password; part of that act in the audit trail.
+/// A new session after a password change, which ends all others. Part of that entry in the audit trail.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn renewed(writer: &mut Writer, user: &User, from: &From) -> Result<String, Error> {
     renew(writer, user, false, from).await
 }
@@ -101,11 +106,11 @@ async fn renew(writer: &mut Writer, user: &User, by_link: bool, from: &From) -> 
     Ok(secret)
 }
 
-/// Whether a user must say the present password to set another one: unless there is none, or a one-time link has just let
-/// the user in.
+/// Whether a user must give the current password to set a new one. Not if there is none, or shortly after a sign-in by
+/// link.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn must_say_password(db: &mut Connection, user: &User, session: Option<&str>) -> Result<bool, Error> {
     if !user.has_password {
         return Ok(false);
@@ -119,10 +124,10 @@ pub async fn must_say_password(db: &mut Connection, user: &User, session: Option
     Ok(by_fresh_link.is_none())
 }
 
-/// Whether somebody who is signed in has no way in but a one-time link.
+/// Whether a signed-in user has no password.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn has_no_password(db: &mut Connection, caller: &Caller) -> Result<bool, Error> {
     let Some(id) = caller.user else { return Ok(false) };
     Ok(!users::get(db, id).await?.has_password)
@@ -131,7 +136,7 @@ pub async fn has_no_password(db: &mut Connection, caller: &Caller) -> Result<boo
 /// Signs out: ends the session with this secret.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn out(writer: &mut Writer, actor: &Actor, session: &str) -> Result<(), Error> {
     if let Some(session) = sessions::find(writer, &secret::hash(session)).await? {
         end(writer, actor, &session).await?;
@@ -139,10 +144,10 @@ pub async fn out(writer: &mut Writer, actor: &Actor, session: &str) -> Result<()
     Ok(())
 }
 
-/// Ends a session: one's own, or, by an administrator, another's.
+/// Ends a session of the caller, or of any user if the caller is an administrator.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn end(writer: &mut Writer, actor: &Actor, session: &Session) -> Result<(), Error> {
     let now = clock::recorded(writer).await?;
     if sessions::end(writer, session.id, now).await? {
@@ -152,10 +157,10 @@ pub async fn end(writer: &mut Writer, actor: &Actor, session: &Session) -> Resul
     Ok(())
 }
 
-/// The sessions that have not ended: of a user, or all. The newest first.
+/// The active sessions of a user or of all users, newest first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn live(
     db: &mut Connection,
     user: Option<UserId>,
@@ -167,26 +172,26 @@ pub async fn live(
     Ok(found)
 }
 
-/// Who is found by a secret.
+/// The result of looking up a secret.
 #[derive(Debug)]
 pub enum Recognised {
-    /// Nobody: it is unknown, or was ended.
+    /// The secret is unknown, or was ended.
     Nobody,
-    /// Nobody: its time is over, which the record does not say yet. To be noted with [`note_ended`].
+    /// The session or token has expired, which must be recorded with [`note_ended`].
     Ended(Option<SessionId>),
-    /// Somebody.
+    /// The secret is valid.
     Known {
-        /// Who.
+        /// The caller.
         caller: Caller,
-        /// The session, when it is time to note that the person did something.
+        /// The session, if its last activity must be recorded.
         seen: Option<SessionId>,
     },
 }
 
-/// Whose session it is.
+/// Looks up the secret of a session.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_session(db: &mut Connection, session: &str, limits: Limits, now: Instant) -> Result<Recognised, Error> {
     let Some(found) = sessions::find(db, &secret::hash(session)).await? else { return Ok(Recognised::Nobody) };
     if limits.has_ended(&found, now) {
@@ -200,10 +205,10 @@ pub async fn of_session(db: &mut Connection, session: &str, limits: Limits, now:
     Ok(Recognised::Known { caller: Caller::person(user.id, &user.name, user.role), seen: due.then_some(found.id) })
 }
 
-/// Whose token it is.
+/// Looks up the secret of a token.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<Recognised, Error> {
     let Some(found) = tokens::by_hash(db, &secret::hash(token)).await? else { return Ok(Recognised::Nobody) };
     if let Some(expires_at) = found.expires_at.filter(|expires_at| *expires_at <= now) {
@@ -213,19 +218,19 @@ pub async fn of_token(db: &mut Connection, token: &str, now: Instant) -> Result<
     Ok(Recognised::Known { caller: Caller::token(found.id, &found.name, &found.scopes), seen: None })
 }
 
-/// Notes that the person did something.
+/// Records the last activity of a session.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn seen(writer: &mut Writer, session: SessionId, now: Instant) -> Result<(), Error> {
     gaitwright_store::clock::reach(writer, now).await?;
     Ok(sessions::seen(writer, session, now).await?)
 }
 
-/// Notes that the time of a session or token is over: it stays so when the machine's clock is set back.
+/// Records that a session or token has expired, so that it stays expired when the machine's clock is set back.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn note_ended(writer: &mut Writer, session: Option<SessionId>, now: Instant) -> Result<(), Error> {
     gaitwright_store::clock::reach(writer, now).await?;
     if let Some(session) = session {

@@ -1,4 +1,4 @@
-//! Tokens of scripts: made, shown once, ended.
+//! Tokens of programs: creation and revocation.
 
 use super::clock;
 use super::secret;
@@ -12,29 +12,29 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Longest life of a token, days.
+/// Maximum validity of a token, days.
 const LONGEST_DAYS: u32 = 3660;
 
-/// A token to make.
+/// A token to create.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewToken {
-    /// What it is for: 1 to 80 characters.
+    /// Purpose of the token, 1 to 80 characters.
     #[schema(min_length = 1, max_length = 80)]
     pub name: String,
-    /// What it allows: at least one of `read`, `run`, `answer`, `rate`, `device`.
+    /// Scopes: at least one of `read`, `run`, `answer`, `rate`, `device`.
     #[schema(min_items = 1)]
     pub scopes: Vec<Right>,
-    /// It ends by itself after so many days; never, if absent.
+    /// Validity in days. Unlimited if absent.
     #[serde(default)]
     #[schema(minimum = 1, maximum = 3660)]
     pub days: Option<u32>,
 }
 
-/// Makes a token: the row and its secret, which is not stored.
+/// Creates a token. Returns the row and its secret, which is not stored.
 ///
 /// # Errors
-/// [`Error::Invalid`], [`Error::Conflict`] when the name is taken.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the name is taken.
 pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<(Token, String), Error> {
     let name = printable::name("name", &new.name, 80)?;
     if new.scopes.is_empty() || new.scopes.contains(&Right::Administer) {
@@ -49,29 +49,31 @@ pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<
     let ends = new.days.map(|days| now.plus_seconds(i64::from(days) * 86_400));
     let token = tokens::insert(writer, name, &secret::hash(&secret), &new.scopes, actor, ends)
         .await
-        .on_constraint(NAME_UNIQUE, || Error::conflict(format!("there is a token {name:?} already")))?;
+        .on_constraint(NAME_UNIQUE, || {
+            Error::conflict(format!("There is already a token {name:?}. Choose another name."))
+        })?;
     let detail = json!({ "name": name, "scopes": new.scopes });
     audit::append(writer, actor, "token.make", &format!("token {}", token.id), &detail).await?;
     Ok((token, secret))
 }
 
-/// Ends a token.
+/// Revokes a token.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when it had ended.
+/// [`Error::NotFound`], [`Error::Conflict`] if it was already revoked.
 pub async fn revoke(writer: &mut Writer, actor: &Actor, id: TokenId) -> Result<Token, Error> {
     let token = tokens::get(writer, id).await?;
     if !tokens::revoke(writer, id).await? {
-        return Err(Error::conflict("this token was revoked already"));
+        return Err(Error::conflict("This token was already revoked."));
     }
     audit::append(writer, actor, "token.revoke", &format!("token {id}"), &json!({ "name": token.name })).await?;
     Ok(tokens::get(writer, id).await?)
 }
 
-/// Ends every token that a user made: whoever may not administer any more keeps no way in by a program.
+/// Revokes every token that a user created, so that a former administrator keeps no access through a program.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub(super) async fn revoke_all_of(writer: &mut Writer, actor: &Actor, user: UserId) -> Result<(), Error> {
     for token in tokens::made_by(writer, user).await? {
         revoke(writer, actor, token.id).await?;

@@ -1,4 +1,4 @@
-//! A person's or a script's answer to a comparison: one way in for the form and the REST interface.
+//! Records and retracts preferences from people and scripts, for pages and REST.
 
 use crate::access::Caller;
 use crate::error::Error;
@@ -18,11 +18,11 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PairAnswer {
-    /// The first.
+    /// The first gait.
     A,
-    /// The second.
+    /// The second gait.
     B,
-    /// Neither.
+    /// Neither gait is better.
     NoDifference,
 }
 
@@ -34,13 +34,12 @@ pub struct Answer {
     pub trial_a: TrialId,
     /// The second gait.
     pub trial_b: TrialId,
-    /// Which is better.
+    /// Which gait is better.
     pub answer: PairAnswer,
-    /// Who says so: `subject`, `clinician` or `script`.
-    /// By default what the caller is.
+    /// Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
     #[serde(default)]
     pub source: Option<Source>,
-    /// Name or pseudonym of who says so; by default the name of the caller.
+    /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
@@ -50,7 +49,7 @@ pub struct Answer {
     pub note: String,
 }
 
-/// Writes an answer.
+/// Records a preference.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
@@ -66,7 +65,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     let fields = ("trial_a", "trial_b");
     let statement = GivenJudgement { study: study.id, pair: (a, b), fields, said, attribution, again: Again::Refused };
     let heard = preference::hear(writer, statement).await?;
-    let id = heard.ok_or_else(|| Error::Internal("a preference was not heard".to_owned()))?;
+    let id = heard.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail =
         json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": attribution.author });
@@ -74,7 +73,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
     Ok(id)
 }
 
-/// Who says something: the caller, or whom the caller names.
+/// The author of an answer: the caller, or the person that the caller names.
 ///
 /// # Errors
 /// [`Error::Invalid`] for `source`, `author` or `note`.
@@ -86,24 +85,24 @@ pub fn attribution<'a>(
 ) -> Result<Attribution<'a>, Error> {
     let source = source.unwrap_or_else(|| caller.source());
     if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
-        return Err(Error::invalid("source", source.as_str(), "subject, clinician, script"));
+        return Err(Error::invalid("source", source.as_str(), "subject, clinician or script"));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    // Who signed in speaks as a clinician under no other name.
+    // A signed-in user cannot answer as another clinician.
     if caller.user.is_some() && source == Source::Clinician && author != caller.name {
-        return Err(Error::invalid("author", author, &format!("{}, who is signed in, or absent", caller.name)));
+        return Err(Error::invalid("author", author, &format!("{} (the signed-in user) or absent", caller.name)));
     }
     printable::note("note", note, 2000)?;
     Ok(Attribution { source, author, note })
 }
 
-/// A comparison lists so many answers of others.
+/// The most answers of other people that a comparison lists.
 const BESIDE: u32 = 20;
 
-/// The newest answers of other people to the same comparison. All of them count.
+/// The newest answers of other people to the same comparison. The learner uses all of them.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
     let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.said else {
         return Ok(Vec::new());
@@ -111,11 +110,11 @@ pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec
     Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)
 }
 
-/// Takes an answer back.
+/// Retracts a preference.
 ///
 /// # Errors
-/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already,
-/// is not a comparison or is of a subject who withdrew.
+/// [`Error::NotFound`], also for a preference of another study. [`Error::Conflict`] if it was already retracted, if it
+/// is a label, or if the subject withdrew consent.
 pub async fn retract(
     writer: &mut Writer,
     caller: &Caller,
@@ -133,12 +132,12 @@ pub async fn retract(
     }
     consents::may_be_shown(writer, row.study_id).await?;
     if matches!(row.said, FeedbackContent::Label { .. }) {
-        return Err(Error::conflict("only an answer can be taken back: a label says what the solver did"));
+        return Err(Error::conflict("Only a preference can be retracted. This entry is the label of a solve."));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, ": why it is taken back")?;
+    let reason = printable::reason("reason", reason, " that say why the preference is retracted")?;
     if !feedback::retract(writer, &row, author, reason).await? {
-        return Err(Error::conflict("this answer was taken back already"));
+        return Err(Error::conflict("This preference was already retracted."));
     }
     events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": row.study_id, "author": author, "reason": reason });
@@ -146,14 +145,14 @@ pub async fn retract(
     Ok(feedback::get(writer, id).await?)
 }
 
-/// A trial of the study whose gait converged; `field` named it.
+/// The converged trial that `field` names.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a trial that is none of the study and for one without a gait.
+/// [`Error::Invalid`] for a trial of another study or without a gait.
 pub async fn comparable(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     let trial = walkable::trial_of_study(db, study, field, id).await?;
     if trial.state != TrialState::Converged {
-        let allowed = format!("a converged trial; trial {} is {}", trial.number, trial.state.as_str());
+        let allowed = format!("a converged trial, but trial {} is {}", trial.number, trial.state.as_str());
         return Err(Error::invalid(field, id.to_string(), &allowed));
     }
     Ok(trial)

@@ -1,4 +1,4 @@
-//! What the learner believes about a study's search space, in the forms people ask for, kept until it hears more.
+//! Computes and caches the learner's posterior of a study, with marginals, probabilities of being best and agreement.
 
 use super::seed::{Purpose, derive};
 use super::snapshot::StudySnapshot;
@@ -9,43 +9,43 @@ use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Joint draws behind the probabilities of being best: their standard error is below 1.6 %.
+/// Joint draws for the probabilities of being best. Their standard error is below 1.6 %.
 const DRAWS: usize = 1000;
-/// From so many answers on the belief takes longer than a page may: its time grows with their third power.
+/// Above this number of answers a page cannot wait for the posterior: its computing time grows with the third power.
 pub const MOST_ANSWERS: usize = 1500;
-/// So many studies are kept.
+/// Number of studies whose results are cached.
 const KEPT: usize = 16;
-/// Of so many studies the learner's state is kept, from which the next posterior is an update.
+/// Number of studies whose learner is cached, so that the next posterior is an update.
 const KEPT_LEARNERS: usize = 4;
-/// The state of a study with more trials is not kept: its memory grows with their second power, here to about 100 MB.
+/// The learner of a study with more trials is not cached: its memory grows with the square, here to about 100 MB.
 const MOST_KEPT_TRIALS: usize = 2000;
 
-/// What the learner believes after a log.
+/// The posterior after a log, with everything that pages and REST show of it.
 #[derive(Debug)]
 pub struct Belief {
-    /// The belief itself, for what else is asked.
+    /// The posterior itself.
     pub posterior: Arc<Posterior>,
-    /// For each dimension the utility of its levels, averaged over all others.
+    /// For each dimension, the utility of its levels, averaged over all other dimensions.
     pub marginals: Vec<Vec<Marginal>>,
-    /// The actions tried, the one that is most likely the best first.
+    /// The tried actions, by decreasing probability of being best.
     pub best: Vec<BestProbability>,
-    /// How many answers it agrees with.
+    /// How many answers the posterior agrees with.
     pub agreement: Agreement,
-    /// Every comparison that stands, the one that surprises it most first.
+    /// Every comparison that was not retracted, the most surprising first.
     pub comparisons: Vec<Comparison>,
 }
 
-/// A comparison that was answered, and what is believed of it now.
+/// An answered comparison and its probability under the posterior.
 #[derive(Debug)]
 pub struct Comparison {
     /// The answer.
     pub given: FeedbackRow,
-    /// The probability that the same answer would be given to the same question.
+    /// The probability of the same answer to the same question.
     pub probability: f64,
 }
 
 impl Belief {
-    /// What follows from the posterior of a study: CPU work.
+    /// Derives the rest from the posterior of a study. CPU-bound.
     fn of(snapshot: &StudySnapshot, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
         let plan = &snapshot.study.plan;
         let dimensions = 0..plan.search_space.dimensions().len();
@@ -67,7 +67,7 @@ impl Belief {
     }
 }
 
-/// Winner and loser as actions, of a preference between two trials that tried different ones.
+/// Winner and loser of a preference between two trials with different actions.
 fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex, ActionIndex)> {
     let action = |id| snapshot.trial(id).map(|trial| trial.action_index);
     match row.said {
@@ -78,7 +78,7 @@ fn preferred(snapshot: &StudySnapshot, row: &FeedbackRow) -> Option<(ActionIndex
     }
 }
 
-/// The beliefs that were computed last, and the learners that computed them.
+/// Cache of recent posteriors and of the learners that computed them.
 #[derive(Debug, Default)]
 pub struct Beliefs {
     learners: Mutex<VecDeque<(StudyId, Arc<Mutex<Learner>>)>>,
@@ -87,14 +87,14 @@ pub struct Beliefs {
 }
 
 impl Beliefs {
-    /// The posterior of a study, computed where the log has changed since: CPU work.
+    /// The posterior of a study, computed anew if the log has changed. CPU-bound.
     ///
     /// # Errors
-    /// When the learner refuses the log.
+    /// When the learner cannot work with the log.
     pub fn posterior(&self, _: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Posterior>, LearnerError> {
         let plan = &snapshot.study.plan;
         let learner = self.learner(snapshot.study.id);
-        // Whoever asks for the same study meanwhile waits for this result instead of computing it again.
+        // Concurrent callers for the same study wait for this result instead of computing it again.
         let mut learner = learner.lock().unwrap_or_else(|poisoned| {
             let mut learner = poisoned.into_inner();
             *learner = Learner::default();
@@ -108,7 +108,7 @@ impl Beliefs {
         posterior
     }
 
-    /// The learner of a study, new where none is kept.
+    /// The cached learner of a study, or a new one.
     fn learner(&self, study: StudyId) -> Arc<Mutex<Learner>> {
         let mut learners = self.learners.lock().unwrap_or_else(PoisonError::into_inner);
         let kept = learners.iter().position(|(id, _)| *id == study).and_then(|at| learners.remove(at));
@@ -120,16 +120,16 @@ impl Beliefs {
         learner
     }
 
-    /// The belief of a study, computed where the log has changed since: CPU work.
+    /// The belief of a study, computed anew if the log has changed. CPU-bound.
     ///
     /// # Errors
-    /// When the learner refuses the log.
+    /// When the learner cannot work with the log.
     pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
         self.shown.get_or(snapshot, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
     }
 }
 
-/// What follows from the log of a study, of those that were asked for last.
+/// A cache of values that derive from the log of a study.
 #[derive(Debug)]
 struct Kept<T>(Mutex<VecDeque<(StudyId, LogVersion, Arc<T>)>>);
 
@@ -146,7 +146,7 @@ impl<T> Kept<T> {
         compute: impl FnOnce() -> Result<T, LearnerError>,
     ) -> Result<Arc<T>, LearnerError> {
         let (study, version) = (snapshot.study.id, snapshot.version);
-        // The list is whole between any two statements that hold the lock.
+        // The list is consistent between statements, so a poisoned lock is usable.
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, found)) = kept().iter().find(|(id, at, _)| (*id, *at) == (study, version)) {
             return Ok(Arc::clone(found));

@@ -1,4 +1,4 @@
-//! What is there before anybody adds anything: the paper's subjects, the built-in device and reference.
+//! The built-in entries of a new record: the subjects of the paper, the device and the reference gait.
 
 use crate::error::Error;
 use gait_optimizer as optimizer;
@@ -16,7 +16,7 @@ const PAPER: [(u32, &str, &str); 2] = [
 /// The built-in device of the record.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn device(db: &mut Connection) -> Result<Device, Error> {
     Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?.0)
 }
@@ -24,15 +24,15 @@ pub async fn device(db: &mut Connection) -> Result<Device, Error> {
 /// The built-in reference gait of the record.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGait, Error> {
     Ok(reference_gaits::ensure(db, &optimizer::ReferenceGait::builtin()?).await?.0)
 }
 
-/// Adds what is missing of the built-in things.
+/// Adds the built-in entries that are missing.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn ensure(db: &mut Connection) -> Result<(), Error> {
     device(db).await?;
     reference_gait(db).await?;
@@ -44,10 +44,10 @@ pub async fn ensure(db: &mut Connection) -> Result<(), Error> {
     Ok(())
 }
 
-/// The subject of the record with this body: one of the paper's, or one named by height and mass.
+/// The subject of the record with this height and mass: one of the paper's, or one named by height and mass.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn subject_with(db: &mut Connection, body: optimizer::Subject) -> Result<Subject, Error> {
     let paper = PAPER.iter().find(|(number, ..)| optimizer::Subject::builtin(*number).is_ok_and(|known| known == body));
     let pseudonym = match paper {

@@ -1,4 +1,4 @@
-//! The certificate of a trial's gait: made when somebody asks for it or the study has ended, then kept.
+//! Makes the certificate of one trial's gait and stores it.
 
 use crate::error::Error;
 use crate::workers::Certify;
@@ -14,19 +14,19 @@ use gaitwright_store::{
 use serde_json::json;
 use std::sync::Arc;
 
-/// What there is to begin with.
+/// The start of a certification.
 #[derive(Debug)]
 pub enum Certification {
-    /// It was made before.
+    /// The certificate is on record.
     Made(Box<Certificate>),
-    /// The gait to certify.
+    /// The gait that is to be certified.
     Ahead(Packed<Gait>),
 }
 
 /// Looks for the certificate of a trial's gait.
 ///
 /// # Errors
-/// [`Error::Conflict`] when the trial has no converged gait or its subject withdrew, or what the database reports.
+/// [`Error::Conflict`] if the trial has no converged gait or the subject withdrew consent; errors of the database.
 pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certification, Error> {
     let found = trials::get(reader, trial).await?;
     consents::may_be_shown(reader, found.study_id).await?;
@@ -35,7 +35,10 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
     }
     if found.state != TrialState::Converged {
         let state = found.state.as_str();
-        return Err(Error::conflict(format!("trial {} is {state}: only a converged gait is certified", found.number)));
+        return Err(Error::conflict(format!(
+            "Trial {} is {state}. Only a converged gait can be certified.",
+            found.number
+        )));
     }
     Ok(Certification::Ahead(gaits::get(reader, trial).await?))
 }
@@ -43,7 +46,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
 /// The certificate; a new one takes some seconds of processor time, outside any transaction.
 ///
 /// # Errors
-/// When the gait is not well-formed.
+/// When the gait is malformed.
 pub async fn certificate(store: &mut Store, certification: Certification) -> Result<Certificate, Error> {
     match certification {
         Certification::Made(certificate) => Ok(*certificate),
@@ -54,8 +57,8 @@ pub async fn certificate(store: &mut Store, certification: Certification) -> Res
     }
 }
 
-/// Certifies the gait of a trial on a thread of its own that gives way to every solve, and keeps the certificate. Nobody waits
-/// for the thread when this is dropped.
+/// Certifies the gait of a trial on its own low-priority thread and stores the certificate. Dropping the future
+/// abandons the thread.
 ///
 /// # Errors
 /// As [`begin`] and [`certificate`].
@@ -69,21 +72,21 @@ pub async fn aside(
     let gait = store.compute(move |pool| gait.unpack(pool)).await??;
     let certifier = Arc::clone(certifier);
     let told = behind_solves("certifier", move || certifier.certify(&gait))
-        .map_err(|e| Error::Internal(format!("no thread for a certification: {e}")))?;
+        .map_err(|e| Error::Internal(format!("cannot start a thread for a certification: {e}")))?;
     let found = match told.await {
         Ok(Ok(certificate)) => certificate,
         Ok(Err(reason)) => Certificate::failed_because(&reason.to_string()),
-        Err(_) => Certificate::failed_because("the certification broke off"),
+        Err(_) => Certificate::failed_because("The certification was aborted."),
     };
     let mut writer = store.write().await?;
     record(&mut writer, actor, trial, &found).await?;
     Ok(commit(writer).await?)
 }
 
-/// Keeps a certificate.
+/// Stores a certificate.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn record(
     writer: &mut Writer,
     actor: &Actor,

@@ -1,7 +1,7 @@
-//! What the service certifies by itself: the best gaits of studies that have ended, and of those whose recommendation was
-//! asked for, until one passes.
+//! Background task that certifies the best gaits of a study until one passes. It takes requested gaits first, then
+//! studies that have ended.
 //!
-//! Which gait comes next follows from the record alone, so a process that is killed goes on where it was.
+//! The next gait derives from the record alone, so the task continues after a crash.
 
 use super::belief::Beliefs;
 use super::choice::ranking_to_show;
@@ -17,7 +17,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{Notify, watch};
 
-/// Certifies gaits one after the other, beside the solves.
+/// Certifies gaits one at a time, at lower priority than solves.
 pub(super) struct Certifier {
     store: Store,
     certify: Arc<dyn Certify>,
@@ -26,7 +26,7 @@ pub(super) struct Certifier {
     asked: Notify,
 }
 
-/// What is certified next.
+/// What to certify next.
 enum Next {
     Trial(TrialId),
     Study(StudyId),
@@ -34,22 +34,22 @@ enum Next {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Trials whose gaits somebody asked for, for people to walk with or to be asked about; the newest comes first.
+    /// Trials whose gaits people wait for, in a lab session or a comparison. The newest comes first.
     asked: BTreeSet<TrialId>,
     /// Studies with gaits to look at.
     waiting: BTreeSet<StudyId>,
-    /// Gaits whose certificates could not be written.
+    /// Gaits whose certificates could not be stored.
     refused: BTreeSet<TrialId>,
 }
 
 impl Certifier {
-    /// Over a record; [`Self::run`] sets it to work.
+    /// Creates the task; [`Self::run`] starts it.
     pub(super) fn new(store: Store, certify: Arc<dyn Certify>, beliefs: Arc<Beliefs>) -> Self {
         Self { store, certify, beliefs, state: Mutex::default(), asked: Notify::new() }
     }
 
-    /// Asks for the best gaits of a study; `next` is the one that the record has no certificate of. `false`: that one cannot
-    /// be certified.
+    /// Requests the best gaits of a study. `next` is the first one without a certificate. Returns `false` if that one
+    /// cannot be certified.
     pub(super) fn ask(&self, study: StudyId, next: TrialId) -> bool {
         let mut state = self.state();
         if state.refused.contains(&next) {
@@ -60,7 +60,7 @@ impl Certifier {
         true
     }
 
-    /// Asks for one gait, before those of studies that have ended.
+    /// Requests one gait, ahead of studies that have ended.
     pub(super) fn ask_for(&self, trial: TrialId) {
         let mut state = self.state();
         if !state.refused.contains(&trial) && state.asked.insert(trial) {
@@ -74,14 +74,14 @@ impl Certifier {
         state.waiting.contains(&study) && !state.refused.contains(&gait)
     }
 
-    /// Works for ever. `pulse` changes whenever something was recorded; `changed` tells that something was, `through` that a
-    /// study has no gait left to certify.
+    /// Runs forever. `pulse` changes with every change of the record. Calls `changed` after it stored a certificate,
+    /// and `through` when a study has no gait left to certify.
     pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
-        // Beginning with every study that ended before this process did.
+        // Start with the studies that ended before this process started.
         let mut heard = 0;
         loop {
             if let Err(error) = self.hear_of_ended(&mut heard).await {
-                tracing::error!(%error, "cannot tell which studies have ended");
+                tracing::error!(%error, "cannot read which studies have ended");
             }
             let next = tokio::select! {
                 next = self.next() => next,
@@ -114,7 +114,7 @@ impl Certifier {
         }
     }
 
-    /// Looks at studies in which something happened and that have ended.
+    /// Queues studies that have ended since the event `heard`.
     async fn hear_of_ended(&self, heard: &mut i64) -> StoreResult<()> {
         let (ended, newest) = events::of_ended_studies(&mut *self.store.read().await?, *heard).await?;
         *heard = newest;
@@ -122,7 +122,7 @@ impl Certifier {
         Ok(())
     }
 
-    /// What somebody waits for comes first, then the newest study: it is the one that somebody is about to look at.
+    /// Requested gaits come first, then the newest study, because somebody is likely to look at it soon.
     async fn next(&self) -> Next {
         loop {
             {
@@ -138,16 +138,16 @@ impl Certifier {
         }
     }
 
-    /// Certifies the gait of a trial. What cannot be certified has failed, and its certificate says why.
+    /// Certifies the gait of a trial. If that is impossible, the trial gets a failed certificate that says why.
     async fn certify(&self, trial: TrialId) -> Result<(), Error> {
         match certification::aside(&mut self.store.clone(), &Actor::program(), trial, &self.certify).await {
-            // There is nothing to certify, or the subject withdrew meanwhile.
+            // The trial has no gait, or the subject withdrew consent in the meantime.
             Err(Error::Conflict(_) | Error::NotFound { .. }) => Ok(()),
             other => other,
         }
     }
 
-    /// Certifies the next gait of a study. `false`: there is none.
+    /// Certifies the next gait of a study. Returns `false` if there is none.
     async fn certify_next(&self, id: StudyId) -> Result<bool, Error> {
         let mut store = self.store.clone();
         let mut reader = store.read().await?;
@@ -158,7 +158,7 @@ impl Certifier {
         let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
         if snapshot.waits_for_first_answer() {
-            // Nothing is recommended yet.
+            // The study recommends no gait yet.
             return Ok(false);
         }
         let beliefs = Arc::clone(&self.beliefs);
@@ -172,7 +172,7 @@ impl Certifier {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // The state is whole between any two statements that hold the lock.
+        // The state is consistent between statements, so a poisoned lock is usable.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,4 @@
-//! Changing a study: its limits, more trials, a fork. One way in for form and REST.
+//! Changes a study: its name and limits, its trial budget, or a fork of it. For pages and REST.
 
 use super::lifecycle::{self, Act};
 use super::plan;
@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// What can be changed of a study in place; what is absent stays.
+/// Changes of a study. Absent fields keep their values.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Change {
@@ -19,17 +19,17 @@ pub struct Change {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 120)]
     pub name: Option<String>,
-    /// Higher runs first.
+    /// Priority, -10 to 10. Higher values run first.
     #[serde(default)]
     #[schema(minimum = -10, maximum = 10)]
     pub priority: Option<i32>,
-    /// How many trials at the same time.
+    /// Number of trials that run in parallel.
     #[serde(default)]
     #[schema(minimum = 1, maximum = 64)]
     pub parallel_trials: Option<u32>,
 }
 
-/// Changes a study in place.
+/// Applies changes to a study.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`].
@@ -55,19 +55,19 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
     changed(writer, actor, "study.change", &study, study.state, &detail).await
 }
 
-/// More trials.
+/// A larger trial budget.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Extend {
-    /// How many trials in all: more than now.
+    /// Total number of trials. Must exceed the current budget.
     #[schema(minimum = 2, maximum = 10000)]
     pub trial_budget: u32,
 }
 
-/// Gives a study more trials; an ended one goes on.
+/// Raises the trial budget of a study. A study that has ended resumes.
 ///
 /// # Errors
-/// [`Error::Invalid`] when it would not be more, [`Error::NotFound`].
+/// [`Error::Invalid`] if the budget would not grow, [`Error::NotFound`].
 pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Extend) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let least = i64::from(study.plan.trial_budget) + 1;
@@ -84,37 +84,37 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Exte
     };
     studies::set_limits(writer, id, &limits).await?;
     if state != study.state && !studies::set_state(writer, &study, state, "extended").await? {
-        return Err(Error::conflict("the study changed at the same moment; try again"));
+        return Err(Error::conflict("The study was changed at the same time. Try again."));
     }
     let detail = json!({ "from": study.plan.trial_budget, "to": more.trial_budget, "state": state });
     changed(writer, actor, "study.extend", &study, state, &detail).await
 }
 
-/// A study like another one; what is absent is as there.
+/// A new study with the set-up of another one. Absent fields are copied.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fork {
     /// Name shown to people.
     #[serde(default)]
     pub name: Option<String>,
-    /// Every random draw derives from it.
+    /// Seed of every random draw except allocations.
     #[serde(default)]
     pub seed: Option<u64>,
-    /// How many trials.
+    /// Number of trials.
     #[serde(default)]
     pub trial_budget: Option<u32>,
-    /// With muscles or without.
+    /// Whether to solve with muscles.
     #[serde(default)]
     pub muscles: Option<bool>,
-    /// Who answers the comparisons.
+    /// Who answers comparisons.
     #[serde(default)]
     pub feedback_mode: Option<FeedbackMode>,
-    /// Whether to start at once.
+    /// Whether to start the study immediately.
     #[serde(default)]
     pub start: bool,
 }
 
-/// Makes a study with the set-up of another one, and none of its trials.
+/// Creates a study with the set-up of another one, without its trials.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`].
@@ -128,7 +128,7 @@ pub async fn fork(writer: &mut Writer, actor: &Actor, id: StudyId, fork: &Fork) 
     new.feedback_mode = fork.feedback_mode.unwrap_or(new.feedback_mode);
     new.start = fork.start;
     let made = plan::create_from(writer, actor, new, Some(id)).await?;
-    // Only members see what a restricted study is made of, in a copy too.
+    // The set-up of a restricted study stays visible to its members only.
     members::inherit(writer, id, made.id, actor.as_str()).await?;
     Ok(made)
 }

@@ -1,4 +1,4 @@
-//! What to try next, as a pure function of where the study stands.
+//! Chooses the next trial and the best trial of a study, as pure functions of its snapshot.
 
 use super::belief::Beliefs;
 use super::search;
@@ -14,26 +14,25 @@ use thiserror::Error;
 /// Why no trial could be chosen.
 #[derive(Debug, Error)]
 pub enum ChoiceError {
-    /// The learner refused.
+    /// The learner failed.
     #[error(transparent)]
     Learner(#[from] LearnerError),
-    /// The action makes no valid bounds.
+    /// The action gives invalid bounds.
     #[error(transparent)]
     Bounds(#[from] ModelError),
 }
 
 impl ChoiceError {
-    /// Whether every action of the search space was tried: the end of a study, not a fault.
+    /// Whether every action of the search space was tried, which ends a study.
     pub fn is_exhausted(&self) -> bool {
         matches!(self, Self::Learner(LearnerError::Exhausted { .. }))
     }
 }
 
-/// The next trial of a study, after what the learner believes now. Depends on the snapshot alone: the same log gives the same
-/// trial, bit for bit.
+/// The next trial of a study. It depends on the snapshot alone: the same log gives the same trial, bit for bit.
 ///
 /// # Errors
-/// [`ChoiceError`], among them that every action was tried.
+/// [`ChoiceError`], also if every action was tried.
 pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
     let plan = &snapshot.study.plan;
     let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
@@ -50,7 +49,7 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> R
     })
 }
 
-/// The converged trial with the highest posterior mean, the earliest of equals: the gait to start from.
+/// The converged trial with the highest posterior mean, from whose gait the next solve starts. The earliest wins a tie.
 ///
 /// # Errors
 /// When a trial's action is not in the search space.
@@ -58,8 +57,7 @@ pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Op
     Ok(by_mean(snapshot, belief, |_| true)?.first().copied())
 }
 
-/// The recommended trial: of those with a gait, that with the highest posterior mean; a gait that somebody called unsafe is
-/// never recommended.
+/// The recommended trial: the one with the highest posterior mean among gaits without an open safety report.
 ///
 /// # Errors
 /// As [`best_converged`].
@@ -67,7 +65,7 @@ pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option
     Ok(ranking(snapshot, belief)?.first().copied())
 }
 
-/// The gaits of a study that nobody called unsafe, the recommended one first, by posterior mean.
+/// The gaits of a study without an open safety report, by decreasing posterior mean. The first is recommended.
 ///
 /// # Errors
 /// As [`best_converged`].
@@ -75,7 +73,7 @@ pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<Trial
     by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.closes(trial.id))
 }
 
-/// Converged trials by posterior mean, the earliest of equals first.
+/// Converged trials by decreasing posterior mean; ties by number.
 fn by_mean(
     snapshot: &StudySnapshot,
     belief: &Posterior,
@@ -89,13 +87,13 @@ fn by_mean(
     Ok(ranked.into_iter().map(|(_, id)| id).collect())
 }
 
-/// From so many trials on, what the learner last believed is shown instead of asking it anew.
+/// From this number of trials on, pages show the last known best trial instead of computing the posterior.
 pub const MANY: usize = 400;
 
-/// The ranking for showing: of a large study only the trial that was the best when the newest one was proposed.
+/// The ranking for pages. For a large study it has only the trial that was best when the newest one was proposed.
 ///
 /// # Errors
-/// When the learner refuses the log.
+/// When the learner cannot work with the log.
 pub fn ranking_to_show(
     pool: &OnPool,
     snapshot: &StudySnapshot,
@@ -107,8 +105,7 @@ pub fn ranking_to_show(
     ranking(snapshot, &*beliefs.posterior(pool, snapshot)?)
 }
 
-/// What the learner last believed to be best, if that has a gait that nobody called unsafe; it does not take every trial to
-/// tell.
+/// The trial that was best at the newest proposal, if its gait has no open safety report. Needs only the newest trials.
 pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
     let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
     (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.closes(best.id)).then_some(best.id)
@@ -116,7 +113,7 @@ pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
 
 fn reason_in_words(reason: ProposalReason) -> String {
     match reason {
-        ProposalReason::FirstAction => "first one: drawn at random",
+        ProposalReason::FirstAction => "first trial, drawn at random",
         ProposalReason::RandomAction => "drawn at random",
         ProposalReason::ThompsonOnLine => "on a line through the best",
         ProposalReason::ExpectedBestUtility => "highest expected utility beside the best",

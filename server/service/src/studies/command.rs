@@ -1,4 +1,4 @@
-//! What a person does to a study or a trial: start, pause, resume, stop; cancel, retry. Each in one transaction.
+//! Commands for studies (start, pause, resume, stop) and trials (cancel, retry), each in one transaction.
 
 use super::lifecycle::{self, Act};
 use super::record;
@@ -9,23 +9,27 @@ use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId, Writer, events, studies, trials};
 use serde_json::json;
 
-/// A study after an act, and the trials whose solves must be told to stop once the act is durable.
+/// The result of a command. The solves of `cancelled` must be stopped once the command is durable.
 #[derive(Debug)]
 pub struct Done {
     /// The study.
     pub study: Study,
-    /// Trials that were cancelled with it.
+    /// Trials that the command cancelled.
     pub cancelled: Vec<TrialId>,
 }
 
-/// Does it, if it is possible where the study stands.
+/// Carries out a command, if the state of the study allows it.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long, or [`Error::Conflict`] with what is possible
-/// instead.
+/// [`Error::NotFound`], [`Error::Invalid`] for a reason that is too long, [`Error::Conflict`] with the possible
+/// commands.
 pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reason: &str) -> Result<Done, Error> {
     if reason.chars().count() > 2000 {
-        return Err(Error::invalid("reason", reason.chars().count(), "at most 2000 characters"));
+        return Err(Error::invalid(
+            "reason",
+            format!("{} characters long", reason.chars().count()),
+            "at most 2000 characters long",
+        ));
     }
     let study = studies::get(writer, id).await?;
     let cancelled = if act == Act::Stop {
@@ -40,10 +44,10 @@ pub async fn act(writer: &mut Writer, actor: &Actor, id: StudyId, act: Act, reas
     Ok(Done { study: changed, cancelled })
 }
 
-/// Ends a study with its open trials, which it gives; whoever does so says it in the audit trail.
+/// Stops a study and returns its open trials, which it cancels. The caller writes the audit trail.
 ///
 /// # Errors
-/// [`Error::Conflict`] when it has ended.
+/// [`Error::Conflict`] if the study has ended.
 pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Result<Vec<TrialId>, Error> {
     let mut cancelled = Vec::new();
     for trial in trials::of_study(writer, study.id).await?.into_iter().filter(|trial| trial.state.is_open()) {
@@ -57,25 +61,25 @@ pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Re
 async fn move_on(writer: &mut Writer, study: &Study, act: Act, reason: &str) -> Result<(), Error> {
     let state = lifecycle::after(study.state, act)?;
     if !studies::set_state(writer, study, state, reason).await? {
-        return Err(Error::conflict("the study changed at the same moment; try again"));
+        return Err(Error::conflict("The study was changed at the same time. Try again."));
     }
     Ok(events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": reason })).await?)
 }
 
-/// Ends an open trial.
+/// Cancels an open trial.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Conflict`] when it has ended.
+/// [`Error::NotFound`], or [`Error::Conflict`] if the trial has ended.
 pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &str) -> Result<Trial, Error> {
     record::cancelled(writer, id, reason).await?;
     audit::append(writer, actor, "trial.cancel", &format!("trial {id}"), &json!({ "reason": reason })).await?;
     Ok(trials::get(writer, id).await?)
 }
 
-/// Lets a trial that gave no result run once more.
+/// Queues a trial without a result again.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Conflict`] when it has a result or is open.
+/// [`Error::NotFound`], or [`Error::Conflict`] if the trial is open or has a result.
 pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<Trial, Error> {
     record::retried(writer, id).await?;
     audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?;

@@ -1,4 +1,4 @@
-//! Whom to compare a new trial with, and what Gait RMSE answers.
+//! Chooses the pairs that are compared, and answers them from Gait RMSE where no person does.
 
 use super::snapshot::StudySnapshot;
 use super::walkable::{NotWalkable, WalkablePair, is_same_gait};
@@ -9,11 +9,11 @@ use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::trials::Trial;
 use std::collections::HashSet;
 
-/// The earlier converged trials that a new converged trial is compared with: the best of them, or the last ones,
-/// as the learner's settings say. `snapshot` is read before the new trial's result is in it.
+/// The earlier converged trials that a new converged trial is compared with: the best one or the latest ones, depending
+/// on the settings of the learner. `snapshot` does not have the result of the new trial yet.
 ///
 /// # Errors
-/// When the learner refuses the log.
+/// When the learner cannot work with the log.
 pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
     let Some(new) = snapshot.trial(new) else { return Ok(Vec::new()) };
     let plan = &snapshot.study.plan;
@@ -25,7 +25,7 @@ pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Ve
     Ok(questions.into_iter().filter_map(|q| snapshot.trial_of(q.against)).map(|trial| trial.id).collect())
 }
 
-/// What Gait RMSE says about two gaits: the smaller one is better, equal ones tie.
+/// The preference that Gait RMSE implies: the smaller value is better, equal values tie.
 pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
     if new.1 < old.1 {
         FeedbackContent::Preference { winner: new.0, loser: old.0 }
@@ -36,19 +36,19 @@ pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent
     }
 }
 
-/// What a study asks people now.
+/// The comparison that a study currently asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Question {
-    /// Nothing.
+    /// No comparison.
     None,
-    /// This pair: the newest gait first.
+    /// This pair, with the newest gait first.
     Pair(WalkablePair),
-    /// The gait of this trial is to be certified first.
+    /// A comparison, once the gait of this trial is certified.
     AfterCertificate(TrialId),
 }
 
 impl Question {
-    /// The trials of the pair, if there is one to be asked about now: the newest gait first.
+    /// The trials of the pair, with the newest gait first.
     pub fn trials(&self) -> Option<(TrialId, TrialId)> {
         match self {
             Self::Pair(pair) => Some(pair.trials()),
@@ -57,11 +57,11 @@ impl Question {
     }
 }
 
-/// The pair of gaits that a person should compare now, if there is one: the newest converged gait with a partner that
-/// nobody has compared it with, and that is another gait. Which pair it is does not depend on when certificates come.
+/// The pair that a person should compare now: the newest converged gait and a different gait that nobody has compared
+/// with it. The pair does not depend on when certificates arrive.
 ///
 /// # Errors
-/// When the learner refuses the log.
+/// When the learner cannot work with the log.
 pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
     let plan = &snapshot.study.plan;
     let log = snapshot.log();
@@ -75,7 +75,7 @@ pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, L
     candidates.retain(|action| {
         *action == newest || !snapshot.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
     });
-    // Whom to compare with follows from what was heard before: else an answer about the newest gait could move the
+    // The partner derives from the answers before the newest gait. Otherwise an answer about that gait could change the
     // best one, and with it the question.
     let mut before = log.clone();
     before.feedback.retain(|feedback| match feedback.actions() {

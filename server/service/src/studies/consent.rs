@@ -1,4 +1,4 @@
-//! Consent of a subject: written down, and withdrawn, which ends every study of the subject.
+//! Records that a subject consents, or withdraws consent, which stops every study of the subject.
 
 use super::command;
 use crate::error::Error;
@@ -10,25 +10,25 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// What a subject signed.
+/// A consent that a subject signed.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewConsent {
-    /// Which version of which form.
+    /// Name and version of the consent form.
     #[schema(min_length = 1, max_length = 2000)]
     pub form: String,
 }
 
-/// That a subject does not take part any more.
+/// A withdrawal of consent.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Withdrawal {
-    /// Reason, if the subject gives one.
+    /// Reason, if the subject gave one.
     #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
 }
 
-/// Writes down what a subject signed.
+/// Records a consent.
 ///
 /// # Errors
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field.
@@ -40,11 +40,11 @@ pub async fn give(writer: &mut Writer, actor: &Actor, id: SubjectId, new: &NewCo
     Ok(row)
 }
 
-/// Writes down that a subject withdrew, and stops the subject's studies. Also gives the trials that were cancelled
-/// with them: their solves are to be told to stop once this is durable.
+/// Records that a subject withdrew consent, and stops the subject's studies. Returns the cancelled trials too: their
+/// solves must be stopped once this is durable.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] when the subject withdrew before.
+/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] if consent was already withdrawn.
 pub async fn withdraw(
     writer: &mut Writer,
     actor: &Actor,
@@ -55,11 +55,11 @@ pub async fn withdraw(
     subjects::get(writer, id).await?;
     let before = consents::of_subject(writer, id).await?;
     if before.last().is_some_and(|last| last.kind == ConsentKind::Withdrawn) {
-        return Err(Error::conflict("this subject withdrew before"));
+        return Err(Error::conflict("This subject has already withdrawn consent."));
     }
     let (mut stopped, mut cancelled) = (Vec::new(), Vec::new());
     for study in studies::open_of(writer, id).await? {
-        cancelled.extend(command::stop(writer, &study, "the subject withdrew").await?);
+        cancelled.extend(command::stop(writer, &study, "the subject withdrew consent").await?);
         stopped.push(study.id);
     }
     let row = consents::append(writer, id, ConsentKind::Withdrawn, reason, actor).await?;

@@ -1,4 +1,4 @@
-//! Adding a device: one way in for the REST interface and the command line.
+//! Checks and adds a device, for REST and the command line.
 
 use crate::error::Error;
 use crate::printable;
@@ -8,7 +8,7 @@ use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::devices::{self, Device};
 use serde_json::json;
 
-/// Checks a device's name and numbers.
+/// Checks the name and the numbers of a device.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
@@ -17,8 +17,8 @@ pub fn check(definition: &Definition) -> Result<(), Error> {
     Ok(definition.validate()?)
 }
 
-/// Checks a device and writes it; the one that is there already where it is the very same. Two devices of one name could
-/// not be told apart where one is chosen.
+/// Adds a device, or returns the identical one that is already on record. Names are unique, so that people can choose
+/// one from a list.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.

@@ -1,8 +1,8 @@
-//! What the service explains: trials without a gait for which somebody asked, then those of studies that have ended and whose
-//! best gaits were certified.
+//! Background task that explains trials without a gait: requested ones first, then those of ended studies whose best
+//! gaits are certified.
 //!
-//! Which trial comes next follows from the record, so a process that is killed goes on where it was. One is explained at a
-//! time, behind every solve.
+//! The next trial derives from the record, so the task continues after a crash. It explains one trial at a time, at
+//! lower priority than solves.
 
 use super::explanation::{self, Effort};
 use crate::error::Error;
@@ -16,7 +16,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{Notify, watch};
 
-/// Explains trials one after the other, beside the solves.
+/// Explains trials one at a time, at lower priority than solves.
 pub(super) struct Explainer {
     store: Store,
     explain: Arc<dyn Explain>,
@@ -26,7 +26,7 @@ pub(super) struct Explainer {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Studies whose best gaits were certified.
+    /// Ended studies whose best gaits are certified.
     ended: BTreeSet<StudyId>,
     /// What is being explained.
     running: Option<TrialId>,
@@ -34,7 +34,7 @@ struct State {
     refused: BTreeMap<TrialId, String>,
 }
 
-/// Cancels when nobody waits any more.
+/// Cancels the solves when the caller stops waiting.
 struct CancelOnDrop(CancelToken);
 
 impl Drop for CancelOnDrop {
@@ -44,18 +44,18 @@ impl Drop for CancelOnDrop {
 }
 
 impl Explainer {
-    /// Over a record; [`Self::run`] sets it to work.
+    /// Creates the task; [`Self::run`] starts it.
     pub(super) fn new(store: Store, explain: Arc<dyn Explain>) -> Self {
         Self { store, explain, state: Mutex::default(), told: Notify::new() }
     }
 
-    /// Takes up a study whose best gaits were certified.
+    /// Queues an ended study whose best gaits are certified.
     pub(super) fn take_up(&self, study: StudyId) {
         self.state().ended.insert(study);
         self.told.notify_one();
     }
 
-    /// What is done about a trial.
+    /// The state of the explanation of a trial in this process.
     pub(super) fn effort(&self, trial: TrialId) -> Effort {
         let state = self.state();
         match state.refused.get(&trial) {
@@ -84,7 +84,7 @@ impl Explainer {
         }
     }
 
-    /// Explains the next trial. `false`: there is none.
+    /// Explains the next trial. Returns `false` if there is none.
     async fn explain_next(&self, pulse: &mut watch::Receiver<u64>) -> Result<bool, Error> {
         let Some(trial) = self.next().await? else { return Ok(false) };
         self.state().running = Some(trial);
@@ -98,7 +98,7 @@ impl Explainer {
         Ok(true)
     }
 
-    /// What was asked for first; then the newest study: it is the one that somebody is about to look at.
+    /// Requested trials come first, in order, then the newest study, because somebody is likely to look at it soon.
     async fn next(&self) -> StoreResult<Option<TrialId>> {
         let refused: BTreeSet<TrialId> = self.state().refused.keys().copied().collect();
         let mut reader = self.store.read().await?;
@@ -114,8 +114,8 @@ impl Explainer {
         }
     }
 
-    /// Explains a trial and keeps the explanation, unless its subject withdraws meanwhile. The solves stop when this is
-    /// dropped.
+    /// Explains a trial and stores the explanation, unless the subject withdraws consent in the meantime. Dropping the
+    /// future cancels the solves.
     async fn explain(&self, trial: TrialId, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
         let mut store = self.store.clone();
         let mut reader = store.read().await?;
@@ -126,7 +126,7 @@ impl Explainer {
         let (explain, cancel) = (Arc::clone(&self.explain), CancelToken::new());
         let _cancels = CancelOnDrop(cancel.clone());
         let mut told = behind_solves("explainer", move || explain.explain(&solve, &cancel))
-            .map_err(|e| Error::Internal(format!("no thread for an explanation: {e}")))?;
+            .map_err(|e| Error::Internal(format!("cannot start a thread for an explanation: {e}")))?;
         let found = loop {
             tokio::select! {
                 found = &mut told => break found.map_err(|_| Error::Internal("the explanation panicked".to_owned()))?,
@@ -137,11 +137,11 @@ impl Explainer {
                 }
             }
         };
-        let nothing = || Error::Internal("the explanation ended without a word".to_owned());
+        let nothing = || Error::Internal("the explanation ended without a result".to_owned());
         explanation::record(&self.store, trial, &problem, &found?.ok_or_else(nothing)?).await
     }
 
-    /// Remembers what cannot be explained, and says so.
+    /// Records that a trial cannot be explained.
     async fn refuse(&self, trial: TrialId, error: &Error) -> Result<(), Error> {
         tracing::warn!(%trial, %error, "a trial cannot be explained");
         let reason = error.to_string();

@@ -1,4 +1,4 @@
-//! Why a trial has no gait: found out when somebody asks or its study has ended, then kept.
+//! The infeasibility explanation of one trial: its state, requests for it, and its storage.
 
 use super::solve_input::{PackedInput, SolveInput};
 use crate::error::Error;
@@ -12,38 +12,38 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, Packed, Store, TrialId, Writer, commit, consents, events, gaits, studies, trials};
 use serde_json::json;
 
-/// Where the explanation of a trial stands.
+/// The state of the explanation of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExplanationState {
-    /// It was made.
+    /// The explanation is on record.
     Made(Box<Explained>),
-    /// It is made now, or after those that were asked for before.
+    /// The explanation is being computed or was requested.
     BeingMade,
-    /// Its turn comes after others of its study; who asks gets it before them.
+    /// The explanation follows those of other trials of the study. A request moves it ahead.
     Waiting,
-    /// It cannot be made, and why.
+    /// The trial cannot be explained, for this reason.
     Refused(String),
-    /// Nobody asked for it.
+    /// The explanation was not requested.
     NotAsked,
 }
 
-/// What this process does about the explanation of a trial.
+/// The state of the explanation of a trial in this process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Effort {
-    /// It explains nothing.
+    /// This process explains no trials.
     None,
-    /// It explains what is asked for, and studies that have ended, but not this trial at present.
+    /// This process explains trials, but is not explaining this one.
     Ready,
-    /// It is at it.
+    /// The trial is being explained.
     Running,
     /// It tried, and why it could not.
     Refused(String),
 }
 
-/// Where the explanation of a trial stands.
+/// The state of the explanation of a trial.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result<ExplanationState, Error> {
     if let Some(made) = explanations::find(db, trial.id).await? {
         return Ok(ExplanationState::Made(Box::new(made)));
@@ -67,10 +67,11 @@ pub async fn state(db: &mut Connection, trial: &Trial, effort: Effort) -> Result
     }
 }
 
-/// Asks for the explanation of a trial. `None`: it is being made.
+/// Requests the explanation of a trial. Returns `None` while it is being computed.
 ///
 /// # Errors
-/// [`Error::Conflict`] when it cannot be made or the subject withdrew, [`Error::NotFound`], or what the database reports.
+/// [`Error::Conflict`] if the trial cannot be explained or the subject withdrew consent, [`Error::NotFound`], errors of
+/// the database.
 pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Effort) -> Result<Option<Explained>, Error> {
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
@@ -87,12 +88,12 @@ pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Effort
     }
 }
 
-/// That a trial cannot be explained, and why.
+/// The error for a trial that cannot be explained.
 pub fn refusal(trial: &Trial, reason: &str) -> Error {
-    Error::conflict(format!("trial {} cannot be explained: {reason}", trial.number))
+    Error::conflict(format!("Trial {} cannot be explained: {reason}", trial.number))
 }
 
-/// What the solve of a trial without a gait left, as it was read.
+/// The stored outcome of a solve without a gait, still compressed.
 pub(super) struct PackedSolve {
     status: SolveStatus,
     violations: Vec<Violation>,
@@ -101,10 +102,10 @@ pub(super) struct PackedSolve {
 }
 
 impl PackedSolve {
-    /// What there is to explain, and the problem as a file.
+    /// The solve to explain, and its problem as a file.
     ///
     /// # Errors
-    /// What the record reports of damage.
+    /// [`Error::Store`] if the stored outcome is damaged.
     pub(super) fn unpack(self, pool: &OnPool) -> Result<(Unexplained, String), Error> {
         let Self { status, violations, last, input } = self;
         let input = input.unpack(pool)?;
@@ -114,11 +115,10 @@ impl PackedSolve {
     }
 }
 
-/// What the solve of a trial without a gait left.
+/// Reads the stored outcome of a trial without a gait.
 ///
 /// # Errors
-/// [`Error::Conflict`] when there is nothing to explain, [`Error::NotFound`] for what was dropped, or what the database
-/// reports.
+/// [`Error::Conflict`] if there is nothing to explain, [`Error::NotFound`] if data was pruned, errors of the database.
 pub(super) async fn unexplained(db: &mut Connection, id: TrialId) -> Result<PackedSolve, Error> {
     let trial = trials::get(db, id).await?;
     let status = explainable(db, &trial).await?;
@@ -127,10 +127,10 @@ pub(super) async fn unexplained(db: &mut Connection, id: TrialId) -> Result<Pack
     Ok(PackedSolve { status, violations: trial.violations, last, input })
 }
 
-/// Keeps what was found out about a problem.
+/// Stores the explanation of a problem.
 ///
 /// # Errors
-/// [`Error::Conflict`] when the subject withdrew, or what the database reports.
+/// [`Error::Conflict`] if the subject withdrew consent; errors of the database.
 pub(super) async fn record(store: &Store, id: TrialId, problem: &str, explanation: &Explanation) -> Result<(), Error> {
     let mut writer = store.write().await?;
     if explanations::keep(&mut writer, id, problem, explanation).await? {
@@ -144,20 +144,22 @@ pub(super) async fn record(store: &Store, id: TrialId, problem: &str, explanatio
     Ok(commit(writer).await?)
 }
 
-/// How the program's own solve of a trial ended without a gait, where its last iterate was kept.
+/// The status of a trial that can be explained: our own solve ended without a gait, and its last iterate was kept.
 async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, Error> {
     let number = trial.number;
     if trial.asked_by.is_some() {
-        return Err(Error::conflict(format!("a script evaluated trial {number}: there is no solve to explain")));
+        return Err(Error::conflict(format!(
+            "Trial {number} was evaluated by a script, so there is no solve to explain."
+        )));
     }
     let Some(status) = trial.status.filter(|_| trial.state == TrialState::NotConverged) else {
         let state = trial.state.as_str();
         return Err(Error::conflict(format!(
-            "trial {number} is {state}: only a trial that did not converge is explained"
+            "Trial {number} is {state}. Only a trial that did not converge can be explained."
         )));
     };
     if !gaits::is_here(db, trial.id).await? {
-        return Err(Error::conflict(format!("the last iterate of trial {number} was not kept")));
+        return Err(Error::conflict(format!("The last iterate of trial {number} was not kept.")));
     }
     Ok(status)
 }

@@ -1,7 +1,7 @@
-//! The best action by iteration: what the study would have recommended after each result.
+//! The history of the recommendation: the best trial after each iteration.
 //!
-//! An iteration is a result. Results count in the order in which they came, which is the order of the trials' numbers
-//! unless several trials run at the same time.
+//! Each result is an iteration. Results count in order of arrival, which is the order of trial numbers unless trials
+//! run in parallel.
 
 use super::snapshot::StudySnapshot;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
@@ -11,27 +11,27 @@ use serde::Serialize;
 use std::collections::HashMap;
 use utoipa::ToSchema;
 
-/// The recommendation after some results.
+/// The recommendation after an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Milestone {
-    /// After how many results this held: 1, 2, ...
+    /// Number of results so far, from 1.
     pub iteration: u32,
-    /// The best trial then.
+    /// Best trial at that time.
     pub trial_id: TrialId,
-    /// Its number.
+    /// Number of that trial.
     pub number: u32,
-    /// Its Gait RMSE, rad; none when it did not converge.
+    /// Gait RMSE of that trial, rad. Absent if it did not converge.
     pub gait_rmse_rad: Option<f64>,
-    /// Its cost of transport.
+    /// Cost of transport of that trial.
     pub cost_of_transport: Option<f64>,
 }
 
-/// The trials that gave a result, in the order in which they did: the first is iteration 1.
+/// The trials with a result, in order of arrival. The first is iteration 1.
 pub fn results(snapshot: &StudySnapshot) -> Vec<&Trial> {
     labelled(snapshot).into_iter().map(|(_, trial)| trial).collect()
 }
 
-/// With the instant at which each was recorded.
+/// The same, with the time at which each result was recorded.
 fn labelled(snapshot: &StudySnapshot) -> Vec<(Instant, &Trial)> {
     let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let label = |row: &FeedbackRow| match row.said {
@@ -41,19 +41,19 @@ fn labelled(snapshot: &StudySnapshot) -> Vec<(Instant, &Trial)> {
     snapshot.feedback.iter().filter_map(label).collect()
 }
 
-/// How many results were there when a trial was proposed.
+/// The number of results when a trial was proposed.
 fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
     let mut count = labelled.partition_point(|(at, _)| *at <= proposed.created_at);
-    // Within one millisecond: what was proposed later cannot have been there before.
+    // Within one millisecond, numbers decide: a later proposal cannot have an earlier result.
     while count > 0 && labelled[count - 1].1.number >= proposed.number {
         count -= 1;
     }
     count
 }
 
-/// The best trial after each iteration at which it was asked for. What the learner believed when it proposed a trial is
-/// the best after the results that were there then; after the last one, what it believes now. The first gait there is
-/// is the best one until more is known. `best`: the best trial now.
+/// The best trial after each iteration at which the learner was asked. Each proposal names the best trial after the
+/// results at that time; `best` is the current one. Before the first proposal with a best trial, the first gait counts
+/// as the best.
 pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
     let labelled = labelled(snapshot);
     let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
@@ -77,7 +77,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
     {
         milestones.extend(milestone(labelled.len(), best));
     }
-    // Of several after the same results, the last one had heard the most.
+    // Among proposals after the same number of results, the last one knew the most answers.
     milestones.sort_by_key(|milestone| milestone.iteration);
     milestones.reverse();
     milestones.dedup_by_key(|milestone| milestone.iteration);
@@ -85,8 +85,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
     milestones
 }
 
-/// What is known of some trials without asking the learner: the best when each was proposed. Iterations are those of
-/// one trial at a time.
+/// The history from the stored proposals alone, without the learner. Assumes that trials ran one at a time.
 pub fn known(snapshot: &StudySnapshot) -> Vec<Milestone> {
     let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let best_before = |trial: &Trial| {

@@ -1,4 +1,4 @@
-//! The life of a study, as a pure function: which change is allowed from where.
+//! The state machine of a study, as a pure function.
 //!
 //! ```text
 //! draft -> running <-> waiting        running, waiting -> finished
@@ -10,38 +10,38 @@
 use gaitwright_store::studies::StudyState;
 use thiserror::Error;
 
-/// Something that is done to a study.
+/// A transition of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// A person starts it.
+    /// A person starts the study.
     Start,
-    /// It needs a person's answer before it can go on.
+    /// The study needs a preference from a person before it can continue.
     Ask,
-    /// The answer is there.
+    /// A person gave the preference.
     Answered,
-    /// A person holds it; solves that run are finished, nothing new starts.
+    /// A person pauses the study. Running solves finish, and no new one starts.
     Pause,
-    /// A person lets it go on.
+    /// A person resumes the study.
     Resume,
-    /// Its budget is used or its stopping rule holds.
+    /// The budget is used up, or a stopping rule applies.
     Finish,
-    /// A person ends it.
+    /// A person stops the study.
     Stop,
-    /// A person gives an ended study more trials.
+    /// A person raises the budget of an ended study.
     Extend,
 }
 
 impl Act {
-    /// Every act.
+    /// Every transition.
     pub const ALL: [Self; 8] =
         [Self::Start, Self::Ask, Self::Answered, Self::Pause, Self::Resume, Self::Finish, Self::Stop, Self::Extend];
 
-    /// In words, for messages.
+    /// A verb for messages and the audit trail.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Start => "start",
-            Self::Ask => "wait for an answer in",
-            Self::Answered => "go on with",
+            Self::Ask => "wait for a preference in",
+            Self::Answered => "continue",
             Self::Pause => "pause",
             Self::Resume => "resume",
             Self::Finish => "finish",
@@ -51,20 +51,20 @@ impl Act {
     }
 }
 
-/// The act is not possible in this state.
+/// The transition is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("cannot {} a study that is {}; possible from here: {}", act.as_str(), state.as_str(), possible(*state))]
+#[error("Cannot {} a study that is {}. Possible now: {}.", act.as_str(), state.as_str(), possible(*state))]
 pub struct NotPossible {
-    /// Where the study stands.
+    /// The state of the study.
     pub state: StudyState,
-    /// What was asked.
+    /// The requested transition.
     pub act: Act,
 }
 
-/// Where a study stands after an act.
+/// The state of a study after a transition.
 ///
 /// # Errors
-/// [`NotPossible`] when the act makes no sense there.
+/// [`NotPossible`] if the state does not allow the transition.
 pub fn after(state: StudyState, act: Act) -> Result<StudyState, NotPossible> {
     use StudyState::{Draft, Finished, Paused, Running, Stopped, Waiting};
     match (state, act) {
@@ -79,7 +79,7 @@ pub fn after(state: StudyState, act: Act) -> Result<StudyState, NotPossible> {
     }
 }
 
-/// The acts a person may do in this state.
+/// The transitions that people can request in this state.
 pub fn acts_of_people(state: StudyState) -> Vec<Act> {
     [Act::Start, Act::Pause, Act::Resume, Act::Stop, Act::Extend]
         .into_iter()
@@ -102,7 +102,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_study_that_ended_only_goes_on_when_it_is_extended(acts in proptest::collection::vec(any_act(), 0..40)) {
+        fn ended_study_resumes_only_when_extended(acts in proptest::collection::vec(any_act(), 0..40)) {
             let mut state = StudyState::Draft;
             for act in acts {
                 let before = state;
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn every_state_is_reached_and_has_a_way_on() {
+    fn every_state_is_reachable_and_can_be_left() {
         for state in [
             StudyState::Draft,
             StudyState::Running,

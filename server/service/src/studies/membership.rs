@@ -1,4 +1,4 @@
-//! Who reaches a study: members are added and removed, and a study is restricted to them. One way in for pages and REST.
+//! Access to a study: adds and removes members, restricts the study to them, and invites raters. For pages and REST.
 
 use crate::access::people::{self, NewUser};
 use crate::access::{Caller, Principal, Reach, Role};
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Somebody to add to a study.
+/// A user or token to add to a study.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewMember {
-    /// Person or program.
+    /// Whether it is a user or a token.
     pub kind: MemberKind,
-    /// Name of a user who is not disabled, or of a token that is still good.
+    /// Name of an enabled user or a valid token.
     pub name: String,
 }
 
@@ -26,14 +26,14 @@ pub struct NewMember {
 pub struct StudyAccess {
     /// Whether only members and administrators reach it. Raters need to be members in any case.
     pub restricted: bool,
-    /// The members, in the order in which they were added.
+    /// Members, in the order in which they were added.
     pub members: Vec<Member>,
 }
 
-/// Who reaches a study.
+/// Reads who can access a study.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn access(db: &mut Connection, study: StudyId) -> Result<StudyAccess, Error> {
     Ok(StudyAccess {
         restricted: members::is_restricted(db, study).await?,
@@ -44,20 +44,20 @@ pub async fn access(db: &mut Connection, study: StudyId) -> Result<StudyAccess, 
 /// Makes a user or a token a member of a study.
 ///
 /// # Errors
-/// [`Error::Invalid`] for an unknown name, [`Error::Conflict`] for a member.
+/// [`Error::Invalid`] for an unknown name, [`Error::Conflict`] if it is a member already.
 pub async fn add(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewMember) -> Result<Member, Error> {
     let who = match new.kind {
         MemberKind::User => users::by_name(writer, &new.name)
             .await?
             .filter(|user| user.disabled_at.is_none())
             .map(|user| Principal::User(user.id))
-            .ok_or_else(|| Error::invalid("name", new.name.as_str(), "the name of a user who is not disabled"))?,
+            .ok_or_else(|| Error::invalid("name", new.name.as_str(), "the name of an enabled user"))?,
         MemberKind::Token => tokens::all(writer)
             .await?
             .into_iter()
             .find(|token| token.name == new.name && token.is_good())
             .map(|token| Principal::Token(token.id))
-            .ok_or_else(|| Error::invalid("name", new.name.as_str(), "the name of a token that is still good"))?,
+            .ok_or_else(|| Error::invalid("name", new.name.as_str(), "the name of a valid token"))?,
     };
     insert(writer, actor, study, who).await
 }
@@ -65,7 +65,7 @@ pub async fn add(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewMe
 async fn insert(writer: &mut Writer, actor: &Actor, study: StudyId, who: Principal) -> Result<Member, Error> {
     let id = members::insert(writer, study, who, actor.as_str())
         .await
-        .on_constraint(MEMBER_ALREADY, || Error::conflict("this is a member of this study already"))?;
+        .on_constraint(MEMBER_ALREADY, || Error::conflict("This user or token is already a member of the study."))?;
     let member = members::get(writer, id).await?;
     let detail = json!({ "member": id, "kind": member.kind, "name": member.name });
     audit::append(writer, actor, "study.member_add", &format!("study {study}"), &detail).await?;
@@ -75,18 +75,19 @@ async fn insert(writer: &mut Writer, actor: &Actor, study: StudyId, who: Princip
 /// Removes a member.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when it was removed already.
+/// [`Error::NotFound`], [`Error::Conflict`] if the member was already removed.
 pub async fn end(writer: &mut Writer, actor: &Actor, id: MemberId) -> Result<Member, Error> {
     let member = members::get(writer, id).await?;
     if !members::end(writer, id, actor.as_str()).await? {
-        return Err(Error::conflict("this member was removed already"));
+        return Err(Error::conflict("This member was already removed."));
     }
     let detail = json!({ "member": id, "kind": member.kind, "name": member.name });
     audit::append(writer, actor, "study.member_end", &format!("study {}", member.study_id), &detail).await?;
     Ok(member)
 }
 
-/// Restricts a study to its members and administrators, or opens it to all staff. Whoever restricts it stays a member.
+/// Restricts a study to its members and administrators, or opens it to all staff. The caller who restricts it becomes a
+/// member.
 ///
 /// # Errors
 /// What the database reports.
@@ -105,7 +106,7 @@ pub async fn restrict(
     access(writer, study).await
 }
 
-/// Makes a caller a member who would not reach the study otherwise.
+/// Makes the caller a member if the study would otherwise become inaccessible to the caller.
 pub(super) async fn keep_in(writer: &mut Writer, caller: &Caller, study: StudyId) -> Result<(), Error> {
     if let Reach::Open(who) | Reach::Assigned(who) = caller.reach()
         && !members::reaches(writer, caller.reach(), study).await?
@@ -115,11 +116,11 @@ pub(super) async fn keep_in(writer: &mut Writer, caller: &Caller, study: StudyId
     Ok(())
 }
 
-/// Assigns a rater to a study and makes a one-time sign-in link: the rater, and the secret of the link, which is not
-/// stored. A rater of that name who does not exist yet is added.
+/// Assigns a rater to a study and creates a one-time sign-in link. Adds the rater if the name is new. Returns the rater
+/// and the secret of the link, which is not stored.
 ///
 /// # Errors
-/// [`Error::Invalid`] for the name of somebody who is no rater, [`Error::Conflict`] for a rater who is disabled.
+/// [`Error::Invalid`] if the name belongs to a user who is not a rater, [`Error::Conflict`] for a disabled rater.
 pub async fn invite(
     writer: &mut Writer,
     actor: &Actor,
@@ -128,7 +129,7 @@ pub async fn invite(
 ) -> Result<(User, Member, String), Error> {
     let user = match users::by_name(writer, name).await? {
         Some(user) if user.role == Role::Rater => user,
-        Some(_) => return Err(Error::invalid("name", name, "the name of a rater, or one that is not taken")),
+        Some(_) => return Err(Error::invalid("name", name, "the name of a rater or a name that is not taken")),
         None => people::add(writer, actor, &NewUser { name: name.to_owned(), role: Role::Rater }).await?,
     };
     let secret = people::link(writer, actor, user.id).await?;
@@ -141,10 +142,10 @@ pub async fn invite(
     Ok((user, member, secret))
 }
 
-/// Users and tokens that could be added to a study, by name.
+/// Users and tokens that can be added to a study, sorted by name.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn candidates(db: &mut Connection, present: &[Member]) -> Result<Vec<(MemberKind, String, String)>, Error> {
     let is_new = |kind, name: &str| !present.iter().any(|member| member.kind == kind && member.name == name);
     let users = users::all(db).await?.into_iter().filter(|user| user.disabled_at.is_none());

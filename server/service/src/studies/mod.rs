@@ -1,8 +1,8 @@
-//! Studies: the tuning loop, and the rules of what may happen to a study and to a trial.
+//! The tuning loop, and the rules for studies and trials.
 //!
-//! The rules ([`lifecycle`], [`trial_state`], [`choice`], [`comparison`]) are pure functions of the record.
-//! The [`Scheduler`](scheduler::Scheduler) applies them: it proposes, dispatches, records; it keeps no state that the
-//! record does not have, so that a process that ends at any instant is continued by the next one.
+//! The rules ([`lifecycle`], [`trial_state`], [`choice`], [`comparison`]) are pure functions of the record. The
+//! [`Scheduler`](scheduler::Scheduler) applies them: it proposes trials, dispatches solves and records results. All its
+//! state is in the record, so a new process continues where a killed one stopped.
 
 pub mod answer;
 pub mod archive;

@@ -1,4 +1,4 @@
-//! What a study needs next, as a pure function of where it stands.
+//! Decides what a study needs next (a trial, a question, the end), as a pure function of its snapshot.
 
 use super::belief::Beliefs;
 use super::choice;
@@ -12,7 +12,7 @@ use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{FeedbackId, now};
 
-/// So many trials in a row without a result pause a study: something is wrong with the set-up.
+/// After this many failed trials in a row a study is paused, because its set-up is probably wrong.
 const FAILURES_IN_A_ROW: usize = 3;
 
 /// What a study needs next.
@@ -22,7 +22,7 @@ pub(super) enum Step {
     Try(NewTrial),
 }
 
-/// Decides it, from the snapshot alone: `beliefs` spares computing what is known.
+/// Decides the next step from the snapshot alone; `beliefs` is a cache.
 pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<Step, Error> {
     let study = &snapshot.study;
     if study.plan.feedback_mode == FeedbackMode::Human {
@@ -31,7 +31,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
                 return Ok(Step::Act(Act::Ask, "a comparison waits for an answer".into()));
             }
             (StudyState::Waiting, Question::None) => return Ok(Step::Act(Act::Answered, String::new())),
-            // A person is asked about the newest gait as soon as it is certified; nothing is planned before.
+            // The comparison follows as soon as the gait is certified. No trial is proposed before.
             (_, Question::AfterCertificate(_)) => return Ok(Step::Nothing),
             _ => {}
         }
@@ -43,7 +43,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
     if failed == FAILURES_IN_A_ROW {
         let message = snapshot.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
-        let reason = format!("{failed} trials in a row failed; the last: {}", message.unwrap_or_default());
+        let reason = format!("{failed} trials in a row failed. The last one: {}", message.unwrap_or_default());
         return Ok(Step::Act(Act::Pause, reason));
     }
     let open = snapshot.open();
@@ -70,7 +70,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     }
 }
 
-/// The trials that would be proposed next, one for each answer to the question that waits for one.
+/// The trials that would be proposed next, one for each possible answer to the pending comparison.
 pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
     let question = comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
     let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
@@ -95,7 +95,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             created_at: now(),
             retraction: None,
         });
-        // What is believed of answers that nobody gave is not kept.
+        // Posteriors of hypothetical answers must not enter the cache.
         if let Step::Try(new) = next_step(pool, &then, &Beliefs::default())?
             && !likely
                 .iter()

@@ -1,4 +1,4 @@
-//! Adding a subject, and what is known of the muscles: one way in for the forms and the REST interface.
+//! Adds and corrects subjects, and records their muscle measurements. For pages and REST.
 
 use crate::error::Error;
 use crate::printable;
@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewSubject {
-    /// Site-given pseudonym: never a name.
+    /// Pseudonym assigned by the site, never a name.
     #[schema(min_length = 1, max_length = 40)]
     pub pseudonym: String,
     /// Body height, m.
@@ -30,7 +30,7 @@ pub struct NewSubject {
     pub notes: String,
 }
 
-/// Checks what is said of a subject.
+/// Checks the data of a subject.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
@@ -41,10 +41,10 @@ pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &s
     Ok(body)
 }
 
-/// Checks a subject and writes it.
+/// Adds a subject.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the pseudonym is taken.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the pseudonym is taken.
 pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<Subject, Error> {
     let pseudonym = new.pseudonym.trim();
     let body = checked(writer, new).await?;
@@ -56,7 +56,7 @@ pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result
     Ok(subject)
 }
 
-/// Checks a subject as [`add`] does, and writes nothing.
+/// Checks a subject as [`add`] does, without adding it.
 ///
 /// # Errors
 /// As [`add`].
@@ -70,10 +70,10 @@ pub async fn checked(db: &mut Connection, new: &NewSubject) -> Result<Body, Erro
 }
 
 fn is_taken(pseudonym: &str) -> Error {
-    Error::conflict(format!("there is a subject {pseudonym:?} already"))
+    Error::conflict(format!("There is already a subject {pseudonym:?}. Choose another pseudonym."))
 }
 
-/// The right height and mass of a subject.
+/// A correction of height and mass.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewCorrection {
@@ -83,15 +83,16 @@ pub struct NewCorrection {
     /// Body mass, kg.
     #[schema(minimum = 35, maximum = 160)]
     pub body_mass_kg: f64,
-    /// Why it is corrected.
+    /// Reason for the correction.
     #[schema(min_length = 1, max_length = 2000, pattern = "\\S")]
     pub reason: String,
 }
 
-/// Corrects height and mass of a subject. Studies made from now on solve with them; those that are there keep theirs.
+/// Corrects height and mass of a subject. New studies use them; existing studies keep the old values.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`], a conflict when nothing would change or the subject withdrew.
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], [`Error::Conflict`] if nothing would change or the subject
+/// withdrew consent.
 pub async fn correct(
     writer: &mut Writer,
     actor: &Actor,
@@ -100,9 +101,9 @@ pub async fn correct(
 ) -> Result<Correction, Error> {
     let before = subjects::get(writer, id).await?.body();
     let body = Body::new(new.height_m, new.body_mass_kg)?;
-    let reason = printable::reason("reason", &new.reason, ": why it is corrected")?;
+    let reason = printable::reason("reason", &new.reason, " that say why the values are corrected")?;
     if body == before {
-        return Err(Error::conflict("height and mass are these already"));
+        return Err(Error::conflict("Height and mass already have these values."));
     }
     let correction = subjects::correct(writer, actor, id, body, reason).await?;
     let detail = json!({
@@ -113,10 +114,10 @@ pub async fn correct(
     Ok(correction)
 }
 
-/// Writes down how the muscles of a subject differ from the published table: studies made from now on take it up.
+/// Records measured muscle values that override the published table. New studies use them.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`], a conflict when the subject withdrew.
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent.
 pub async fn set_muscles(
     writer: &mut Writer,
     actor: &Actor,
@@ -130,27 +131,25 @@ pub async fn set_muscles(
     Ok(())
 }
 
-/// Characters that look like themselves. Controls, joiners, direction overrides and letters without a shape make two
-/// pseudonyms look alike, or one look like another.
+/// Whether a character is visible and unambiguous. Control characters, joiners, direction overrides and blank letters
+/// could make two pseudonyms look alike.
 fn is_visible(c: char) -> bool {
     const SHAPELESS: [char; 4] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}'];
     (c.is_alphanumeric() && !SHAPELESS.contains(&c)) || " -_.:/#+()".contains(c)
 }
 
-/// A pseudonym that could be a person's address, number or date of birth is refused.
+/// Refuses a pseudonym that may be an e-mail address, a number of a person or a date of birth.
 fn check_pseudonym(pseudonym: &str) -> Result<(), Error> {
     let refuse = |allowed| Err(Error::invalid("pseudonym", pseudonym, allowed));
     if pseudonym.is_empty() || pseudonym.chars().count() > 40 {
-        return refuse("1 to 40 characters");
+        return refuse("1 to 40 characters long");
     }
     let digits = pseudonym.chars().filter(|c| c.is_numeric()).count();
     if pseudonym.contains('@') || digits > 5 {
-        return refuse("a code of the site such as S01: no address, no date, no long number");
+        return refuse("a code of the site such as S01, not an address, a date or a long number");
     }
     if !pseudonym.chars().all(is_visible) {
-        return refuse(
-            "letters, digits, spaces and - _ . : / # + ( ): nothing that cannot be seen or turns text around",
-        );
+        return refuse("made of letters, digits, spaces and the characters - _ . : / # + ( )");
     }
     Ok(())
 }

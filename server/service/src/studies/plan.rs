@@ -1,4 +1,4 @@
-//! Making a study: one way in for the form, the REST interface and the command line.
+//! Checks and creates a study, for pages, REST and the command line.
 
 use super::person::{self, NewSubject};
 use super::{catalogue, membership, recording, search};
@@ -17,26 +17,26 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// A study to make. Everything but the subject has a default.
+/// A study to create. Every field except the subject has a default.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewStudy {
-    /// Who walks.
+    /// Subject of the study.
     pub subject_id: SubjectId,
-    /// Name shown to people; by default made from subject and variant.
+    /// Name shown to people. Made from subject and variant by default.
     #[serde(default)]
     pub name: Option<String>,
-    /// With which device; by default the built-in one.
+    /// Device. The built-in one by default.
     #[serde(default)]
     pub device_id: Option<DeviceId>,
-    /// What Gait RMSE is measured against; by default the reference gait nearest to the subject in height and body mass, and
-    /// the built-in one where no reference says whose it is.
+    /// Reference gait for Gait RMSE. By default the one nearest to the subject in height and body mass, or the built-in
+    /// one if no reference gait states height and mass.
     #[serde(default)]
     pub reference_gait_id: Option<ReferenceGaitId>,
-    /// With muscles (C1-C12) or without (C1-C4).
+    /// Whether to solve with muscles (C1-C12) or without (C1-C4).
     #[serde(default = "yes")]
     pub muscles: bool,
-    /// Settings of the gait problem; where they say nothing of muscles, those written down of the subject are taken.
+    /// Settings of the gait problem. Unless they set muscles, the measured muscle values of the subject apply.
     #[serde(default)]
     #[schema(value_type = Object)]
     pub gait_settings: Box<GaitSettings>,
@@ -48,44 +48,44 @@ pub struct NewStudy {
     #[serde(default)]
     #[schema(value_type = schema::Bounds)]
     pub base_bounds: TunedBounds,
-    /// What is tuned; by default Table I.
+    /// Tuned bounds and their values. Table I of the paper by default.
     #[serde(default)]
     #[schema(value_type = Option<schema::SearchSpace>)]
     pub search_space: Option<SearchSpace>,
-    /// Settings of the learner; what is left out is what is recommended for the method.
+    /// Settings of the learner. Absent settings have the recommended values of the method.
     #[serde(default)]
     #[schema(value_type = Object)]
     pub learner: LearnerSettings,
-    /// Who answers the comparisons.
+    /// Who answers comparisons.
     #[serde(default = "automatic")]
     pub feedback_mode: FeedbackMode,
-    /// Who evaluates the trials.
+    /// Who evaluates trials.
     #[serde(default = "optimizer")]
     pub evaluation: Evaluation,
-    /// How many trials.
+    /// Number of trials.
     #[serde(default = "fifteen")]
     #[schema(minimum = 1, maximum = 10000)]
     pub trial_budget: u32,
-    /// No new trial once the solves so far took so many seconds together.
+    /// Total solve time, s, after which no new trial starts.
     #[serde(default)]
     pub solve_seconds_budget: Option<f64>,
-    /// Done when the best action stayed the same over so many results in a row.
+    /// The study finishes when the best action has not changed over this many results.
     #[serde(default)]
     #[schema(minimum = 1, maximum = 10000)]
     pub unchanged_limit: Option<u32>,
-    /// How many trials at the same time.
+    /// Number of trials that run in parallel.
     #[serde(default = "one")]
     pub parallel_trials: u32,
-    /// Higher runs first.
+    /// Priority, -10 to 10. Higher values run first.
     #[serde(default)]
     pub priority: i32,
-    /// Every random draw derives from it.
+    /// Seed of every random draw except allocations.
     #[serde(default = "one_seed")]
     pub seed: u64,
-    /// Whether to start at once.
+    /// Whether to start the study immediately.
     #[serde(default = "yes")]
     pub start: bool,
-    /// From the beginning only members and administrators reach it; whoever makes it is a member.
+    /// Whether only members and administrators can access the study. The creator becomes a member.
     #[serde(default)]
     pub restricted: bool,
 }
@@ -110,7 +110,7 @@ fn one_seed() -> u64 {
 }
 
 impl NewStudy {
-    /// A study of this subject with every default.
+    /// A study of this subject with all defaults.
     pub fn of(subject_id: SubjectId) -> Self {
         Self {
             subject_id,
@@ -138,7 +138,7 @@ impl NewStudy {
 }
 
 impl NewStudy {
-    /// A study with the set-up of another one, not started.
+    /// A draft with the set-up of another study.
     pub fn like(plan: &StudyPlan) -> Self {
         Self {
             subject_id: plan.subject_id,
@@ -165,18 +165,18 @@ impl NewStudy {
     }
 }
 
-/// The largest seed: JSON readers keep 53 bits of an integer.
+/// The largest seed: many JSON readers keep only 53 bits of an integer.
 pub const LARGEST_SEED: u64 = (1 << 53) - 1;
 
-/// Checks a study and writes it.
+/// Creates a study.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference.
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference gait.
 pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result<Study, Error> {
     create_from(writer, actor, new, None).await
 }
 
-/// [`create`] by somebody who reaches it afterwards, also where it is restricted.
+/// [`create`], and makes the caller a member if the study is restricted.
 ///
 /// # Errors
 /// As [`create`].
@@ -186,7 +186,7 @@ pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> R
     Ok(study)
 }
 
-/// The same, noting the study whose set-up it has.
+/// The same, for a fork of a study.
 pub(super) async fn create_from(
     writer: &mut Writer,
     actor: &Actor,
@@ -195,12 +195,12 @@ pub(super) async fn create_from(
 ) -> Result<Study, Error> {
     writer.room()?;
     let state = if new.start { StudyState::Running } else { StudyState::Draft };
-    // A fork has the very set-up of its parent.
+    // A fork copies the set-up of its parent, muscle values included.
     let new = if forked_from.is_some() { new } else { with_own_muscles(writer, new).await? };
     let restricted = new.restricted;
     let mut plan = check(writer, new).await?;
     if let Some(parent) = forked_from {
-        // Also where the subject was corrected meanwhile: the two are compared with each other.
+        // Both studies will be compared, so a correction of the subject since then does not apply.
         plan.body = studies::get(writer, parent).await?.plan.body;
     }
     let study = studies::insert(writer, &plan, state, forked_from).await?;
@@ -217,7 +217,7 @@ pub(super) async fn create_from(
     Ok(study)
 }
 
-/// What a study will be made of, every default filled in.
+/// The plan of a study with all defaults filled in.
 ///
 /// # Errors
 /// As [`create`]; nothing is written.
@@ -226,7 +226,7 @@ pub async fn checked(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Er
     check(db, new).await
 }
 
-/// As [`checked`], for a subject who is described and not written down yet; [`NewStudy::subject_id`] is not looked at.
+/// As [`checked`], for a subject who is not on record yet. Ignores [`NewStudy::subject_id`].
 ///
 /// # Errors
 /// As [`create`]; nothing is written.
@@ -235,7 +235,7 @@ pub async fn checked_for_new(db: &mut Connection, subject: &NewSubject, new: New
     check_for(db, subject.pseudonym.trim(), body, new).await
 }
 
-/// A study that says nothing of muscles takes those that are written down of its subject.
+/// Fills in the measured muscle values of the subject, unless the study sets muscles itself.
 async fn with_own_muscles(db: &mut Connection, mut new: NewStudy) -> Result<NewStudy, Error> {
     if new.gait_settings.muscles.is_published() {
         new.gait_settings.muscles = subjects::muscles(db, new.subject_id).await?;
@@ -294,7 +294,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     Ok(plan)
 }
 
-/// Checks every number of a study that is made, or that comes from elsewhere.
+/// Checks every number of a new or imported study.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
@@ -318,7 +318,7 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     search::validate(&plan.search_space, plan.base_bounds)?;
     plan.learner.validate().map_err(Error::Learner)?;
     if plan.learner.categories() != 2 {
-        let allowed = "one threshold: a trial is converged or not converged";
+        let allowed = "one threshold, because a trial is either converged or not converged";
         return Err(Error::invalid("learner.ordinal_thresholds", json!(plan.learner.ordinal_thresholds), allowed));
     }
     Ok(())

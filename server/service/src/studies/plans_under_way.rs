@@ -1,4 +1,4 @@
-//! The plans that are being made: one task for each study, one at a time.
+//! The planning tasks in progress: at most one for each study.
 
 use super::snapshot::StudySnapshot;
 use crate::error::Error;
@@ -8,25 +8,25 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::task::{Id, JoinSet};
 
-/// So long the other studies wait for a plan.
+/// How long jobs of other studies wait for a plan.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What came of a plan: where the study stands if it waits for an answer.
+/// The result of a planning task: the snapshot of the study if it waits for an answer.
 type Planned = Result<Option<StudySnapshot>, Error>;
 
-/// See the module.
+/// The planning tasks in progress.
 #[derive(Debug, Default)]
 pub(super) struct Plans {
     tasks: JoinSet<Planned>,
     under_way: HashMap<Id, (StudyId, Instant)>,
-    /// Studies in which something may have changed since their plan was begun.
+    /// Studies that may have changed since their task started, and must be planned again.
     again: HashSet<StudyId>,
-    /// Studies that waited for an answer when they were planned last.
+    /// Studies that waited for an answer when they were last planned.
     waiting: BTreeMap<StudyId, Arc<StudySnapshot>>,
 }
 
 impl Plans {
-    /// Begins the plan of a study, or notes that it is to be made once more after the one that is being made.
+    /// Starts a task for a study, or schedules another one after the task in progress.
     pub(super) fn begin(&mut self, study: StudyId, plan: impl Future<Output = Planned> + Send + 'static) {
         if self.under_way.values().any(|(other, _)| *other == study) {
             self.again.insert(study);
@@ -36,22 +36,22 @@ impl Plans {
         }
     }
 
-    /// What is known of other studies is forgotten.
+    /// Forgets all studies that are not active.
     pub(super) fn keep(&mut self, is_active: impl Fn(StudyId) -> bool) {
         self.waiting.retain(|study, _| is_active(*study));
         self.again.retain(|study| is_active(*study));
     }
 
-    /// The next plan that is made; none while none is being made.
+    /// Waits for the next task to end. Returns `None` if no task is in progress.
     pub(super) async fn next(&mut self) -> Option<(StudyId, Planned)> {
         let (id, planned) = match self.tasks.join_next_with_id().await? {
             Ok(made) => made,
-            Err(error) => (error.id(), Err(Error::Internal(format!("a plan was not made: {error}")))),
+            Err(error) => (error.id(), Err(Error::Internal(format!("planning was aborted: {error}")))),
         };
         Some((self.under_way.remove(&id)?.0, planned))
     }
 
-    /// Notes what came of a plan. Whether it is to be made once more.
+    /// Records the result of a task. Returns whether the study must be planned again.
     pub(super) fn ended(&mut self, study: StudyId, snapshot: Option<StudySnapshot>) -> bool {
         match snapshot {
             Some(snapshot) => self.waiting.insert(study, Arc::new(snapshot)),
@@ -60,15 +60,14 @@ impl Plans {
         self.again.remove(&study)
     }
 
-    /// When jobs are handed out that were there at `since`: the plans that are being made are waited for, so that a study with
-    /// a higher priority, whose plan takes a little longer, still comes first. [`PATIENCE`] ends, and a plan that takes longer
-    /// holds up nobody.
+    /// When to dispatch jobs that have been queued since `since`. Dispatch waits for tasks in progress, so that a study
+    /// with a higher priority comes first even if its planning takes longer, but at most for [`PATIENCE`].
     pub(super) fn hand_out_at(&self, since: Instant) -> Instant {
         let newest = self.under_way.values().map(|(_, begun)| *begun + PATIENCE).max();
         newest.map_or(since, |patient| patient.min(since + PATIENCE))
     }
 
-    /// Where the studies stand that wait for an answer.
+    /// The snapshots of the studies that wait for an answer.
     pub(super) fn waiting(&self) -> Arc<[Arc<StudySnapshot>]> {
         self.waiting.values().cloned().collect()
     }

@@ -1,5 +1,5 @@
-//! The one way into the learner's log. Forms, REST, raters, lab sessions, suggestions and computed answers all end here:
-//! a test finds every other writer of the table.
+//! The only writer of the learner's log: every answer of pages, REST, raters, lab sessions, suggestions and Gait RMSE
+//! ends here. A test fails if another module writes the table.
 
 use super::walkable::{self, Grounds, NotWalkable, WalkablePair, is_same_gait, trial_of_study};
 use crate::error::Error;
@@ -10,48 +10,48 @@ use gaitwright_store::presentations::Judgement;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, remarks};
 
-/// Author of what the program itself says.
+/// The author of computed answers.
 pub(super) const PROGRAM: &str = concat!("gaitwright ", env!("CARGO_PKG_VERSION"));
 
 /// Whether a person may answer the same comparison twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Again {
-    /// A second answer of the same person is a mistake: the first one is to be retracted.
+    /// A second answer is refused until the first one is retracted.
     Refused,
-    /// The program asked this person again on purpose.
+    /// The study repeated the comparison on purpose.
     Meant,
 }
 
-/// What a person says of two gaits.
+/// A judgement of two gaits.
 #[derive(Debug, Clone, Copy)]
 pub struct GivenJudgement<'a> {
     /// The study.
     pub study: StudyId,
     /// The two gaits, in the order in which they were shown or walked.
     pub pair: (TrialId, TrialId),
-    /// What the request calls them.
+    /// The names of their fields in the request.
     pub fields: (&'a str, &'a str),
-    /// What the person says.
+    /// The judgement.
     pub said: Judgement,
-    /// Who says it.
+    /// The author.
     pub attribution: Attribution<'a>,
-    /// Whether this person may have answered before.
+    /// Whether the author may have answered before.
     pub again: Again,
 }
 
-/// Applies every rule to what a person says and tells the learner. `None`: the learner hears nothing of it, because it is
-/// no preference.
+/// Checks a judgement and passes it to the learner. Returns `None` if it states no preference.
 ///
-/// A preference needs two different gaits that may be walked with, and no earlier answer of the same person. A safety
-/// report is always taken while the subject takes part; the learner hears that the other gait is better only if people may
-/// still be asked about that one.
+/// A preference needs two different walkable gaits, and no earlier answer of the same person. A safety report is
+/// accepted unless the subject withdrew consent; the learner takes it as a preference for the other gait only if that
+/// one is walkable.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after a withdrawal and for a second answer.
+/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a
+/// second answer.
 pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
     let GivenJudgement { study, pair, fields, said, attribution, again } = statement;
     if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
-        return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician, script"));
+        return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
     }
     if pair.0 == pair.1 {
         let allowed = format!("another trial than {}: a gait cannot be compared with itself", fields.0);
@@ -70,8 +70,7 @@ pub async fn hear(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<
     }
 }
 
-/// A safety report names gaits of this study that exist. What the learner hears of it says nothing of a gait that was
-/// reported before.
+/// Handles a safety report. A gait that was already reported does not lose again in the learner's log.
 async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Result<Option<FeedbackId>, Error> {
     let GivenJudgement { study, pair, fields, said, attribution, .. } = statement;
     let first = converged(writer, study, fields.0, pair.0).await?;
@@ -91,13 +90,13 @@ async fn report_unsafe(writer: &mut Writer, statement: GivenJudgement<'_>) -> Re
 async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     let trial = trial_of_study(db, study, field, id).await?;
     if trial.state != TrialState::Converged {
-        let allowed = format!("a converged trial; trial {} is {}", trial.number, trial.state.as_str());
+        let allowed = format!("a converged trial, but trial {} is {}", trial.number, trial.state.as_str());
         return Err(Error::invalid(field, id.to_string(), &allowed));
     }
     Ok(trial)
 }
 
-/// One standing answer of a person to a comparison.
+/// An answer of a person to a comparison that was not retracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandingAnswer {
     /// A preference or a tie.
@@ -106,10 +105,10 @@ pub enum StandingAnswer {
     Note(gaitwright_store::RemarkId),
 }
 
-/// The newest answer of a person to a comparison that was not retracted; blind answers are not shown.
+/// The newest answer of a person to a comparison, without retracted and blinded answers.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn standing_answer(
     db: &mut Connection,
     study: StudyId,
@@ -137,17 +136,16 @@ async fn refuse_second_answer(
 ) -> Result<(), Error> {
     if standing_answer(db, study, pair.trials(), author).await?.is_some() {
         let why =
-            format!("{author} has answered this comparison already: retract that answer first, then answer again");
+            format!("{author} has already answered this comparison. Retract that answer first, then answer again.");
         return Err(Error::conflict(why));
     }
     Ok(())
 }
 
-/// Tells the learner that an action would have been better than a trial. Nothing is said against the trial: its gait may have
-/// been reported as unsafe.
+/// Tells the learner that an action would have been better than a trial. The gait of the trial need not be walkable.
 ///
 /// # Errors
-/// [`Error::Conflict`] after a withdrawal, a violated constraint or trigger, or what the database reports.
+/// [`Error::Conflict`] after withdrawal of consent; errors of the database.
 pub(super) async fn suggest(
     writer: &mut Writer,
     over: &Trial,
@@ -161,10 +159,10 @@ pub(super) async fn suggest(
     Ok(feedback::append(writer, over.study_id, &said, attribution).await?)
 }
 
-/// Tells the learner the result of a trial, and what Gait RMSE answers about it.
+/// Tells the learner the result of a trial, and the preferences that Gait RMSE implies.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
+/// Errors of the database.
 pub(super) async fn compute(
     writer: &mut Writer,
     study: StudyId,

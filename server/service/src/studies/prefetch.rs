@@ -1,7 +1,7 @@
-//! Solves that are run before anybody asked for them: while a person decides, those that the study would need next.
+//! Prefetched solves: while a person decides, idle workers solve the trials that may follow.
 //!
-//! The same problem from the same start has the same solution to the last bit. Taking a solution that is there already
-//! changes nothing but the wait; the record and the learner hear of a solve only when a trial asks for it.
+//! The same problem from the same start has the same solution, bit for bit, so a prefetched solution only shortens the
+//! wait. The record and the learner see it only when a trial claims it.
 
 use super::next_step::likely_next;
 use super::snapshot::StudySnapshot;
@@ -13,10 +13,10 @@ use gaitwright_store::{Store, StudyId, TrialId};
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Who ran a solve that was there before it was asked for.
+/// The worker name of prefetched solves in the record.
 pub(super) const PREPARED: &str = "prepared";
 
-/// The solves of all studies that nobody asked for yet, by the name under which they run: that of no trial.
+/// The prefetched solves of all studies, by the identifier under which they run, which is that of no trial.
 #[derive(Debug, Default)]
 pub(super) struct Prefetches(Mutex<HashMap<TrialId, Prefetch>>);
 
@@ -24,25 +24,25 @@ pub(super) struct Prefetches(Mutex<HashMap<TrialId, Prefetch>>);
 struct Prefetch {
     study: StudyId,
     assignment: Assignment,
-    /// What came of it; `None`: it runs. What failed is not tried again here, but when a trial asks for it.
+    /// The result, or `None` while the solve runs. A failed solve is repeated only when a trial claims it.
     finding: Option<Finding>,
-    /// The attempt that asked for it while it ran.
+    /// The attempt that claimed the running solve.
     promised_to: Option<Attempt>,
 }
 
-/// What there is for an attempt.
+/// What was prefetched for an attempt.
 #[derive(Debug)]
 pub(super) enum Prepared {
     /// Nothing.
     Nothing,
-    /// The solve runs, and goes on as that of the attempt.
+    /// The solve is running, and continues as that of the attempt.
     Running,
     /// The solve is done.
     Done(Finding),
 }
 
 impl Prefetches {
-    /// Notes that a solve is run for a study. `false`: it is there, or runs, already.
+    /// Registers a solve of a study. Returns `false` if it is already known.
     pub(super) fn begin(&self, study: StudyId, assignment: &Assignment) -> bool {
         let mut all = self.all();
         if all.values().any(|one| same_solve(&one.assignment, assignment)) {
@@ -53,12 +53,12 @@ impl Prefetches {
         true
     }
 
-    /// How many run that nobody asked for.
+    /// The number of running solves that no attempt has claimed.
     pub(super) fn running(&self) -> usize {
         self.all().values().filter(|one| one.finding.is_none() && one.promised_to.is_none()).count()
     }
 
-    /// What there is for an attempt; it belongs to the attempt from now on.
+    /// Hands the solve of the same problem, if there is one, to an attempt.
     pub(super) fn claim(&self, assignment: &Assignment) -> Prepared {
         let mut all = self.all();
         let found =
@@ -79,12 +79,12 @@ impl Prefetches {
         }
     }
 
-    /// Forgets what nobody asked for, of the studies that are not to stay; those that run are to be withdrawn.
+    /// Drops unclaimed solves of studies that do not stay. Returns the running ones, which the caller must cancel.
     pub(super) fn forget(&self, stays: impl Fn(StudyId) -> bool) -> Vec<TrialId> {
         self.remove(|one| !stays(one.study))
     }
 
-    /// Forgets those that run and that nobody asked for; they are to be withdrawn.
+    /// Drops unclaimed running solves and returns them; the caller must cancel them.
     pub(super) fn forget_running(&self) -> Vec<TrialId> {
         self.remove(|one| one.finding.is_none())
     }
@@ -101,14 +101,15 @@ impl Prefetches {
         running
     }
 
-    /// The name under which the solve of a trial runs.
+    /// The identifier under which the solve of a trial runs.
     pub(super) fn name_of(&self, trial: TrialId) -> TrialId {
         let all = self.all();
         let promised = |one: &Prefetch| one.promised_to.is_some_and(|attempt| attempt.trial == trial);
         all.iter().find(|(_, one)| promised(one)).map_or(trial, |(name, _)| *name)
     }
 
-    /// News of an attempt of a trial; of a solve that nobody asked for yet, what is to be signed at its end.
+    /// Translates a worker's message to the attempt that claimed the solve. For an unclaimed solve, keeps the result
+    /// and returns the receipt to acknowledge.
     pub(super) fn hear(&self, news: News) -> Result<News, Receipt> {
         let mut all = self.all();
         let name = match &news {
@@ -133,30 +134,30 @@ impl Prefetches {
     }
 
     fn all(&self) -> MutexGuard<'_, HashMap<TrialId, Prefetch>> {
-        // The map is whole between any two statements that hold the lock.
+        // The map is consistent between statements, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// What studies that wait for an answer would propose next, computed once for what each has heard.
+/// Cache of the trials that waiting studies would propose next, by version of their log.
 #[derive(Debug, Default)]
 pub(super) struct LikelyNext(HashMap<StudyId, (LogVersion, Vec<NewTrial>)>);
 
 impl LikelyNext {
-    /// Forgets the studies that are not to stay.
+    /// Drops the studies that do not stay.
     pub(super) fn keep(&mut self, stays: impl Fn(StudyId) -> bool) {
         self.0.retain(|study, _| stays(*study));
     }
 
-    /// Whether it is computed for what the study has heard by now.
+    /// Whether the cache is current for this snapshot.
     pub(super) fn knows(&self, snapshot: &StudySnapshot) -> bool {
         self.0.get(&snapshot.study.id).is_some_and(|(heard, _)| *heard == snapshot.version)
     }
 
-    /// The trials that a study would propose next.
+    /// The trials that a study would propose next, one for each possible answer.
     ///
     /// # Errors
-    /// What the learner reports.
+    /// Errors of the learner.
     pub(super) async fn of(&mut self, store: &mut Store, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
         if !self.knows(snapshot) {
             let there = snapshot.clone();

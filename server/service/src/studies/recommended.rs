@@ -1,4 +1,4 @@
-//! What the certificate of a recommended gait says: nothing is recommended silently whose certificate failed.
+//! The certificates of the best gaits of a study, so that a recommendation always states whether its gait passed.
 
 use super::belief::Beliefs;
 use super::certification;
@@ -13,26 +13,26 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use utoipa::ToSchema;
 
-/// So many of the best gaits are certified in search of one that passes.
+/// The most gaits that are certified in search of one that passes.
 pub const MOST_CERTIFIED: usize = 10;
 
-/// What is known of a gait's certificate.
+/// State of the certificate of a gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CertificateState {
     /// Every quantity is within its limit, and the gait is stable.
     Passed,
-    /// Something is not.
+    /// A quantity exceeds its limit, or the gait is unstable.
     Failed,
-    /// The service is at it.
+    /// The gait is being certified.
     BeingCertified,
-    /// Nobody asked for it yet.
+    /// The gait has no certificate.
     #[default]
     NotCertified,
 }
 
 impl CertificateState {
-    /// As written in tables.
+    /// The name in tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -43,23 +43,23 @@ impl CertificateState {
     }
 }
 
-/// The certificate of a study's best gait, and the gait to take where that one failed.
+/// The certificate of the best gait of a study, and an alternative if it failed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Judged {
-    /// Of the best gait.
+    /// State of the certificate of the best gait.
     pub verdict: CertificateState,
-    /// Why it failed, in words.
+    /// Reasons if it failed.
     pub objections: Vec<String>,
-    /// Where the best one failed: the best gait that is known to pass.
+    /// If the best gait failed, the best one that passed.
     pub passing: Option<TrialId>,
-    /// The best gait that was not certified, where no better one passed; of the first [`MOST_CERTIFIED`].
+    /// The best gait without a certificate among the first [`MOST_CERTIFIED`], unless a better one passed.
     pub without_certificate: Option<TrialId>,
-    /// The service is certifying that one by itself.
+    /// Whether the service is certifying that gait.
     pub certifying: bool,
 }
 
 impl Judged {
-    /// Says whether the service is certifying the best gait that was not certified.
+    /// Sets whether the service is certifying the best gait without a certificate.
     pub fn certified_by_service(&mut self, certifying: bool) {
         self.certifying = certifying;
         if certifying && self.verdict == CertificateState::NotCertified {
@@ -68,10 +68,10 @@ impl Judged {
     }
 }
 
-/// Reads what is known of the certificates of gaits, the best one first.
+/// Reads the certificates of gaits that are ranked best first.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Judged> {
     let mut judged = Judged::default();
     for (place, &trial) in ranking.iter().enumerate() {
@@ -101,11 +101,11 @@ pub async fn judged(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Jud
     Ok(judged)
 }
 
-/// The next gait to certify in search of one that passes: none when one has passed, or the first [`MOST_CERTIFIED`] have
-/// failed. `refused`: what cannot be certified.
+/// The next gait to certify. `None` if one has passed, or if the first [`MOST_CERTIFIED`] failed. Skips the gaits in
+/// `refused`, which cannot be certified.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn next_to_certify(
     db: &mut Connection,
     ranking: &[TrialId],
@@ -121,11 +121,11 @@ pub async fn next_to_certify(
     Ok(None)
 }
 
-/// The gaits that a study recommends or may still recommend: the best one, the best one that passes its certificate, and, as long
-/// as none is known to pass, those that are still to be certified.
+/// The gaits that a study recommends or may recommend: the best one, the best one that passed its certificate, and,
+/// until one passes, those that are still to be certified.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreResult<Vec<TrialId>> {
     let mut kept = Vec::new();
     for (place, &trial) in ranking.iter().enumerate() {
@@ -140,12 +140,12 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
     Ok(kept)
 }
 
-/// Certifies the gaits of a study, the best one first, until one passes or [`MOST_CERTIFIED`] have failed.
+/// Certifies the gaits of a study, best first, until one passes or [`MOST_CERTIFIED`] have failed.
 ///
-/// What is no gait of the walker, as another worker may have sent it, stays without a certificate.
+/// A malformed gait, as another worker may have sent it, stays without a certificate.
 ///
 /// # Errors
-/// What learner and database report.
+/// Errors of the learner and the database.
 pub async fn certify(
     store: &mut Store,
     actor: &Actor,
@@ -162,7 +162,7 @@ pub async fn certify(
         let certificate = match certification::certificate(store, begun).await {
             Ok(certificate) => certificate,
             Err(error) if error.is_input() => {
-                tracing::warn!(%trial, %error, "what a trial gave cannot be certified");
+                tracing::warn!(%trial, %error, "the gait of a trial cannot be certified");
                 refused.insert(trial);
                 continue;
             }

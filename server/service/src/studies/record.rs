@@ -1,5 +1,5 @@
-//! Recording what a trial gave: its state, label, gait and the answers that Gait RMSE implies, exactly once, in
-//! one transaction.
+//! Records the result of a trial exactly once: state, label, gait and the preferences that Gait RMSE implies, in one
+//! transaction.
 
 use super::comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
@@ -16,16 +16,16 @@ use gaitwright_store::{Store, TrialId, Writer, commit, events, gaits, jobs, resu
 use serde_json::json;
 use std::time::Duration;
 
-/// So often a result is compared anew because the study heard something meanwhile.
+/// How often a result is compared again because the study received an answer in the meantime.
 const TRIES: u32 = 20;
-/// Pause after the first time, longer by as much after each.
+/// The pause after the first attempt; it grows by this much after each.
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
 
-/// Records a solve that ended by itself. `false`: the lease was not ours any more; what came is kept as evidence, and
-/// nobody hears of it.
+/// Records a completed solve. Returns `false` if the lease had passed to another attempt: the result is then kept as
+/// evidence, and not used.
 ///
 /// # Errors
-/// What the database or the learner reports; nothing is recorded then.
+/// Errors of the database and the learner. Nothing is recorded then.
 pub async fn ended(
     store: &mut Store,
     lease: &Lease,
@@ -77,10 +77,10 @@ pub async fn ended(
     broke(store, lease, "the study heard answers faster than the result could be compared with them").await
 }
 
-/// Records a failure of the program: the job runs again at most twice, then the trial is `failed`.
+/// Records an engineering failure: the job is retried at most twice, then the trial is `failed`.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, Error> {
     tracing::warn!(trial = %lease.trial, attempt = lease.attempt, reason, "a solve failed");
     let mut writer = store.write().await?;
@@ -91,10 +91,10 @@ pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, E
     Ok(recorded)
 }
 
-/// Records a lease that ran out.
+/// Records an expired lease.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
     let before = jobs::troubles(&mut writer, lease.job).await?;
@@ -105,10 +105,10 @@ pub async fn silent(store: &Store, lease: &Lease) -> Result<bool, Error> {
     Ok(recorded)
 }
 
-/// Gives an interrupted trial back to the queue, uncounted.
+/// Queues an interrupted trial again, without counting it as a failure.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
     let same = jobs::troubles(&mut writer, lease.job).await?;
@@ -117,10 +117,10 @@ pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
     Ok(recorded)
 }
 
-/// Cancels an open trial on a person's order.
+/// Cancels an open trial at a person's request.
 ///
 /// # Errors
-/// A conflict when the trial has ended, or what the database reports.
+/// [`Error::Conflict`] if the trial has ended; errors of the database.
 pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
     let state = trial_state::after(row.state, Happening::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
@@ -131,15 +131,15 @@ pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Res
     Ok(events::append(writer, row.study_id, "trial_ended", &payload).await?)
 }
 
-/// Lets a trial that gave no result run once more.
+/// Queues a trial without a result again.
 ///
 /// # Errors
-/// A conflict when the trial has a result or is open, or what the database reports.
+/// [`Error::Conflict`] if the trial is open or has a result; errors of the database.
 pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
     trial_state::after(row.state, Happening::Retried).map_err(|e| Error::conflict(e.to_string()))?;
     if row.asked_by.is_some() {
-        return Err(Error::conflict("a script evaluates this trial: it asks for another one"));
+        return Err(Error::conflict("This trial is evaluated by a script, which has to ask for another trial."));
     }
     jobs::reopen(writer, trial).await?;
     trials::requeue(writer, trial, "").await?;
@@ -169,7 +169,7 @@ async fn give_up_or_requeue(
     Ok(true)
 }
 
-/// What Gait RMSE answers about the new trial, unless the study leaves the answers to people.
+/// The preferences about the new trial that Gait RMSE implies; none if people answer.
 async fn answers(
     store: &mut Store,
     snapshot: &StudySnapshot,

@@ -1,4 +1,5 @@
-//! Reference gaits from recordings: one way in for the form, the REST interface and the command line.
+//! Imports reference gaits from recordings of joint angles, and finds the nearest one for a subject. For pages, REST
+//! and the command line.
 
 use crate::error::Error;
 use crate::printable;
@@ -11,16 +12,16 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Longest name, characters.
+/// Maximum length of a name, characters.
 const LONGEST_NAME: usize = 200;
-/// The right foot's force in the files of OpenSim's examples.
+/// Column of the vertical force under the right foot in OpenSim's examples.
 const FORCE_COLUMN: &str = "ground_force_vy";
-/// The right foot's force in the `fp` tables of Camargo 2021.
+/// Column of the vertical force under the right foot in the `fp` tables of Camargo 2021.
 const CAMARGO_FORCE_COLUMN: &str = "Treadmill_R_vy";
-/// Longest provenance: comments of a recording become part of it.
+/// Maximum length of the provenance, which includes the comments of the recording.
 const LONGEST_PROVENANCE_BYTES: usize = 20_000;
 
-/// Forms of recordings.
+/// File format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
@@ -33,7 +34,7 @@ pub enum Form {
     Csv,
 }
 
-/// Units of angles.
+/// Unit of angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Unit {
@@ -52,61 +53,61 @@ impl From<Unit> for AngleUnit {
     }
 }
 
-/// How right heel strikes are found.
+/// How to find right heel strikes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Strikes {
-    /// Where the vertical force under the right foot rises above 20 N.
+    /// At instants where the vertical force under the right foot rises above 20 N.
     Force,
-    /// Where the right heel is farthest ahead of the pelvis.
+    /// At instants where the right heel is farthest ahead of the pelvis.
     #[default]
     Kinematics,
-    /// The first and the last row: the recording is one stride, as exported gaits are.
+    /// At the first and the last row: the recording is one stride, like an exported gait.
     Ends,
 }
 
-/// A recording to make a reference gait of.
+/// A recording that becomes a reference gait.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewReferenceGait {
     /// Name shown to people.
     pub name: String,
-    /// Form of the recording.
+    /// File format of the recording.
     #[serde(default)]
     pub form: Form,
-    /// The file's text.
+    /// Content of the file.
     pub recording: String,
-    /// Unit of an OpenSim file whose header does not say it.
+    /// Unit of angles, if the header of an OpenSim file does not state it.
     #[serde(default)]
     pub unit: Option<Unit>,
-    /// Column of the vertical force under the right foot in an OpenSim file; where `forces` is given, by default
-    /// `ground_force_vy`, and `Treadmill_R_vy` in a table of Camargo 2021.
+    /// Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
+    /// `Treadmill_R_vy` for Camargo 2021.
     #[serde(default)]
     pub force_column: Option<String>,
-    /// Text of the file that has this column, where it is not the recording itself: an OpenSim file, or the `fp` table
-    /// beside an `ik` table of Camargo 2021. Both have one clock.
+    /// Content of a separate file with the force column: an OpenSim file, or the `fp` table that belongs to an `ik`
+    /// table of Camargo 2021. Both files must have the same time axis.
     #[serde(default)]
     pub forces: Option<String>,
-    /// How right heel strikes are found where they are not given.
+    /// How to find right heel strikes if `heel_strikes_s` is empty.
     #[serde(default)]
     pub strikes: Strikes,
-    /// Right heel strikes, s; empty: to be found.
+    /// Times of right heel strikes, s. Empty: detect them.
     #[serde(default)]
     pub heel_strikes_s: Vec<f64>,
-    /// Height of the person, for matching, m.
+    /// Height of the recorded person, m.
     #[serde(default)]
     pub height_m: Option<f64>,
-    /// Body mass of the person, for matching, kg.
+    /// Body mass of the recorded person, kg.
     #[serde(default)]
     pub body_mass_kg: Option<f64>,
 }
 
 impl NewReferenceGait {
-    /// Cuts the recording at heel strikes and averages its strides; in errors and provenance `what` names the recording,
-    /// `forces` the file of the forces.
+    /// Cuts the recording at heel strikes and averages the strides. `what` and `forces` name the two files in errors
+    /// and in the provenance.
     ///
     /// # Errors
-    /// [`Error::Invalid`] with field, or line and column, and the reason.
+    /// [`Error::Invalid`] with the field, or line and column, and the reason.
     pub fn definition(&self, what: &str, forces: &str) -> Result<Definition, Error> {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
         let recording = match self.form {
@@ -141,13 +142,14 @@ impl NewReferenceGait {
         let walker = Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
         let definition = recording.reference(name, &strikes, walker)?;
         if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
-            let allowed = format!("at most {LONGEST_PROVENANCE_BYTES} bytes of comments before its columns");
-            return Err(Error::invalid("recording", definition.provenance.len(), &allowed));
+            let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");
+            let given = format!("a file with {} bytes of comments", definition.provenance.len());
+            return Err(Error::invalid("recording", given, &allowed));
         }
         Ok(definition)
     }
 
-    /// The same on a thread of its own: seconds for a long recording.
+    /// The same on the thread pool, because a long recording takes seconds.
     ///
     /// # Errors
     /// As [`Self::definition`].
@@ -156,20 +158,20 @@ impl NewReferenceGait {
     }
 }
 
-/// Checks a reference gait.
+/// Checks the name and the provenance of a reference gait.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check(definition: &Definition) -> Result<(), Error> {
     printable::name("name", &definition.name, LONGEST_NAME)?;
     if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
-        let allowed = format!("at most {LONGEST_PROVENANCE_BYTES} bytes");
-        return Err(Error::invalid("provenance", definition.provenance.len(), &allowed));
+        let allowed = format!("at most {LONGEST_PROVENANCE_BYTES} bytes long");
+        return Err(Error::invalid("provenance", format!("{} bytes long", definition.provenance.len()), &allowed));
     }
     Ok(definition.validate()?)
 }
 
-/// Writes a reference gait; the one that is there already where it is the very same.
+/// Adds a reference gait, or returns the identical one that is already on record.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a name that does not print, or what the database reports.
@@ -185,20 +187,20 @@ pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) ->
     Ok(reference)
 }
 
-/// A reference gait and how far its walker is from a subject.
+/// A reference gait and the distance between the recorded person and a subject.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Match {
     /// The reference gait.
     pub reference_gait: ReferenceGait,
-    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`; none when the reference does not say whose it is.
+    /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait states no height and mass.
     pub distance: Option<f64>,
 }
 
-/// Every reference gait, the nearest to the subject in height and body mass first; those that do not say whose they
-/// are come last.
+/// Every reference gait, the nearest to the subject in height and body mass first. Those without height and mass come
+/// last.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Match>, Error> {
     let mut found: Vec<Match> = reference_gaits::all(db)
         .await?
@@ -212,10 +214,10 @@ pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Match
     Ok(found)
 }
 
-/// The reference gait nearest to a subject; none where no reference says whose it is.
+/// The reference gait nearest to a subject. `None` if no reference gait states height and mass.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn nearest(db: &mut Connection, subject: &Subject) -> Result<Option<ReferenceGait>, Error> {
     let matches = matches(db, subject).await?;
     Ok(matches.into_iter().find(|found| found.distance.is_some()).map(|found| found.reference_gait))

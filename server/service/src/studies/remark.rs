@@ -1,4 +1,5 @@
-//! What staff say of two gaits that is no preference: one way in for the form and the REST interface.
+//! Records and retracts assessments: answers of staff about two gaits that state no preference (cannot tell, or
+//! unsafe).
 
 use super::answer::attribution;
 use super::preference::{self, Again, GivenJudgement};
@@ -20,15 +21,14 @@ use utoipa::ToSchema;
 pub struct NewRemark {
     /// One gait.
     pub first: TrialId,
-    /// The other one.
+    /// Trial of the other gait.
     pub second: TrialId,
-    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`; which gait is better is a preference.
+    /// `cannot_tell`, `unsafe_first`, `unsafe_second` or `unsafe_both`. Which gait is better is a preference.
     pub answer: Judgement,
-    /// Who says so: `subject`, `clinician` or `script`.
-    /// By default what the caller is.
+    /// Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
     #[serde(default)]
     pub source: Option<Source>,
-    /// Name or pseudonym of who says so; by default the name of the caller.
+    /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
@@ -48,7 +48,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Ne
         return Err(Error::invalid(
             "answer",
             json!(new.answer),
-            "cannot_tell, unsafe_first, unsafe_second, unsafe_both",
+            "cannot_tell, unsafe_first, unsafe_second or unsafe_both",
         ));
     }
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
@@ -82,8 +82,8 @@ pub(super) async fn write(writer: &mut Writer, statement: GivenJudgement<'_>) ->
 /// Takes a remark back, and what the learner heard of it.
 ///
 /// # Errors
-/// [`Error::NotFound`] also when it is of another study than `study`, [`Error::Conflict`] when it was taken back already
-/// or is of a subject who withdrew.
+/// [`Error::NotFound`], also for an assessment of another study. [`Error::Conflict`] if it was already retracted, or if
+/// the subject withdrew consent.
 pub async fn retract(
     writer: &mut Writer,
     caller: &Caller,

@@ -1,24 +1,23 @@
-//! What the record keeps only for a while: answers to requests that may be repeated, sessions that ended, links that were
-//! used. Everything that says what was measured, answered, decided or allowed is kept, events among it.
+//! Background task that deletes expired idempotency keys, sessions and sign-in links. All other data, events included,
+//! is kept forever.
 
 use crate::error::Error;
 use crate::supervise::Task;
 use gaitwright_store::{Store, commit, idempotency, now, sessions};
 use std::time::Duration;
 
-/// Answers to requests with an Idempotency-Key are kept so many days: a client that retries later has given up before.
+/// Days for which the response to an Idempotency-Key is kept. No client retries longer than that.
 pub const IDEMPOTENCY_KEY_DAYS: i64 = 7;
-/// Sessions that ended or were idle for so many days are dropped, and links that were used or expired so long ago. The
-/// audit trail keeps who signed in.
+/// Days after which ended or idle sessions, and used or expired links, are deleted. The audit trail keeps the sign-ins.
 pub const SESSION_DAYS: i64 = 90;
-/// Between two rounds.
+/// Time between two rounds.
 const EVERY: Duration = Duration::from_hours(1);
 const DAY_S: i64 = 86_400;
 
-/// What a round dropped.
+/// How much a round deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dropped {
-    /// Answers to requests that may be repeated.
+    /// Stored responses to requests with an Idempotency-Key.
     pub answers: u64,
     /// Sessions.
     pub sessions: u64,
@@ -26,10 +25,10 @@ pub struct Dropped {
     pub links: u64,
 }
 
-/// Drops what is past its time.
+/// Deletes everything that has expired.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn drop_expired(store: &Store) -> Result<Dropped, Error> {
     let present = now();
     let long_ago = present.plus_seconds(-SESSION_DAYS * DAY_S);
@@ -43,19 +42,19 @@ pub async fn drop_expired(store: &Store) -> Result<Dropped, Error> {
     Ok(dropped)
 }
 
-/// Drops what is past its time, now and every hour; what fails is tried again in the next round.
+/// Deletes everything that has expired, now and every hour. A failed round is logged, and the next one tries again.
 ///
 /// # Errors
-/// None: what fails is logged.
+/// None: failures are logged.
 pub async fn keep_dropping(store: Store, task: Task) -> Result<(), Error> {
     loop {
         task.works();
         match drop_expired(&store).await {
             Ok(Dropped { answers: 0, sessions: 0, links: 0 }) => {}
             Ok(Dropped { answers, sessions, links }) => {
-                tracing::info!(answers, sessions, links, "dropped what is past its time");
+                tracing::info!(answers, sessions, links, "deleted expired data");
             }
-            Err(error) => tracing::warn!(%error, "cannot drop what is past its time"),
+            Err(error) => tracing::warn!(%error, "cannot delete expired data"),
         }
         tokio::time::sleep(EVERY).await;
     }

@@ -1,5 +1,4 @@
-//! What people said of gaits that is no preference, wherever they said it: gaits that must not be walked, and pairs of
-//! which somebody could not tell which is better.
+//! Collects the safety reports and the "cannot tell" answers of a study from all places where people give them.
 
 use crate::access::Reach;
 use crate::error::Error;
@@ -11,25 +10,25 @@ use gaitwright_store::{
 };
 use std::collections::HashSet;
 
-/// A gait that somebody called unsafe: nobody is asked about it, and it is not recommended.
+/// A safety report. While it is open, the gait is neither recommended nor compared nor walked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Closed {
     /// The trial.
     pub trial: TrialId,
-    /// Who said so, as shown.
+    /// Who reported it, as shown to people.
     pub by: String,
-    /// When.
+    /// Time of the report.
     pub at: Instant,
-    /// Where it was said.
+    /// Where it was given.
     pub said: SafetyReportSource,
-    /// What staff decided who looked at it.
+    /// The newest review by staff.
     pub review: Option<SafetyReview>,
 }
 
-/// Where somebody called a gait unsafe.
+/// Where a safety report was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SafetyReportSource {
-    /// A rater, comparing blindly.
+    /// In a blind comparison by a rater.
     Rater(PresentationId),
     /// In a remark.
     Staff(RemarkId),
@@ -37,10 +36,10 @@ pub enum SafetyReportSource {
     Subject,
 }
 
-/// Studies that a caller reaches with gaits about which staff decided nothing since somebody called them unsafe, and how many gaits that are.
+/// Accessible studies with safety reports that await review, and the number of such gaits.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreResult<Vec<(Study, usize)>> {
     let mut found = Vec::new();
     for study in studies::with_safety_reports(db, reach, limit).await? {
@@ -53,22 +52,22 @@ pub async fn undecided(db: &mut Connection, reach: Reach, limit: u32) -> StoreRe
     Ok(found)
 }
 
-/// The safety reports of a study, and the pairs that nobody is asked about again.
+/// The safety reports of a study, and the pairs that are not compared again.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SafetyReports {
-    /// Gaits that must not be walked.
+    /// Open reports: their gaits must not be walked.
     pub closed: Vec<Closed>,
-    /// What closed a gait until staff let it be walked with again.
+    /// Reports after which staff decided that the gait may be walked again.
     pub lifted: Vec<Closed>,
-    /// Pairs that are not asked about again.
+    /// Pairs of which somebody could not tell which gait is better.
     pub skipped: Vec<(TrialId, TrialId)>,
 }
 
 impl SafetyReports {
-    /// Those that stand.
+    /// Reads the reports of a study that were not retracted.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         let mut found = Self::default();
         for shown in presentations::remarks_of_study(db, study).await? {
@@ -94,8 +93,8 @@ impl SafetyReports {
                 continue;
             }
             if let Some(answer) = session.answer().filter(|answer| answer.said.is_about_safety()) {
-                // Naming one of the two would reveal the order: both are closed until unblinding.
-                let by = format!("the subject in lab session {}, of one of its two gaits or both", session.number);
+                // Naming one of the two gaits would reveal the allocation, so both are closed until unblinding.
+                let by = format!("the subject in lab session {} (which of its two gaits is blinded)", session.number);
                 let (at, said) = (answer.at, SafetyReportSource::Subject);
                 let closed = |trial| Closed { trial, by: by.clone(), at, said, review: None };
                 found.closed.extend([session.gait_one, session.gait_two].map(closed));
@@ -105,7 +104,7 @@ impl SafetyReports {
         Ok(found)
     }
 
-    /// What was said before staff let a gait be walked with again closes it no more.
+    /// Lifts the reports that are older than a review that lets the gait be walked again.
     fn review(&mut self, reviews: &[SafetyReview]) {
         for mut closed in std::mem::take(&mut self.closed) {
             let of_it = |review: &&SafetyReview| review.trial_id == closed.trial && closed.at <= review.said_until;
@@ -122,23 +121,23 @@ impl SafetyReports {
         self.closed.extend(said.unsafe_of(pair).into_iter().map(closed));
     }
 
-    /// What closes the gait of this trial.
+    /// The open reports about the gait of this trial.
     pub fn closing(mut self, trial: TrialId) -> Vec<Closed> {
         self.closed.retain(|closed| closed.trial == trial);
         self.closed
     }
 
-    /// Whether somebody called the gait of this trial unsafe.
+    /// Whether the gait of this trial has an open report.
     pub fn closes(&self, trial: TrialId) -> bool {
         self.closed.iter().any(|closed| closed.trial == trial)
     }
 
-    /// Whether somebody could not tell which of the two is better.
+    /// Whether somebody could not tell which of the two gaits is better.
     pub fn is_skipped(&self, (a, b): (TrialId, TrialId)) -> bool {
         self.skipped.iter().any(|pair| *pair == (a, b) || *pair == (b, a))
     }
 
-    /// Refuses a gait that somebody called unsafe; `field` named it.
+    /// Refuses a gait with an open report; `field` names its trial.
     ///
     /// # Errors
     /// [`Error::Invalid`].
@@ -146,7 +145,8 @@ impl SafetyReports {
         match self.closed.iter().find(|closed| closed.trial == trial) {
             None => Ok(()),
             Some(closed) => {
-                let allowed = format!("a gait that nobody called unsafe; this one was, by {}", closed.by);
+                let allowed =
+                    format!("a gait without an open safety report. This gait was reported as unsafe by {}", closed.by);
                 Err(Error::invalid(field, trial.to_string(), &allowed))
             }
         }

@@ -1,4 +1,4 @@
-//! Staff look at a gait that was called unsafe, and decide: one way in for the form and the REST interface.
+//! Records the decision of staff about a gait that was reported as unsafe, for pages and REST.
 
 use super::safety_reports::{Closed, SafetyReportSource, SafetyReports};
 use crate::access::Caller;
@@ -13,31 +13,32 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// A decision.
+/// A decision about the safety reports of a gait.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = SafetyReviewToMake)]
 pub struct Decision {
-    /// `walkable`: the gait may be walked with again. `unsafe`: it stays as it is, and waits for nobody's look any more.
+    /// `walkable`: the gait may be walked again. `unsafe`: the gait stays closed, and the review is done.
     pub verdict: SafetyVerdict,
-    /// Why, for the record.
+    /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
-    /// Name or pseudonym of who decides; by default the name of the caller.
+    /// Name or pseudonym of the reviewer. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
-    /// When the newest safety report was made that the caller has seen: after a newer one the decision is refused. By default
-    /// every safety report counts as seen.
+    /// Time of the newest safety report that the reviewer has seen. The decision is refused if a newer one exists. By
+    /// default, all reports count as seen.
     #[serde(default)]
     pub said_until: Option<Instant>,
 }
 
-/// Writes a decision. Where the gait may be walked with again, what the learner heard of the safety reports is taken back.
+/// Records a decision. If the gait may be walked again, retracts the preferences that the learner derived from the
+/// reports.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] when nobody calls the gait unsafe, when
-/// somebody did so later than the caller has seen, and of a subject who withdrew.
+/// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] if no report is open, if there is a
+/// newer report than the reviewer has seen, or if the subject withdrew consent.
 pub async fn give(
     writer: &mut Writer,
     caller: &Caller,
@@ -47,14 +48,17 @@ pub async fn give(
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     let author = printable::name("author", decision.author.as_deref().unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", &decision.reason, ": why it is decided so")?;
+    let reason = printable::reason("reason", &decision.reason, " that say why you decide so")?;
     let closed = SafetyReports::read(writer, trial.study_id).await?.closing(id);
     let number = trial.number;
     let newest = closed.iter().max_by_key(|closed| closed.at);
     let newest =
-        newest.ok_or_else(|| Error::conflict(format!("nobody calls the gait of trial {number} unsafe now")))?;
+        newest.ok_or_else(|| Error::conflict(format!("The gait of trial {number} has no open safety report.")))?;
     if decision.said_until.is_some_and(|seen| newest.at > seen) {
-        let again = format!("the gait of trial {number} was called unsafe again, by {}: look at that first", newest.by);
+        let again = format!(
+            "The gait of trial {number} was reported as unsafe again, by {}. Read that report first.",
+            newest.by
+        );
         return Err(Error::conflict(again));
     }
     let verdict = decision.verdict;
@@ -73,7 +77,7 @@ pub async fn give(
     Ok(safety_reviews::get(writer, made).await?)
 }
 
-/// That a gait is unsafe was heard as "the other one is better": nobody said that.
+/// Retracts the preferences that were derived from safety reports, because nobody stated them.
 async fn take_back_what_was_heard(
     writer: &mut Writer,
     closed: &[Closed],

@@ -1,7 +1,7 @@
-//! The scheduler: proposes, dispatches, records, for every study that goes on by itself.
+//! The scheduler: proposes trials, dispatches their solves and records the results, for every running study.
 //!
-//! One task plans and hands jobs to the engine, another hears what comes of them, a third prepares what studies that
-//! wait for an answer will need. What they decide depends on the record alone, so the process may end at any instant.
+//! One task plans and dispatches jobs, one receives the messages of workers, one prefetches solves for studies that
+//! wait for an answer. Their decisions depend on the record alone, so the process may end at any instant.
 
 use super::belief::Beliefs;
 use super::certifier::Certifier;
@@ -33,43 +33,43 @@ use tokio::sync::{Mutex, Notify, OnceCell, watch};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-/// Signs of life come with every iteration; so many of them are written down during a lease.
+/// How often a lease is renewed within its duration. Workers report each iteration, which is too often to write.
 const HEARTBEATS_PER_LEASE: u32 = 3;
-/// The plan is looked at this often even when nothing seems to happen.
+/// The longest time between two rounds of planning.
 const IDLE: Duration = Duration::from_secs(5);
-/// Changes within this time lead to one plan.
+/// Changes within this time are planned together.
 const TOGETHER: Duration = Duration::from_millis(10);
 
-/// Runs the studies of a record.
+/// Runs the studies of a record. Cheap to clone.
 #[derive(Debug, Clone)]
 pub struct Scheduler(Arc<Inner>);
 
 struct Inner {
     store: Store,
-    /// The record with a pool of its own: a job does not wait for the posterior of another study.
+    /// The record with its own thread pool, so that a job does not wait for the posterior of another study.
     unpacking: Store,
     engine: Arc<dyn Dispatch>,
-    /// How far the running solves are.
+    /// Progress of the running solves.
     board: Arc<Board>,
-    /// Solves that are run before anybody asked for them.
+    /// Prefetched solves.
     prefetches: Prefetches,
-    /// Where the studies stand that wait for an answer, as of the last plan: what may be prefetched.
+    /// Snapshots of the studies that wait for an answer, for prefetching.
     waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
-    /// What certifies the best gaits of studies that ended, and what explains their trials without a gait.
+    /// The tasks that certify the best gaits of ended studies and explain their trials without a gait.
     after_solves: Option<(Certifier, Explainer)>,
     beliefs: Arc<Beliefs>,
-    /// Held from looking for a free worker until the engine has the job, so that what nobody asked for is begun only
-    /// where no job of a trial is.
+    /// Held from the search for a free worker until the engine has the job, so that a prefetch never takes the worker
+    /// of a trial.
     hand_over: Mutex<()>,
-    /// With `Some`, the only study that is looked at.
+    /// If set, the only study that is run.
     only: Option<StudyId>,
-    /// Something changed: plan again.
+    /// Signals a change that needs planning.
     wake: Notify,
-    /// Counts what was written, for listeners that then read the events.
+    /// Counts changes of the record, so that listeners know when to read events.
     pulse: watch::Sender<u64>,
     shutdown: CancellationToken,
     tasks: TaskTracker,
-    /// How the tasks of this scheduler are.
+    /// Health of the background tasks.
     health: Tasks,
     leases_taken_back: OnceCell<()>,
 }
@@ -84,15 +84,15 @@ impl fmt::Debug for Inner {
 }
 
 impl Scheduler {
-    /// A scheduler over a record; [`Self::run`] sets it to work. Without `after_solves`, a gait is certified when somebody asks,
-    /// and nothing is explained.
+    /// Creates a scheduler; [`Self::run`] starts it. Without `after_solves`, it certifies gaits on request only and
+    /// explains nothing.
     pub fn new(
         store: &Store,
         engine: Arc<dyn Dispatch>,
         only: Option<StudyId>,
         after_solves: Option<AfterSolves>,
     ) -> Self {
-        // What requests compute never holds up the planning.
+        // A separate pool, so that requests cannot delay planning.
         let store = store.with_own_pool();
         let beliefs = Arc::<Beliefs>::default();
         let over_record = |AfterSolves { certify, explain }| {
@@ -123,44 +123,44 @@ impl Scheduler {
         &self.0.store
     }
 
-    /// How far the running solves are.
+    /// Progress of the running solves.
     pub fn board(&self) -> &Arc<Board> {
         &self.0.board
     }
 
-    /// What the learner believes of the studies that were asked about last.
+    /// Cached posteriors of studies.
     pub fn beliefs(&self) -> &Arc<Beliefs> {
         &self.0.beliefs
     }
 
-    /// How many solves can run at the same time.
+    /// Number of solves that can run in parallel.
     pub fn workers(&self) -> usize {
         self.0.engine.size()
     }
 
-    /// Changes whenever something was recorded.
+    /// Changes with every change of the record.
     pub fn pulse(&self) -> watch::Receiver<u64> {
         self.0.pulse.subscribe()
     }
 
-    /// Ends when the scheduler is told to stop: for streams that would otherwise go on for ever.
+    /// Cancelled when the scheduler stops, so that endless streams end.
     pub fn stopping(&self) -> CancellationToken {
         self.0.shutdown.clone()
     }
 
-    /// Says that the record changed: plans are made anew and listeners told.
+    /// Announces a change of the record: wakes planning and listeners.
     pub fn changed(&self) {
         self.0.pulse.send_modify(|count| *count = count.wrapping_add(1));
         self.0.wake.notify_one();
     }
 
-    /// Asks for the best gaits of a study to be certified, where the record has no certificate of `next`. `false`: that is done
-    /// only when somebody asks for one gait.
+    /// Requests certificates of the best gaits of a study; `next` is the first one without. Returns `false` if this
+    /// process certifies gaits on request only.
     pub fn certify_best_of(&self, study: StudyId, next: TrialId) -> bool {
         self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.ask(study, next))
     }
 
-    /// Asks for the gait of one trial to be certified. `false`: this process certifies none.
+    /// Requests the certificate of one gait. Returns `false` if this process certifies none.
     pub fn certify(&self, trial: TrialId) -> bool {
         self.0.after_solves.as_ref().map(|(certifier, _)| certifier.ask_for(trial)).is_some()
     }
@@ -170,18 +170,18 @@ impl Scheduler {
         self.0.after_solves.as_ref().is_some_and(|(certifier, _)| certifier.is_at(study, gait))
     }
 
-    /// What this process does about the explanation of a trial.
+    /// The state of the explanation of a trial in this process.
     pub fn explaining(&self, trial: TrialId) -> Effort {
         self.0.after_solves.as_ref().map_or(Effort::None, |(_, explainer)| explainer.effort(trial))
     }
 
-    /// Asks the solve of a trial to stop within one iteration.
+    /// Cancels the solve of a trial, which stops within one iteration.
     pub async fn cancel_solve(&self, trial: TrialId) {
         self.0.engine.withdraw(self.0.prefetches.name_of(trial)).await;
         self.0.board.close(trial);
     }
 
-    /// Keeps another task of the service running until the scheduler is told to stop; [`Self::trouble`] speaks of it too.
+    /// Keeps another background task running until the scheduler stops; [`Self::trouble`] reports its failures too.
     pub async fn keep<F>(&self, name: &'static str, begin: impl Fn(Task) -> F)
     where
         F: Future<Output = Result<(), Error>> + Send + 'static,
@@ -189,15 +189,15 @@ impl Scheduler {
         self.0.health.keep(name, &self.0.shutdown, begin).await;
     }
 
-    /// Tells the scheduler to stop; [`Self::run`] returns soon after.
+    /// Stops the scheduler; [`Self::run`] returns soon after.
     pub fn stop(&self) {
         self.0.shutdown.cancel();
     }
 
-    /// Works until told to stop. Solves that run in this process then are given back to the queue.
+    /// Runs until [`Self::stop`]. Solves that are still running in this process return to the queue.
     ///
     /// # Errors
-    /// What the database reports at the end; a task that fails before is begun again, and [`Self::trouble`] says so.
+    /// Errors of the database while stopping. A task that fails earlier is restarted, and [`Self::trouble`] reports it.
     pub async fn run(&self) -> Result<(), Error> {
         let keep = |name, begin: fn(Self, Task) -> BoxFuture<'static, Result<(), Error>>| {
             let scheduler = self.clone();
@@ -211,9 +211,7 @@ impl Scheduler {
             keep("listening to workers", |scheduler, task| Box::pin(
                 async move { scheduler.keep_listening(&task).await }
             )),
-            keep("preparing what comes next", |scheduler, task| {
-                Box::pin(async move { scheduler.keep_prefetching(&task).await })
-            }),
+            keep("prefetching", |scheduler, task| { Box::pin(async move { scheduler.keep_prefetching(&task).await }) }),
             keep("certifying gaits", |scheduler, task| Box::pin(async move { scheduler.keep_certifying(&task).await })),
             keep("explaining trials", |scheduler, task| Box::pin(
                 async move { scheduler.keep_explaining(&task).await }
@@ -225,12 +223,12 @@ impl Scheduler {
         self.take_back_leases().await
     }
 
-    /// Why studies do not go on as they should, in words; none: they do.
+    /// Which background tasks have failed, in words; `None` if all run.
     pub fn trouble(&self) -> Option<String> {
         self.0.health.trouble().or_else(|| self.0.engine.trouble())
     }
 
-    /// Certifies what solves gave, for ever.
+    /// Certifies gaits forever.
     async fn keep_certifying(&self, task: &Task) -> Result<(), Error> {
         let Some((certifier, explainer)) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
@@ -238,7 +236,7 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Explains what solves did not give, for ever.
+    /// Explains trials without a gait forever.
     async fn keep_explaining(&self, task: &Task) -> Result<(), Error> {
         let Some((_, explainer)) = &self.0.after_solves else { return std::future::pending().await };
         task.works();
@@ -247,11 +245,11 @@ impl Scheduler {
     }
 
     async fn keep_planning(&self, task: &Task) -> Result<(), Error> {
-        // Once: what is leased after that runs.
+        // Once at the start: later leases belong to running solves.
         self.0.leases_taken_back.get_or_try_init(|| self.take_back_leases()).await?;
         let pause = IDLE.min(self.0.engine.lease() / HEARTBEATS_PER_LEASE);
         let mut plans = Plans::default();
-        // Since when there may be something to hand out.
+        // Since when jobs may be ready to dispatch.
         let mut since = None;
         loop {
             self.look_after_leases().await?;
@@ -275,7 +273,7 @@ impl Scheduler {
                         self.dispatch().await?;
                         since = None;
                     }
-                    // Nothing new for so long, or something new; what comes close together is planned with once.
+                    // Wakes on a change or after the idle time. Changes close together are planned once.
                     () = &mut looked => break,
                     () = self.0.wake.notified() => {
                         tokio::time::sleep(TOGETHER).await;
@@ -286,7 +284,7 @@ impl Scheduler {
         }
     }
 
-    /// Jobs that ended with the process that ran them go back to the queue, uncounted.
+    /// Queues the jobs of a killed process again, without counting them as failures.
     async fn take_back_leases(&self) -> Result<(), Error> {
         let engine = self.0.engine.outlives_process().then_some(IN_PROCESS);
         let mut reader = self.0.store.read().await?;
@@ -312,7 +310,7 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Begins a plan of each active study. Each is made apart: what is computed for a large study holds up no other.
+    /// Starts planning for each active study, in parallel, so that a large study does not delay the others.
     async fn begin_plans(&self, plans: &mut Plans) -> Result<(), Error> {
         let active = studies::active(&mut *self.0.store.read().await?).await?;
         self.withdraw(self.0.prefetches.forget(|id| active.iter().any(|study| study.id == id))).await;
@@ -322,7 +320,7 @@ impl Scheduler {
             plans.begin(study.id, async move {
                 match scheduler.plan(study.clone()).await {
                     Err(error) if error.is_of_machine() => Err(error),
-                    // It would fail again: somebody has to see it.
+                    // Planning would fail again, so a person has to see it.
                     Err(error) => scheduler.hold(&study, &error).await.map(|()| None),
                     snapshot => snapshot,
                 }
@@ -331,14 +329,14 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Takes a job back from the engine, uncounted.
+    /// Takes a job back from the engine, without counting a failure.
     async fn give_back(&self, lease: &Lease) -> Result<(), Error> {
         self.cancel_solve(lease.trial).await;
         record::interrupted(&self.0.store, lease).await.map(drop)
     }
 
-    /// A lease ran out. What no worker took yet is handed over once more, in case the engine forgot it; what a worker
-    /// took and is silent about is taken from it.
+    /// Handles an expired lease. A job that no worker has started is dispatched again, in case the engine lost it. A
+    /// job of a silent worker is taken from it.
     async fn look_after(&self, lease: &Lease) -> Result<(), Error> {
         let state = trials::get(&mut *self.0.store.read().await?, lease.trial).await?.state;
         if state == TrialState::Queued {
@@ -350,8 +348,8 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Proposes trials until the study has as many open ones as it may, or moves it to another state. Gives where it
-    /// stands when it waits for an answer.
+    /// Proposes trials up to the parallel limit of the study, or changes its state. Returns the snapshot if the study
+    /// waits for an answer.
     async fn plan(&self, mut study: Study) -> Result<Option<StudySnapshot>, Error> {
         let mut store = self.0.store.clone();
         loop {
@@ -380,7 +378,7 @@ impl Scheduler {
         }
     }
 
-    /// Has the gaits certified that people will be asked about: nobody is asked before.
+    /// Requests the certificates that the next comparison needs.
     fn certify_for_people(&self, snapshot: &StudySnapshot) {
         if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
             for trial in snapshot.trials.iter().filter(|trial| snapshot.waits_for_certificate(trial)) {
@@ -389,10 +387,10 @@ impl Scheduler {
         }
     }
 
-    /// Pauses a study that cannot be planned, with the reason.
+    /// Pauses a study that cannot be planned, and records the reason.
     async fn hold(&self, study: &Study, error: &Error) -> Result<(), Error> {
-        tracing::error!(study = %study.id, %error, "cannot plan a study; it is paused");
-        self.act(study, Act::Pause, &format!("it cannot be planned: {error}")).await.map(drop)
+        tracing::error!(study = %study.id, %error, "cannot plan a study; pausing it");
+        self.act(study, Act::Pause, &format!("planning failed: {error}")).await.map(drop)
     }
 
     async fn act(&self, study: &Study, act: Act, reason: &str) -> Result<Option<Study>, Error> {
@@ -409,12 +407,12 @@ impl Scheduler {
         Ok(Some(changed).filter(|s| matches!(s.state, StudyState::Running | StudyState::Waiting)))
     }
 
-    /// Writes trial and job in one transaction, if the record is still what the choice was made from.
+    /// Writes trial and job in one transaction, unless the study has changed since the snapshot.
     async fn propose(&self, snapshot: &StudySnapshot, new: &NewTrial) -> Result<bool, Error> {
         let study = snapshot.study.id;
         let mut writer = self.0.store.write().await?;
         if let Err(shortage) = writer.room() {
-            tracing::warn!(%study, %shortage, "no trial is planned");
+            tracing::warn!(%study, %shortage, "no trial is proposed because the disk is nearly full");
             return Ok(false);
         }
         let current = studies::get(&mut writer, study).await?;
@@ -431,7 +429,7 @@ impl Scheduler {
         Ok(true)
     }
 
-    /// Hands jobs to the engine as long as it takes some.
+    /// Dispatches jobs while the engine has free workers.
     async fn dispatch(&self) -> Result<(), Error> {
         while let Some(lease) = self.lease().await? {
             self.submit(&lease).await?;
@@ -441,7 +439,7 @@ impl Scheduler {
 
     async fn lease(&self) -> Result<Option<Lease>, Error> {
         let engine = &self.0.engine;
-        // Asked with every change: the only writer is left to those who write.
+        // This runs on every change, so it must not occupy the only writer.
         let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
         if queued == 0 || leased as usize >= engine.size() {
             return Ok(None);
@@ -480,30 +478,30 @@ impl Scheduler {
             self.withdraw(self.0.prefetches.forget_running()).await;
         }
         if let Err(error) = self.0.engine.submit(assignment).await {
-            // The lease runs out, and the job is handed over again.
-            tracing::error!(trial = %lease.trial, %error, "a job was not taken");
+            // The lease will expire, and the job is dispatched again.
+            tracing::error!(trial = %lease.trial, %error, "the engine refused a job");
         }
         Ok(())
     }
 
-    /// How many solves are out, also those that nobody asked for.
+    /// Number of dispatched solves, prefetches included.
     async fn busy(&self) -> Result<usize, Error> {
         let (_, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
         Ok(leased as usize + self.0.prefetches.running())
     }
 
-    /// Runs what studies will need next, whatever the answers that they wait for, where no worker is needed for others.
+    /// Prefetches the solves that may follow each pending answer, on workers that are idle.
     async fn keep_prefetching(&self, task: &Task) -> Result<(), Error> {
         task.works();
         let mut waiting = self.0.waiting.subscribe();
         let mut likely = LikelyNext::default();
-        // The sender lives as long as this scheduler.
+        // The sender lives as long as the scheduler, so this loop ends only with it.
         while waiting.changed().await.is_ok() {
             let snapshots = Arc::clone(&waiting.borrow_and_update());
             likely.keep(|study| snapshots.iter().any(|snapshot| snapshot.study.id == study));
             for snapshot in snapshots.iter() {
                 if let Err(error) = self.prefetch(&mut likely, snapshot).await {
-                    tracing::warn!(study = %snapshot.study.id, %error, "what comes next cannot be prepared");
+                    tracing::warn!(study = %snapshot.study.id, %error, "cannot prefetch");
                 }
             }
         }
@@ -521,7 +519,7 @@ impl Scheduler {
             if self.busy().await? >= self.0.engine.size() {
                 return Ok(());
             }
-            // No trial has this name: what comes of it is kept here until one asks.
+            // No trial has this identifier: the result is kept here until a trial claims it.
             let attempt = Attempt { trial: TrialId::fresh(), number: 1 };
             let mut reader = unpacking.read().await?;
             let input = PackedInput::of(&mut reader, &study.plan, new.action, new.warm_started_from).await?;
@@ -546,7 +544,7 @@ impl Scheduler {
         }
     }
 
-    /// Hears what comes of the jobs.
+    /// Receives the messages of workers.
     async fn keep_listening(&self, task: &Task) -> Result<(), Error> {
         task.works();
         let mut written: HashMap<TrialId, Instant> = HashMap::new();
@@ -579,7 +577,7 @@ impl Scheduler {
                     self.0.tasks.spawn(async move {
                         match scheduler.ended(attempt, &worker, finding).await {
                             Ok(()) => receipt.sign().await,
-                            // Not signed for: it comes again, or the lease runs out.
+                            // Without a receipt the message comes again, or the lease expires.
                             Err(error) => tracing::error!(trial = %attempt.trial, %error, "cannot record a trial"),
                         }
                         scheduler.changed();
@@ -591,7 +589,7 @@ impl Scheduler {
         }
     }
 
-    /// A worker took a job.
+    /// Records that a worker started a job.
     async fn started(&self, attempt: Attempt, worker: &str) -> Result<(), Error> {
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let mut writer = self.0.store.write().await?;
@@ -610,11 +608,11 @@ impl Scheduler {
         Ok(())
     }
 
-    /// The lease of an attempt. `None`: the record has no such trial; what was prefetched in vain speaks of one.
+    /// The lease of an attempt. `None` if the record has no such trial, as after a dropped prefetch.
     async fn lease_of(&self, attempt: Attempt) -> Result<Option<Lease>, Error> {
         match jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await {
             Err(StoreError::Missing { .. }) => {
-                tracing::debug!(trial = %attempt.trial, "news of a solve that nobody waits for");
+                tracing::debug!(trial = %attempt.trial, "ignoring a message about a dropped prefetch");
                 Ok(None)
             }
             found => Ok(Some(found?)),
@@ -629,7 +627,7 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Keeps a lease alive. `false`: it is another attempt's by now.
+    /// Renews a lease. Returns `false` if it has passed to another attempt.
     async fn live_on(&self, lease: &Lease) -> Result<bool, Error> {
         let mut writer = self.0.store.write().await?;
         let ours = jobs::heartbeat(&mut writer, lease, now().after(self.0.engine.lease())).await?;
@@ -637,7 +635,7 @@ impl Scheduler {
         Ok(ours)
     }
 
-    /// Records what came of an attempt.
+    /// Records the result of an attempt.
     async fn ended(&self, attempt: Attempt, worker: &str, finding: Finding) -> Result<(), Error> {
         self.0.board.close(attempt.trial);
         let mut store = self.0.store.clone();
@@ -653,7 +651,7 @@ impl Scheduler {
         let (outcome, packed) = store.compute(pack).await?;
         let packed = packed?;
         if packed.is_none() && outcome.report.status == SolveStatus::Converged {
-            let reason = "the solver called a gait converged that holds numbers that are not finite";
+            let reason = "the solver returned a converged gait with numbers that are not finite";
             return record::broke(&store, &lease, reason).await.map(drop);
         }
         record::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)

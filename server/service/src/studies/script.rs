@@ -1,7 +1,7 @@
-//! Trials that scripts of the lab evaluate: ask for one, tell what it gave.
+//! Trials that a lab script evaluates: the script asks for a trial and tells its outcome.
 //!
-//! A suggestion is sticky: who asks again before telling gets the same trial. What is computed is computed before the
-//! transaction, and written only if the study is still where it was.
+//! Asking again before telling returns the same trial. Proposals are computed before the transaction, and written only
+//! if the study has not changed.
 
 use super::belief::Beliefs;
 use super::choice::{self, ChoiceError};
@@ -22,29 +22,29 @@ use serde_json::json;
 use std::sync::Arc;
 use utoipa::ToSchema;
 
-/// Asking for a trial.
+/// A request for a trial.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ask {
-    /// Which evaluator asks: each has one open trial at most. By default the name of the caller.
+    /// Name of the evaluator, which has at most one open trial. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub worker: Option<String>,
 }
 
-/// What to write when a script asks.
+/// The trial for a script that asks.
 #[derive(Debug)]
 pub enum Suggestion {
-    /// It has an open trial already.
+    /// The open trial of this evaluator.
     Same(TrialId),
-    /// This one is new, if the study still stands where it stood.
+    /// A new trial, valid while the study matches the snapshot.
     New(Box<StudySnapshot>, Box<NewTrial>),
 }
 
-/// Looks what a worker should evaluate: no transaction is open yet.
+/// Chooses the trial for an evaluator, outside any transaction.
 ///
 /// # Errors
-/// [`Error::Conflict`] when the study gives out no trial now, [`Error::Invalid`] for the worker's name.
+/// [`Error::Conflict`] if the study has no trial to give, [`Error::Invalid`] for the name of the evaluator.
 pub async fn suggest(
     store: &mut Store,
     study: StudyId,
@@ -57,24 +57,24 @@ pub async fn suggest(
     let study = studies::get(&mut db, study).await?;
     if study.plan.evaluation != Evaluation::Script {
         return Err(Error::conflict(
-            "the program evaluates the trials of this study; make one with evaluation \"script\"",
+            "The service evaluates the trials of this study itself. Scripts need a study with evaluation \"script\".",
         ));
     }
     if let Some(open) = trials::open_of(&mut db, study.id, worker).await? {
         return Ok(Suggestion::Same(open));
     }
     if study.state != StudyState::Running {
-        let reason = format!("the study is {}: {}", study.state.as_str(), study.state_reason);
+        let reason = format!("The study is {}: {}", study.state.as_str(), study.state_reason);
         return Err(Error::conflict(reason.trim_end_matches(": ")));
     }
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let plan = &snapshot.study.plan;
     if snapshot.trials.len() >= plan.trial_budget as usize {
-        return Err(Error::conflict(format!("all {} trials were given out", plan.trial_budget)));
+        return Err(Error::conflict(format!("All {} trials of the study were given out.", plan.trial_budget)));
     }
     if snapshot.open() >= plan.parallel_trials as usize {
-        return Err(Error::conflict(format!("{} trials are open already: tell what they gave first", snapshot.open())));
+        return Err(Error::conflict(format!("{} trials are open. Tell their outcomes first.", snapshot.open())));
     }
     let choose = move |pool: &OnPool| {
         let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
@@ -84,16 +84,16 @@ pub async fn suggest(
     let (snapshot, chosen) = store.compute(choose).await?;
     match chosen {
         Ok(new) => Ok(Suggestion::New(Box::new(snapshot), Box::new(new))),
-        Err(e) if e.is_exhausted() => Err(Error::conflict("every action of the search space was tried")),
+        Err(e) if e.is_exhausted() => Err(Error::conflict("Every action of the search space was tried.")),
         Err(ChoiceError::Learner(e)) => Err(Error::Learner(e)),
         Err(ChoiceError::Bounds(e)) => Err(e.into()),
     }
 }
 
-/// Writes a suggestion. `None`: the study moved on meanwhile; look again.
+/// Writes the chosen trial. Returns `None` if the study has changed, and the caller must choose again.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn give_out(
     writer: &mut Writer,
     caller: &Caller,
@@ -121,27 +121,27 @@ pub async fn give_out(
     Ok(Some(trials::get(writer, id).await?))
 }
 
-/// What a trial gave.
+/// Outcome of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// There is a gait.
+    /// The evaluation found a gait.
     Converged,
-    /// There is none: a result, too.
+    /// The evaluation found no gait, which is a result too.
     NotConverged,
 }
 
-/// Telling what a trial gave.
+/// The outcome of a trial, as a script tells it.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tell {
-    /// Whether there is a gait.
+    /// Whether the evaluation found a gait.
     pub outcome: Outcome,
-    /// Why not: required when there is none, 1 to 2000 characters.
+    /// Why there is no gait, 1 to 2000 characters. Required for `not_converged`.
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub reason: String,
-    /// Gait RMSE, rad: required for a gait when Gait RMSE answers the comparisons.
+    /// Gait RMSE, rad. Required for `converged` if Gait RMSE answers the comparisons of the study.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub gait_rmse_rad: Option<f64>,
@@ -150,7 +150,7 @@ pub struct Tell {
     pub cost_of_transport: Option<f64>,
 }
 
-/// What to write when a script tells.
+/// A checked outcome, ready to be written.
 #[derive(Debug)]
 pub struct Heard {
     snapshot: StudySnapshot,
@@ -158,18 +158,18 @@ pub struct Heard {
     answers: Vec<FeedbackContent>,
 }
 
-/// Checks the outcome that a script tells, and what follows from it: no transaction is open yet.
+/// Checks an outcome and derives its preferences, outside any transaction.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] when the trial is not open to be told.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial is not open or not evaluated by a script.
 pub async fn hear(store: &mut Store, id: TrialId, tell: &Tell) -> Result<Heard, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
     if trial.asked_by.is_none() {
-        return Err(Error::conflict("the program evaluates this trial"));
+        return Err(Error::conflict("The service evaluates this trial itself."));
     }
     if trial.state != TrialState::Running {
-        return Err(Error::conflict(format!("the trial is {} already", trial.state.as_str())));
+        return Err(Error::conflict(format!("The trial is already {}.", trial.state.as_str())));
     }
     let study = studies::get(&mut db, trial.study_id).await?;
     let told = checked(&study, tell)?;
@@ -205,13 +205,13 @@ fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
     let state = match tell.outcome {
         Outcome::Converged => TrialState::Converged,
         Outcome::NotConverged if reason.is_empty() => {
-            return Err(Error::invalid("reason", "", "1 to 2000 characters: why there is no gait"));
+            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why there is no gait"));
         }
         Outcome::NotConverged => TrialState::NotConverged,
     };
     let answered_by_rmse = study.plan.feedback_mode != FeedbackMode::Human;
     if state == TrialState::Converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
-        let allowed = "a number: Gait RMSE answers the comparisons of this study";
+        let allowed = "a number, because Gait RMSE answers the comparisons of this study";
         return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));
     }
     Ok(Told {
@@ -222,10 +222,10 @@ fn checked(study: &Study, tell: &Tell) -> Result<Told, Error> {
     })
 }
 
-/// Writes the outcome. `None`: the study has changed meanwhile; look again.
+/// Writes an outcome. Returns `None` if the study has changed, and the caller must check again.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &Heard) -> Result<Option<Trial>, Error> {
     let study = heard.snapshot.study.id;
     let present = trials::get(writer, id).await?;
@@ -241,7 +241,7 @@ pub async fn record(writer: &mut Writer, caller: &Caller, id: TrialId, heard: &H
     Ok(Some(trials::get(writer, id).await?))
 }
 
-/// Whether the study has heard nothing and given out nothing since it was read.
+/// Whether the study has received no answer and given out no trial since the snapshot.
 async fn is_current(writer: &mut Writer, snapshot: &StudySnapshot) -> Result<bool, Error> {
     let study = snapshot.study.id;
     let total = trials::counts(writer, study).await?.total;

@@ -1,4 +1,4 @@
-//! What is tuned: grids over the bounds a1..a8.
+//! Search spaces: grids over the bounds a1 to a8, and the bounds of each action.
 
 use gait_learner::{ActionIndex, Dimension, LearnerError, SearchSpace};
 use gait_optimizer::{ModelError, TunedBounds};
@@ -32,7 +32,7 @@ pub fn table_i() -> Result<SearchSpace, LearnerError> {
     )
 }
 
-/// The bounds that an action stands for: its own values over those that are not tuned.
+/// The bounds of an action: its values replace those of `base`.
 ///
 /// # Errors
 /// [`ModelError`] naming the bound that is unknown or out of range.
@@ -45,7 +45,7 @@ pub fn bounds_of(space: &SearchSpace, base: TunedBounds, action: ActionIndex) ->
     Ok(bounds)
 }
 
-/// A name that is no bound is a fault of the search space.
+/// Attributes an unknown bound to the field `search_space`.
 fn in_search_space(error: ModelError) -> ModelError {
     match error {
         ModelError::Unknown { value, known, .. } => {
@@ -65,7 +65,7 @@ pub fn validate(space: &SearchSpace, base: TunedBounds) -> Result<(), ModelError
             base.clone().set(&dimension.name, value).map_err(in_search_space)?;
         }
     }
-    // Bounds depend on each other only through a3 < a4: the largest a3 with the smallest a4 decides.
+    // Only a3 < a4 couples bounds, so the largest a3 with the smallest a4 is the critical combination.
     let mut tightest = base;
     for dimension in space.dimensions() {
         let chosen = if dimension.name == "a3" { dimension.values.last() } else { dimension.values.first() };
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_that_are_not_tuned_keep_their_values() {
+    fn untuned_bounds_keep_their_values() {
         let space =
             SearchSpace::new(vec![Dimension { name: "a5".to_owned(), values: vec![0.0, 0.02], lengthscale: 0.02 }])
                 .unwrap();
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn grids_with_impossible_actions_are_refused() {
+    fn grids_with_invalid_actions_are_refused() {
         let dimension = |name: &str, values: &[f64]| {
             SearchSpace::new(vec![Dimension { name: name.to_owned(), values: values.to_vec(), lengthscale: 1.0 }])
                 .unwrap()

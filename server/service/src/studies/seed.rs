@@ -1,14 +1,14 @@
-//! Random draws of the learner: every one derives from (study seed, purpose, counter), never from time or order of arrival.
-//! What blinds people is drawn by the operating system instead (`store::allocations`).
+//! Seeds for the random draws of the learner, derived from (study seed, purpose, counter), never from time or order of
+//! arrival. Allocations do not use them: the operating system draws those (`store::allocations`).
 
 use sha2::{Digest, Sha256};
 
-/// What a draw is for.
+/// The purpose of a draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// Proposing the trial with this number.
+    /// The proposal of the trial with this number.
     Proposal,
-    /// Draws behind what is shown of the learner's belief.
+    /// The samples behind figures of the posterior.
     Belief,
 }
 
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draws_differ_by_seed_purpose_and_counter_and_never_change() {
+    fn seeds_depend_on_study_purpose_and_counter_alone() {
         let seeds = [
             derive(1, Purpose::Proposal, 1),
             derive(2, Purpose::Proposal, 1),

@@ -1,4 +1,4 @@
-//! Where a study stands, as its learner sees it: the log of results and answers, by action.
+//! A consistent snapshot of a study: its trials, its feedback log and its walkable gaits.
 
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
@@ -9,20 +9,20 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, trials};
 use std::collections::{HashMap, HashSet};
 
-/// Everything that the next decision of a study depends on, read in one go.
+/// Everything on which the next decision of a study depends, read at one instant.
 #[derive(Debug, Clone)]
 pub struct StudySnapshot {
     /// The study.
     pub study: Study,
     /// Its trials, by number.
     pub trials: Vec<Trial>,
-    /// Its feedback, as heard, retracted rows included.
+    /// Its feedback log, retracted rows included.
     pub feedback: Vec<FeedbackRow>,
-    /// The version of the feedback: a decision is written only if it is still current.
+    /// Version of the feedback log. A decision is written only if it is still current.
     pub version: LogVersion,
-    /// The version of what was said about safety: likewise.
+    /// Version of the safety reports and reviews, used in the same way.
     pub safety: SafetyVersion,
-    /// Which gaits people may be asked about and given.
+    /// What decides which gaits are walkable.
     pub grounds: Grounds,
 }
 
@@ -30,7 +30,7 @@ impl StudySnapshot {
     /// Reads the snapshot of a study.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn read(db: &mut Connection, study: Study) -> StoreResult<Self> {
         let version = feedback::version(db, study.id).await?;
         let safety = safety_reviews::version(db, study.id).await?;
@@ -40,21 +40,21 @@ impl StudySnapshot {
         Ok(Self { study, trials, feedback, version, safety, grounds })
     }
 
-    /// Whether nothing was heard and nothing was said about safety since this was read: what follows from it may then be
-    /// written, in the transaction that asks.
+    /// Whether there is no new answer and no new safety report since this was read. A decision may then be written in
+    /// the same transaction.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn is_current(&self, writer: &mut Writer) -> StoreResult<bool> {
         let study = self.study.id;
         Ok(feedback::version(writer, study).await? == self.version
             && safety_reviews::version(writer, study).await? == self.safety)
     }
 
-    /// The newest trials of a large study and the best one, for showing: the learner is not asked about it.
+    /// The newest trials and the best one of a large study, for pages. Not for the learner.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn newest(db: &mut Connection, study: Study, limit: u32) -> StoreResult<Self> {
         let version = feedback::version(db, study.id).await?;
         let safety = safety_reviews::version(db, study.id).await?;
@@ -74,12 +74,12 @@ impl StudySnapshot {
         self.trials.iter().find(|trial| trial.id == id)
     }
 
-    /// The trial that gave the result of an action.
+    /// The trial with the result of an action.
     pub fn trial_of(&self, action: ActionIndex) -> Option<&Trial> {
         self.trials.iter().find(|trial| trial.state.is_result() && trial.action_index == action)
     }
 
-    /// Whether people are to answer the comparisons and no answer of theirs stands.
+    /// Whether people answer the comparisons, and have given no valid answer yet.
     pub fn waits_for_first_answer(&self) -> bool {
         let answered = |row: &FeedbackRow| {
             row.retraction.is_none() && !matches!(row.source, Source::Convergence | Source::GaitRmse)
@@ -87,13 +87,12 @@ impl StudySnapshot {
         self.study.plan.feedback_mode == FeedbackMode::Human && !self.feedback.iter().any(answered)
     }
 
-    /// How many trials are queued or running.
+    /// Number of queued or running trials.
     pub fn open(&self) -> usize {
         self.trials.iter().filter(|trial| trial.state.is_open()).count()
     }
 
-    /// Why no further trial is needed though the number of trials would allow one: the time is used, or the best
-    /// action stayed the same for long enough.
+    /// The stopping rule that applies before the trial budget is used up: the time limit, or an unchanged best action.
     pub fn is_enough(&self) -> Option<String> {
         let plan = &self.study.plan;
         let spent: f64 = self.trials.iter().filter_map(|trial| trial.seconds_total).sum();
@@ -103,36 +102,35 @@ impl StudySnapshot {
             return Some(format!("the solves took {spent:.0} s of {budget:.0} s"));
         }
         let limit = plan.unchanged_limit? as usize;
-        // What was the best when a trial was proposed, newest first.
+        // The best trial at each proposal, newest first.
         let bests: Vec<TrialId> =
             self.trials.iter().rev().filter_map(|trial| trial.best_before).take(limit + 1).collect();
         let same = bests.len() > limit && bests.iter().all(|best| *best == bests[0]);
         same.then(|| format!("the best action stayed the same over {limit} results"))
     }
 
-    /// The gait of a trial, if people may walk with it and be asked about it.
+    /// The gait of a trial, if it is walkable.
     ///
     /// # Errors
-    /// Why not.
+    /// The first reason why it is not.
     pub fn walkable(&self, trial: &Trial) -> Result<WalkableGait, NotWalkable> {
         self.grounds.admit(trial)
     }
 
-    /// Whether a gait has everything that a walkable one needs but a certificate.
+    /// Whether only a certificate is missing for the gait to be walkable.
     pub fn waits_for_certificate(&self, trial: &Trial) -> bool {
         matches!(self.walkable(trial), Err(NotWalkable::NotCertified { .. }))
     }
 
-    /// Actions whose gaits Gait RMSE compares: they exist, and no safety report against them is open. Nobody walks because
-    /// of such a comparison, so it does not wait for certificates.
+    /// Actions whose gaits Gait RMSE compares: converged, without an open safety report. Nobody walks because of such a
+    /// comparison, so it needs no certificate.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
         let shown =
             |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.closes(trial.id);
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 
-    /// What the learner hears: results in the order in which they were recorded, and every answer that was
-    /// not taken back.
+    /// The input of the learner: results in the order of recording, and every answer that was not retracted.
     pub fn log(&self) -> FeedbackLog {
         let by_id: HashMap<TrialId, &Trial> = self.trials.iter().map(|trial| (trial.id, trial)).collect();
         let action = |id: TrialId| by_id.get(&id).map(|trial| trial.action_index);
@@ -150,13 +148,13 @@ impl StudySnapshot {
         log
     }
 
-    /// Actions that may not be proposed though they gave no result: being solved, or given up.
+    /// Actions without a result that must not be proposed again: being solved, or failed.
     pub fn taken_without_result(&self) -> Vec<ActionIndex> {
         self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index).collect()
     }
 }
 
-/// An answer about trials as an answer about actions. `None` when it speaks of one action only.
+/// Converts an answer about trials to one about actions. `None` if both trials have the same action.
 fn heard(said: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
     let feedback = match *said {
         FeedbackContent::Label { trial, category } => {

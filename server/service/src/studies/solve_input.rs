@@ -1,4 +1,4 @@
-//! What a solve begins with: for the worker that runs it, and as a file with which it is done again elsewhere.
+//! The input of a solve (`problem.json`), for workers and for reproducing a solve elsewhere.
 
 use super::device;
 use crate::error::Error;
@@ -8,22 +8,22 @@ use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::{Connection, Packed, TrialId, devices, gaits, reference_gaits, studies, subjects, trials};
 use serde::{Deserialize, Serialize};
 
-/// Everything that a solve depends on: the same input has the same outcome, to the last bit.
+/// Everything that a solve depends on. The same input gives the same outcome, bit for bit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolveInput {
-    /// What to solve.
+    /// The gait problem.
     pub problem: GaitProblem,
-    /// Limits of the solve.
+    /// Settings and limits of the solver.
     #[serde(default)]
     pub options: SolveOptions,
-    /// What to start from; `None`: cold.
+    /// The warm start; `None` for a cold start.
     #[serde(default)]
     pub warm_start: Option<WarmStart>,
 }
 
 impl SolveInput {
-    /// Checks every number that a file may hold.
+    /// Checks every number, for input from a file.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field.
@@ -37,7 +37,7 @@ impl SolveInput {
         Ok(options.validate()?)
     }
 
-    /// As a file.
+    /// The text of `problem.json`.
     ///
     /// # Errors
     /// [`Error::Internal`] when it cannot be written as JSON.
@@ -46,7 +46,7 @@ impl SolveInput {
     }
 }
 
-/// A solve input as it was read: its start is not unpacked yet.
+/// A stored solve input, whose warm start is still compressed.
 #[derive(Debug)]
 pub struct PackedInput {
     problem: GaitProblem,
@@ -55,17 +55,17 @@ pub struct PackedInput {
 }
 
 impl PackedInput {
-    /// That of a trial, as its solve has it or had it.
+    /// The input of a trial's solve.
     ///
     /// # Errors
-    /// [`Error::NotFound`], also for the gait that it started from where that was dropped, or what the database reports.
+    /// [`Error::NotFound`], also if the gait of its warm start was pruned; errors of the database.
     pub async fn of_trial(db: &mut Connection, id: TrialId) -> Result<Self, Error> {
         let trial = trials::get(db, id).await?;
         let plan = studies::get(db, trial.study_id).await?.plan;
         Self::of(db, &plan, trial.action, trial.warm_started_from).await
     }
 
-    /// That of an action in a study, from the gait of a trial.
+    /// The input for an action of a study, with a warm start from the gait of a trial.
     ///
     /// # Errors
     /// As [`Self::of_trial`].
@@ -90,7 +90,7 @@ impl PackedInput {
         Ok(Self { problem, options: plan.solve_options, warm_start })
     }
 
-    /// The input.
+    /// Decompresses the input.
     ///
     /// # Errors
     /// [`gaitwright_store::StoreError::Damaged`] for a start that cannot be unpacked.

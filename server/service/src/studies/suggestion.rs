@@ -1,4 +1,4 @@
-//! Coactive feedback: "with these bounds it would have been better than in that trial".
+//! Records suggestions (coactive feedback): bounds with which a gait would have been better than that of a trial.
 
 use super::answer::{attribution, comparable};
 use super::preference;
@@ -14,19 +14,19 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A suggestion.
+/// Bounds with which a gait would have been better than that of a trial.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Suggestion {
-    /// The trial that would have been better.
+    /// Trial whose gait could be better.
     pub over: TrialId,
-    /// With these values of tuned bounds (`{"a5": 0.026}`), each a level of the search space; the others as they were.
+    /// Suggested values of tuned bounds, such as `{"a5": 0.026}`, each a level of the search space. Other bounds keep
+    /// the values of the trial.
     pub bounds: BTreeMap<String, f64>,
-    /// Who says so: `subject`, `clinician` or `script`.
-    /// By default what the caller is.
+    /// Who answers: `subject`, `clinician` or `script`. Defaults to the caller's kind.
     #[serde(default)]
     pub source: Option<Source>,
-    /// Name or pseudonym of who says so; by default the name of the caller.
+    /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
@@ -36,7 +36,7 @@ pub struct Suggestion {
     pub note: String,
 }
 
-/// Writes a suggestion.
+/// Records a suggestion.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown trial.
@@ -52,7 +52,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Su
     Ok(id)
 }
 
-/// The action of the trial with these bounds in place of its own.
+/// The action of the trial with the suggested bounds.
 fn action(study: &Study, trial: &Trial, bounds: &BTreeMap<String, f64>) -> Result<ActionIndex, Error> {
     let space = &study.plan.search_space;
     let dimensions = space.dimensions();
@@ -71,7 +71,7 @@ fn action(study: &Study, trial: &Trial, bounds: &BTreeMap<String, f64>) -> Resul
     }
     let suggested = space.index_of_levels(&levels).map_err(Error::Learner)?;
     if suggested == trial.action_index {
-        return Err(Error::invalid("bounds", json!(bounds), "others than those of the trial"));
+        return Err(Error::invalid("bounds", json!(bounds), "different from the bounds of the trial"));
     }
     Ok(suggested)
 }

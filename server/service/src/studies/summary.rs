@@ -1,4 +1,4 @@
-//! A study in one document: what `tune --json` prints, a contract for scripts.
+//! The summary of a study as one document, as `tune --json` prints it for scripts.
 
 use super::recommended::{CertificateState, Judged};
 use super::snapshot::StudySnapshot;
@@ -8,26 +8,26 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Serialize;
 
-/// A study in one document.
+/// Summary of a study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// The study.
     pub study_id: StudyId,
-    /// Where it stands.
+    /// State of the study.
     pub state: StudyState,
     /// Number of the recommended trial.
     pub best_trial: Option<u32>,
-    /// Its action.
+    /// Action of the recommended trial.
     pub best_action: Option<TunedBounds>,
-    /// Its Gait RMSE, rad.
+    /// Gait RMSE of the recommended trial, rad.
     pub best_gait_rmse_rad: Option<f64>,
-    /// Its cost of transport.
+    /// Cost of transport of the recommended trial.
     pub best_cost_of_transport: Option<f64>,
-    /// What the certificate of its gait says.
+    /// State of the certificate of the recommended gait.
     pub best_certificate: CertificateState,
-    /// Why that failed, in words.
+    /// Reasons if that certificate failed.
     pub best_objections: Vec<String>,
-    /// Where it failed: the best trial whose gait passed.
+    /// If it failed, the best trial whose gait passed.
     pub passing: Option<TrialSummary>,
     /// Every trial, by number.
     pub trials: Vec<TrialSummary>,
@@ -40,13 +40,13 @@ pub struct TrialSummary {
     pub number: u32,
     /// Identifier.
     pub trial_id: TrialId,
-    /// The bounds.
+    /// Bounds of the trial.
     pub action: TunedBounds,
-    /// `converged` or `not_converged`; none when the solve gave no result.
+    /// `converged` or `not_converged`. Absent without a result.
     pub label: Option<TrialState>,
-    /// Where the trial stands.
+    /// State of the trial.
     pub state: TrialState,
-    /// How the solve ended.
+    /// Status of the solve.
     pub status: Option<SolveStatus>,
     /// Gait RMSE, rad.
     pub gait_rmse_rad: Option<f64>,
@@ -56,11 +56,11 @@ pub struct TrialSummary {
     pub iterations: Option<u32>,
     /// Wall time of the solve, s.
     pub seconds_total: Option<f64>,
-    /// Number of the trial whose gait it started from; none: cold.
+    /// Number of the trial that gave the warm start. Absent for a cold start.
     pub warm_started_from: Option<u32>,
 }
 
-/// The summary of a study and its best trial, with what is known of its certificates.
+/// The summary of a study with its best trial and the certificates.
 pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, judged: Judged) -> Summary {
     let best = best.and_then(|id| snapshot.trial(id));
     Summary {

@@ -1,46 +1,46 @@
-//! The life of a trial, as a pure function: what each thing that happens to its job makes of it.
+//! The state machine of a trial, as a pure function of what happens to its job.
 
 use gait_optimizer::SolveStatus;
 use gaitwright_store::jobs::Troubles;
 use gaitwright_store::trials::TrialState;
 use thiserror::Error;
 
-/// How often a job may fail or be lost and run again.
+/// How often a failed or lost job is retried.
 pub const RETRIES: u32 = 2;
 
-/// Something that happens to a trial.
+/// An event in the life of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Happening {
-    /// A worker takes it.
+    /// A worker takes the job.
     Leased,
-    /// Its solve ended by itself.
+    /// The solve ended by itself.
     Solved(SolveStatus),
-    /// The program failed; so many times before, this one not counted.
+    /// The program failed. Has the number of earlier failures.
     Broke(Troubles),
-    /// Its worker was not heard of again; so many times before, this one not counted.
+    /// The worker stopped responding. Has the number of earlier failures.
     Silent(Troubles),
-    /// The process that ran it ended. Says nothing about the trial, and is not counted.
+    /// The process of the solve ended, which is not counted as a failure.
     Interrupted,
-    /// A person ended it.
+    /// A person cancels the trial.
     Cancelled,
-    /// A person lets it run once more.
+    /// A person retries the trial.
     Retried,
 }
 
-/// The happening makes no sense in this state.
+/// The event is not possible in this state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("a trial that is {} cannot take {happening:?}", state.as_str())]
+#[error("The trial is {}, which does not allow this ({happening:?}).", state.as_str())]
 pub struct Impossible {
-    /// Where the trial stands.
+    /// The state of the trial.
     pub state: TrialState,
-    /// What happened.
+    /// The event.
     pub happening: Happening,
 }
 
-/// Whether a solve status is a result for the learner, and which.
+/// The result for the learner of a solve status, if it is one.
 ///
-/// A solve that ran out of time says how fast the machine is, not how good the action is; one that was
-/// cancelled says nothing at all.
+/// A time limit depends on the speed of the machine, not on the action, and a cancelled solve says nothing. Neither is
+/// a result.
 pub fn result_of(status: SolveStatus) -> Option<TrialState> {
     match status {
         SolveStatus::Converged => Some(TrialState::Converged),
@@ -49,10 +49,10 @@ pub fn result_of(status: SolveStatus) -> Option<TrialState> {
     }
 }
 
-/// Where a trial stands after something happened.
+/// The state of a trial after an event.
 ///
 /// # Errors
-/// [`Impossible`]: for one, nothing changes a result.
+/// [`Impossible`], for example for any event after a result.
 pub fn after(state: TrialState, happening: Happening) -> Result<TrialState, Impossible> {
     use TrialState::{Cancelled, Failed, Lost, Queued, Running};
     match (state, happening) {
@@ -87,7 +87,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn results_are_final_and_only_solves_make_them(
+        fn results_are_final_and_come_from_solves_only(
             happenings in proptest::collection::vec(any_happening(), 0..60)
         ) {
             let mut state = TrialState::Queued;
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_that_keeps_failing_is_given_up_after_two_retries() {
+    fn failing_job_is_given_up_after_two_retries() {
         let mut runs = 0;
         let mut state = TrialState::Queued;
         while state == TrialState::Queued {

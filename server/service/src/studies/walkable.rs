@@ -1,7 +1,7 @@
-//! The gaits that a person may walk with, be asked about or be given for a device.
+//! Decides which gaits may reach a person: be walked with, compared or exported for a device.
 //!
-//! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, planned session,
-//! comparison and recommendation takes one, so a way to a person that skips the rules does not compile.
+//! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, lab session,
+//! comparison and recommendation takes one, so code that skips the rules does not compile.
 
 use super::safety_reports::SafetyReports;
 use crate::error::Error;
@@ -13,18 +13,18 @@ use gaitwright_store::{Connection, Packed, StoreError, StoreResult, StudyId, Tri
 use std::collections::HashMap;
 use thiserror::Error as ThisError;
 
-/// What is known of the certificate of a walkable gait.
+/// The certificate of a walkable gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certified {
-    /// It passed.
+    /// The certificate passed.
     Passed,
-    /// It failed, and the controller file says so.
+    /// The certificate failed, which the controller file states.
     Failed,
-    /// The lab evaluated the trial itself; the record has no gait to certify.
+    /// A lab script evaluated the trial, so the record has no gait to certify.
     ByLab,
 }
 
-/// A converged gait with a known certificate and no open safety report, of a subject who has not withdrawn.
+/// A converged gait with a certificate and without an open safety report, of a subject who has not withdrawn consent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WalkableGait {
     trial: TrialId,
@@ -44,7 +44,7 @@ impl WalkableGait {
         self.number
     }
 
-    /// What its certificate says.
+    /// State of its certificate.
     pub fn certified(&self) -> Certified {
         self.certified
     }
@@ -57,7 +57,7 @@ impl WalkableGait {
         gaits::get(db, self.trial).await
     }
 
-    /// The controller file of this gait, which says whether it passed its certificate. `gait` is [`Self::trajectory`].
+    /// The controller file of this gait, which states whether its certificate passed. `gait` is [`Self::trajectory`].
     ///
     /// # Errors
     /// [`Error::Invalid`] for a rate out of range.
@@ -66,7 +66,7 @@ impl WalkableGait {
         pretty(&ControllerFile { certificate_passed, ..ControllerFile::new(gait, rate_hz)? })
     }
 
-    /// The controller file of this gait for a blinded walk: nothing in it names the gait.
+    /// The controller file of this gait for a blinded walk, without anything that names the gait.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a rate out of range.
@@ -79,23 +79,23 @@ fn pretty(file: &ControllerFile) -> Result<String, Error> {
     serde_json::to_string_pretty(file).map_err(|e| Error::Internal(e.to_string()))
 }
 
-/// Why nobody may walk with a gait.
+/// Why a gait must not be walked.
 #[derive(Debug, Clone, PartialEq, Eq, ThisError)]
 pub enum NotWalkable {
     /// The subject withdrew consent.
-    #[error("the subject withdrew consent")]
+    #[error("The subject withdrew consent.")]
     Withdrawn,
     /// The trial has no converged gait.
-    #[error("trial {number} is {state}: only a converged gait can be walked with or compared")]
+    #[error("Trial {number} is {state}. Only a converged gait can be walked or compared.")]
     NotConverged {
         /// Number of the trial.
         number: u32,
         /// Its state.
         state: &'static str,
     },
-    /// Somebody reported the gait as unsafe, and the report is open.
+    /// The gait has an open safety report.
     #[error(
-        "the gait of trial {number} was called unsafe by {by}: nobody walks with it until staff decide that it may be walked with again"
+        "The gait of trial {number} was reported as unsafe by {by}. It must not be walked until a review by staff allows it."
     )]
     ReportedUnsafe {
         /// Number of the trial.
@@ -114,7 +114,7 @@ pub enum NotWalkable {
         number: u32,
     },
     /// The trajectory was pruned before it was certified.
-    #[error("the gait of trial {number} was pruned and never certified")]
+    #[error("The gait of trial {number} was pruned before it was certified.")]
     Pruned {
         /// Number of the trial.
         number: u32,
@@ -122,9 +122,9 @@ pub enum NotWalkable {
 }
 
 impl NotWalkable {
-    /// The same as the refusal of a field that names the trial.
+    /// The error for a request field that names the trial.
     pub fn of_field(&self, field: &str, trial: TrialId) -> Error {
-        Error::invalid(field, trial.to_string(), &format!("a gait that may be walked with ({self})"))
+        Error::invalid(field, trial.to_string(), &format!("a gait that may be walked with. {self}"))
     }
 }
 
@@ -134,22 +134,22 @@ impl From<NotWalkable> for Error {
     }
 }
 
-/// What the rules need to know of a study: who reported what, which gaits have certificates, and consent.
+/// The facts that decide which gaits of a study are walkable: safety reports, certificates and consent.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Grounds {
-    /// Safety reports and what staff decided.
+    /// Safety reports and their reviews.
     pub safety_reports: SafetyReports,
     /// Certificates of converged trials.
     pub certificates: HashMap<TrialId, CertificateOnRecord>,
-    /// Whether the subject withdrew.
+    /// Whether the subject withdrew consent.
     pub withdrawn: bool,
 }
 
 impl Grounds {
-    /// Reads them.
+    /// Reads the facts of a study.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn read(db: &mut Connection, study: StudyId) -> StoreResult<Self> {
         Ok(Self {
             safety_reports: SafetyReports::read(db, study).await?,
@@ -158,11 +158,11 @@ impl Grounds {
         })
     }
 
-    /// The same with the certificates of a few trials of the study alone, for changes: they hold the only writer, and a study
-    /// may have ten thousand trials. Any other trial is refused.
+    /// Reads the facts with the certificates of a few trials only. For changes, which hold the only writer while a
+    /// study may have ten thousand trials. Any other trial is refused.
     ///
     /// # Errors
-    /// What the database reports.
+    /// Errors of the database.
     pub async fn read_for(db: &mut Connection, study: StudyId, trials: &[TrialId]) -> StoreResult<Self> {
         let mut found = HashMap::new();
         for &trial in trials {
@@ -175,7 +175,7 @@ impl Grounds {
         })
     }
 
-    /// Whether the gait of a trial may reach a person: the one place that decides.
+    /// Decides whether the gait of a trial may reach a person. No other function does.
     ///
     /// # Errors
     /// [`NotWalkable`] with the first reason.
@@ -202,7 +202,8 @@ impl Grounds {
         Ok(WalkableGait { trial: trial.id, number, study: trial.study_id, certified })
     }
 
-    /// Whether a gait may be chosen for a comparison once it is certified: the choice must not depend on when that is.
+    /// Whether a gait could be walkable once it is certified. Comparisons choose among these, so that the choice does
+    /// not depend on when certificates arrive.
     pub fn may_become_walkable(&self, trial: &Trial) -> bool {
         matches!(self.admit(trial), Ok(_) | Err(NotWalkable::NotCertified { .. }))
     }
@@ -211,21 +212,21 @@ impl Grounds {
 /// The gait of a trial, if it may reach a person.
 ///
 /// # Errors
-/// What the database reports, with a trial that does not exist.
+/// Errors of the database, also for a trial that does not exist.
 pub async fn admit(db: &mut Connection, trial: TrialId) -> StoreResult<Result<WalkableGait, NotWalkable>> {
     let trial = trials::get(db, trial).await?;
     Ok(Grounds::read_for(db, trial.study_id, &[trial.id]).await?.admit(&trial))
 }
 
-/// Whether both gaits of a pair that was drawn earlier may still reach a person.
+/// Whether both gaits of an earlier pair are still walkable.
 ///
 /// # Errors
-/// What the database reports, with a trial that does not exist.
+/// Errors of the database, also for a trial that does not exist.
 pub async fn are_walkable(db: &mut Connection, (a, b): (TrialId, TrialId)) -> StoreResult<bool> {
     Ok(admit(db, a).await?.is_ok() && admit(db, b).await?.is_ok())
 }
 
-/// Two different gaits of one study that a person may be asked about.
+/// Two different walkable gaits of one study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WalkablePair {
     first: WalkableGait,
@@ -233,7 +234,7 @@ pub struct WalkablePair {
 }
 
 impl WalkablePair {
-    /// A pair of two gaits. `None`: they are of two studies, or they are the same gait.
+    /// A pair of two gaits. `None` if they belong to two studies or are the same motion.
     pub fn of((first, of_first): (WalkableGait, &Trial), (second, of_second): (WalkableGait, &Trial)) -> Option<Self> {
         let distinct = first.study == second.study && first.trial != second.trial && !is_same_gait(of_first, of_second);
         distinct.then_some(Self { first, second })
@@ -245,10 +246,10 @@ impl WalkablePair {
     }
 }
 
-/// The pair of two trials of a study; `fields` named them.
+/// The pair of two trials of a study; `fields` name them.
 ///
 /// # Errors
-/// [`Error::NotFound`], or [`Error::Invalid`] naming the field that is at fault.
+/// [`Error::NotFound`], or [`Error::Invalid`] naming the field.
 pub async fn admit_pair(
     db: &mut Connection,
     study: StudyId,
@@ -267,10 +268,10 @@ pub async fn admit_pair(
     WalkablePair::of((a, &first), (b, &second)).ok_or_else(|| Error::invalid(fields.1, pair.1.to_string(), &same))
 }
 
-/// A trial of this study; `field` named it.
+/// The trial of this study that `field` names.
 ///
 /// # Errors
-/// [`Error::Invalid`], the same for a trial of another study and for one that does not exist.
+/// [`Error::Invalid`], with the same text for a trial of another study and for one that does not exist.
 pub async fn trial_of_study(db: &mut Connection, study: StudyId, field: &str, id: TrialId) -> Result<Trial, Error> {
     match trials::get(db, id).await {
         Ok(trial) if trial.study_id == study => Ok(trial),
@@ -279,8 +280,8 @@ pub async fn trial_of_study(db: &mut Connection, study: StudyId, field: &str, id
     }
 }
 
-/// Whether two trials gave the very same motion, as when a bound changed that no gait comes near. So many figures agree to
-/// the last bit in no other case.
+/// Whether two trials gave the same motion, as when they differ only in a bound that is not active. Different motions
+/// do not agree in so many figures to the last bit.
 pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
     let figures = |report: &SolveReport| {
         let single = [report.objective, report.cost_of_transport, report.stride_length_m];

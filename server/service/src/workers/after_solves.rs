@@ -1,20 +1,20 @@
-//! What is found out about solves when they are over.
+//! The certifier and the explainer, which examine completed solves.
 
 use super::{Certify, Explain, GaitCertifier, GaitExplainer};
 use std::fmt;
 use std::sync::Arc;
 
-/// Whoever looks into what solves gave.
+/// The services that examine completed solves.
 #[derive(Clone)]
 pub struct AfterSolves {
-    /// Gaits are certified.
+    /// Certifies gaits.
     pub certify: Arc<dyn Certify>,
-    /// That there is no gait is explained.
+    /// Explains solves without a gait.
     pub explain: Arc<dyn Explain>,
 }
 
 impl AfterSolves {
-    /// The real thing.
+    /// The implementations of `gait_optimizer`.
     pub fn by_optimizer() -> Self {
         Self { certify: Arc::new(GaitCertifier), explain: Arc::new(GaitExplainer) }
     }

@@ -1,4 +1,4 @@
-//! The board: how far the running solves are. Lives in memory only; the record has what they gave.
+//! Progress of the running solves, in memory only. The record has the results.
 
 use gait_optimizer::IterationRecord;
 use gaitwright_store::{StudyId, TrialId};
@@ -41,13 +41,13 @@ pub struct Board {
 
 impl Default for Board {
     fn default() -> Self {
-        // A listener that is slower than this many iterations misses some: it sees the next ones.
+        // A listener that falls further behind skips iterations.
         Self { tracks: Mutex::default(), changes: broadcast::channel(1024).0 }
     }
 }
 
 impl Board {
-    /// Every iteration from now on.
+    /// Subscribes to all further iterations.
     pub fn listen(&self) -> broadcast::Receiver<Progress> {
         self.changes.subscribe()
     }
@@ -57,7 +57,7 @@ impl Board {
         self.tracks().get(&trial).cloned()
     }
 
-    /// How many solves run.
+    /// Number of running solves.
     pub fn running(&self) -> usize {
         self.tracks().len()
     }
@@ -72,7 +72,7 @@ impl Board {
             Progress { study_id: track.study, trial_id: trial, number: track.number, record }
         });
         if let Some(progress) = progress {
-            // Nobody listening is fine.
+            // Fails only without listeners.
             let _ = self.changes.send(progress);
         }
     }
@@ -82,7 +82,7 @@ impl Board {
     }
 
     fn tracks(&self) -> MutexGuard<'_, HashMap<TrialId, Track>> {
-        // The map is whole between any two statements that hold the lock.
+        // The map is consistent between statements, so a poisoned lock is usable.
         self.tracks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,18 +1,18 @@
-//! The seam between the service and the certification of a gait.
+//! The interface between the service and the certification of gaits.
 
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::{Gait, ModelError};
 
 /// Certifies a gait on the calling thread.
 pub trait Certify: Send + Sync + 'static {
-    /// The certificate of a gait: the same for the same gait, to the last bit.
+    /// The certificate of a gait. The same gait gives the same certificate, bit for bit.
     ///
     /// # Errors
-    /// [`ModelError`] when it is no gait of the walker.
+    /// [`ModelError`] for a malformed gait.
     fn certify(&self, gait: &Gait) -> Result<Certificate, ModelError>;
 }
 
-/// The real thing: `gait_optimizer::certificate::certify`.
+/// Certifies with `gait_optimizer::certificate::certify`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct GaitCertifier;
 

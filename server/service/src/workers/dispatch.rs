@@ -1,7 +1,8 @@
-//! The seam between the record and whatever runs solves: threads of this process, or workers on other machines.
+//! The interface between the scheduler and the engines that run solves: threads of this process, or workers on other
+//! machines.
 //!
-//! An engine may forget everything at any time, bring a result late, or bring it twice. What counts is decided in the
-//! record, by the number of the attempt.
+//! An engine may lose jobs, and may deliver a result late or twice. The record decides what counts, by the number of
+//! the attempt.
 
 use super::Assignment;
 use futures_util::future::BoxFuture;
@@ -12,74 +13,74 @@ use std::fmt;
 use std::time::Duration;
 use thiserror::Error;
 
-/// One try at the solve of a trial.
+/// One attempt at the solve of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Attempt {
     /// The trial.
     pub trial: TrialId,
-    /// 1, 2, ...: a result counts only while this is the newest try.
+    /// Number of the attempt, from 1. A result counts only if this is the newest attempt.
     pub number: u32,
 }
 
-/// What came of an assignment.
+/// The result of an assignment.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Finding {
     /// The solve ended by itself, with or without a gait.
     Ended {
-        /// What it gave.
+        /// The outcome.
         outcome: Box<SolveOutcome>,
         /// Its iterations.
         iterations: Vec<IterationRecord>,
     },
-    /// The program failed: a panic or an error, in words.
+    /// The program failed with this panic or error message.
     Broke(String),
 }
 
-/// What is heard of a job that was submitted.
+/// A message about a submitted job.
 #[derive(Debug)]
 pub enum News {
-    /// A worker took it.
+    /// A worker started the job.
     Started {
-        /// Which try.
+        /// The attempt.
         attempt: Attempt,
-        /// Who runs it.
+        /// Name of the worker.
         worker: String,
     },
-    /// Its solve came one iteration further: also the sign that the worker lives.
+    /// The solve completed an iteration, which also renews the lease.
     Iterated {
-        /// Which try.
+        /// The attempt.
         attempt: Attempt,
         /// The iteration.
         record: IterationRecord,
     },
-    /// It came to an end.
+    /// The job ended.
     Ended {
-        /// Which try.
+        /// The attempt.
         attempt: Attempt,
-        /// Who ran it.
+        /// Name of the worker.
         worker: String,
-        /// What came of it.
+        /// The result.
         finding: Finding,
-        /// To be signed once the finding is in the record; unsigned, it may be brought again.
+        /// Must be signed once the result is on record. Otherwise the engine may deliver it again.
         receipt: Receipt,
     },
 }
 
-/// Tells the engine that what it brought is in the record.
+/// Acknowledges to the engine that a result is on record.
 pub struct Receipt(Option<BoxFuture<'static, ()>>);
 
 impl Receipt {
-    /// Of an engine that does not ask for one.
+    /// A receipt for an engine that needs none.
     pub fn not_needed() -> Self {
         Self(None)
     }
 
-    /// What to do when it is signed.
+    /// A receipt with the action that acknowledges it.
     pub fn new(sign: impl Future<Output = ()> + Send + 'static) -> Self {
         Self(Some(Box::pin(sign)))
     }
 
-    /// Signs it.
+    /// Acknowledges the result.
     pub async fn sign(self) {
         if let Some(sign) = self.0 {
             sign.await;
@@ -93,52 +94,52 @@ impl fmt::Debug for Receipt {
     }
 }
 
-/// A job could not be handed over; it is tried again later.
+/// A job could not be dispatched. It is retried later.
 #[derive(Debug, Error)]
 pub enum DispatchError {
     /// The job is too large for the engine.
-    #[error("{what} of {bytes} bytes is more than the {limit} bytes that the broker takes: raise its max_payload")]
+    #[error("{what} has {bytes} bytes, but the broker accepts at most {limit}. Raise its max_payload.")]
     TooLarge {
-        /// What was to be sent.
+        /// The kind of message.
         what: &'static str,
         /// Its size.
         bytes: usize,
-        /// What the broker takes.
+        /// The limit of the broker.
         limit: usize,
     },
     /// A message cannot be written or read.
-    #[error("a message between service and worker: {0}")]
+    #[error("A message between service and worker is malformed: {0}")]
     Message(String),
     /// The engine cannot be reached.
     #[error("{0}")]
     Unreachable(String),
 }
 
-/// What takes jobs and tells what comes of them.
+/// An engine that runs jobs and reports their results.
 pub trait Dispatch: Send + Sync + 'static {
     /// Its name in the record.
     fn name(&self) -> &'static str;
 
-    /// How many jobs may be out at the same time.
+    /// Maximum number of dispatched jobs.
     fn size(&self) -> usize;
 
-    /// A worker that is silent for so long has lost its job.
+    /// Time without a message after which a worker loses its job.
     fn lease(&self) -> Duration;
 
-    /// Whether jobs that were submitted go on when this process ends.
+    /// Whether submitted jobs survive the end of this process.
     fn outlives_process(&self) -> bool;
 
-    /// Why it cannot work now, in words; none: it can.
+    /// Why the engine cannot work now, if it cannot.
     fn trouble(&self) -> Option<String> {
         None
     }
 
-    /// Hands a job over. Handing the same attempt over twice has the effect of once.
+    /// Submits a job. Submitting the same attempt twice has no further effect.
     fn submit(&self, assignment: Assignment) -> BoxFuture<'_, Result<(), DispatchError>>;
 
-    /// Asks that the solve of a trial stop within one iteration; nobody waits for it any more.
+    /// Cancels the solve of a trial, which stops within one iteration.
     fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()>;
 
-    /// The next news. Dropping the future loses none.
+    /// The next message. Dropping the future loses none.
     fn next(&self) -> BoxFuture<'_, News>;
 }

@@ -1,4 +1,4 @@
-//! The seam between the service and the optimizer.
+//! The interface between the workers and the optimizer.
 
 use super::dispatch::Attempt;
 use gait_optimizer::{CancelToken, GaitProblem, IterationRecord, SolveOptions, SolveOutcome, WarmStart, solve};
@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 /// One solve to run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Assignment {
-    /// The trial, and which try at it this is.
+    /// The trial and the number of the attempt.
     pub attempt: Attempt,
     /// Number of the trial within its study.
     pub number: u32,
-    /// What to solve.
+    /// The gait problem.
     pub problem: GaitProblem,
-    /// What to start from; `None`: cold.
+    /// The warm start; `None` for a cold start.
     pub warm_start: Option<WarmStart>,
-    /// Limits of the solve.
+    /// Settings and limits of the solver.
     pub options: SolveOptions,
 }
 
@@ -24,7 +24,7 @@ pub trait Evaluate: Send + Sync + 'static {
     /// Runs the solve, calling `observer` at every iteration and stopping within one of `cancel`.
     ///
     /// # Errors
-    /// Text for people when the solve could not even be tried: a failure of the program, not of the action.
+    /// A message if the solve could not start, which is an engineering failure.
     fn evaluate(
         &self,
         assignment: &Assignment,
@@ -33,7 +33,7 @@ pub trait Evaluate: Send + Sync + 'static {
     ) -> Result<SolveOutcome, String>;
 }
 
-/// The real thing: `gait_optimizer::solve`.
+/// Solves with `gait_optimizer::solve`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct GaitSolver;
 
@@ -45,7 +45,7 @@ impl Evaluate for GaitSolver {
         cancel: &CancelToken,
     ) -> Result<SolveOutcome, String> {
         let solved = solve(&assignment.problem, assignment.warm_start.as_ref(), &assignment.options, observer, cancel);
-        // The record keeps the answer; whoever wants the gaits of other basins solves the trial's problem again.
+        // The record does not keep gaits of other basins. To get them, solve the trial's problem again.
         solved.map(|outcome| SolveOutcome { other_basins: Vec::new(), ..outcome }).map_err(|e| e.to_string())
     }
 }

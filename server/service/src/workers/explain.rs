@@ -1,4 +1,4 @@
-//! The seam between the service and the explanation of a solve without a gait.
+//! The interface between the service and infeasibility explanations.
 
 use gait_optimizer::explanation::{Explanation, Unsolved, explain};
 use gait_optimizer::{CancelToken, GaitProblem, SolveError, SolveOptions, SolveStatus, Violation, WarmStart};
@@ -6,13 +6,13 @@ use gait_optimizer::{CancelToken, GaitProblem, SolveError, SolveOptions, SolveSt
 /// A solve that ended without a gait.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
-    /// What was solved.
+    /// The gait problem.
     pub problem: GaitProblem,
-    /// Its limits.
+    /// Settings and limits of the solver.
     pub options: SolveOptions,
-    /// How it ended.
+    /// Status of the solve.
     pub status: SolveStatus,
-    /// What its last iterate violates, worst first.
+    /// Violations of its last iterate, worst first.
     pub violations: Vec<Violation>,
     /// Its last iterate.
     pub last: WarmStart,
@@ -20,21 +20,21 @@ pub struct Unexplained {
 
 /// Explains a solve without a gait on the calling thread.
 pub trait Explain: Send + Sync + 'static {
-    /// Why there is no gait: the same for the same solve, to the last bit. `None`: cancelled, within one iteration.
+    /// The explanation. The same solve gives the same one, bit for bit. `None` if cancelled, within one iteration.
     ///
     /// # Errors
-    /// [`SolveError`] when what the solve left does not belong to its problem.
+    /// [`SolveError`] if the last iterate does not belong to the problem.
     fn explain(&self, solve: &Unexplained, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError>;
 }
 
-/// The real thing: `gait_optimizer::explanation::explain`.
+/// Explains with `gait_optimizer::explanation::explain`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct GaitExplainer;
 
 impl Explain for GaitExplainer {
     fn explain(&self, solve: &Unexplained, cancel: &CancelToken) -> Result<Option<Explanation>, SolveError> {
         let Unexplained { problem, options, status, violations, last } = solve;
-        // On one thread, which waits for others: what a clock says of it is not about the problem.
+        // This low-priority thread has no time limit, because elapsed time says nothing about the problem.
         let options = SolveOptions { threads: 1, time_limit_s: None, ..*options };
         explain(problem, Unsolved { status: *status, violations, last }, &options, &mut |_| {}, cancel)
     }

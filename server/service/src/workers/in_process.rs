@@ -1,4 +1,4 @@
-//! The engine of one machine: one named thread per running solve.
+//! The engine of a single machine: one thread for each running solve.
 
 use super::dispatch::{Dispatch, DispatchError, Finding, News, Receipt};
 use super::{Assignment, Evaluate};
@@ -16,12 +16,12 @@ use tokio::sync::mpsc::{self, UnboundedReceiver, UnboundedSender};
 
 /// Its name in the record.
 pub const IN_PROCESS: &str = "in-process";
-/// Longer than any iteration takes, on any machine that is worth waiting for.
+/// Longer than any iteration takes.
 pub const LEASE: Duration = Duration::from_mins(1);
 
 type Running = Arc<Mutex<HashMap<TrialId, (u32, CancelToken)>>>;
 
-/// Threads that solve.
+/// The solver threads of this process.
 pub struct InProcess {
     evaluate: Arc<dyn Evaluate>,
     size: usize,
@@ -33,7 +33,7 @@ pub struct InProcess {
 }
 
 impl InProcess {
-    /// At most `size` solves at the same time (at least one).
+    /// An engine for at most `size` parallel solves (at least one).
     pub fn new(size: usize, evaluate: Arc<dyn Evaluate>) -> Self {
         let (news, heard) = mpsc::unbounded_channel();
         Self {
@@ -47,21 +47,21 @@ impl InProcess {
         }
     }
 
-    /// Solves give way to whoever waits for an answer of this process.
+    /// Lowers the priority of solves below that of requests.
     #[must_use]
     pub fn standing_back(mut self) -> Self {
         self.stands_back = true;
         self
     }
 
-    /// A solve without an iteration for so long is taken for lost.
+    /// Sets the time without an iteration after which a solve counts as lost.
     #[must_use]
     pub fn with_lease(mut self, lease: Duration) -> Self {
         self.lease = lease;
         self
     }
 
-    /// Begins a solve on a thread of its own, unless this attempt runs already.
+    /// Starts a solve on its own thread, unless the attempt is already running.
     fn begin(&self, assignment: Assignment) -> Result<(), DispatchError> {
         let attempt = assignment.attempt;
         let cancel = CancelToken::new();
@@ -80,7 +80,7 @@ impl InProcess {
             if stands_back {
                 stand_back(SOLVER);
             }
-            // Nobody listens any more when the process is shutting down.
+            // Fails only while the process is shutting down.
             let _ = news.send(News::Started { attempt, worker: IN_PROCESS.to_owned() });
             let finding = solve(evaluate.as_ref(), &assignment, &news, &cancel);
             let mut running = lock(&running);
@@ -94,7 +94,7 @@ impl InProcess {
         let thread = std::thread::Builder::new().name("solver".to_owned()).stack_size(STACK_BYTES).spawn(work);
         thread.map(drop).map_err(|error| {
             self.running().remove(&attempt.trial);
-            DispatchError::Unreachable(format!("no thread for a solve: {error}"))
+            DispatchError::Unreachable(format!("Cannot start a thread for a solve: {error}."))
         })
     }
 
@@ -126,7 +126,7 @@ impl Dispatch for InProcess {
 
     fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
         Box::pin(async move {
-            // A thread that hangs keeps its place in memory, but nothing waits for it.
+            // A hanging thread keeps its memory, but does not block others.
             if let Some((_, cancel)) = self.running().remove(&trial) {
                 cancel.cancel();
             }
@@ -137,7 +137,7 @@ impl Dispatch for InProcess {
         Box::pin(async move {
             match self.heard.lock().await.recv().await {
                 Some(news) => news,
-                // Cannot be: this engine holds a sender itself.
+                // Unreachable: the engine holds a sender itself.
                 None => std::future::pending().await,
             }
         })
@@ -181,7 +181,7 @@ fn solve(
 }
 
 fn lock(running: &Running) -> MutexGuard<'_, HashMap<TrialId, (u32, CancelToken)>> {
-    // The map is whole between any two statements that hold the lock.
+    // The map is consistent between statements, so a poisoned lock is usable.
     running.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

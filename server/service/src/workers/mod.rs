@@ -1,8 +1,8 @@
-//! Workers: what runs a solve. They never see the database.
+//! Workers and engines that run solves. They never access the database.
 //!
-//! A worker gets an [`Assignment`], reports iterations, and gives back a [`Finding`]. What hands assignments out is an
-//! engine ([`Dispatch`]): threads of this process ([`InProcess`]), or workers elsewhere behind a broker ([`nats`]).
-//! Solves are CPU work: each runs on a thread of its own and never on the async runtime.
+//! A worker receives an [`Assignment`], reports iterations, and returns a [`Finding`]. An engine ([`Dispatch`])
+//! distributes assignments: to threads of this process ([`InProcess`]), or to workers on other machines through a
+//! broker ([`nats`]). Solves are CPU-bound, so each runs on its own thread and never on the async runtime.
 
 mod after_solves;
 mod board;

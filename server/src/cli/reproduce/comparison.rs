@@ -1,4 +1,4 @@
-//! With muscles against without, per subject and seed; as tables and in words.
+//! Compares studies with and without muscles for each subject and seed, as tables and as text.
 
 use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::csv_table::{Cell, CsvTable, cells};
@@ -25,7 +25,7 @@ impl Curve {
     }
 }
 
-/// What a study came to.
+/// The results of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Outcome {
     pub(super) subject: u32,
@@ -33,25 +33,25 @@ pub(super) struct Outcome {
     pub(super) seed: u64,
     pub(super) trials: usize,
     pub(super) converged: usize,
-    /// Sum of the solves' wall times.
+    /// Total wall time of the solves.
     pub(super) solve_seconds: f64,
-    /// From the first trial's start to the last one's end, solves and learner; an interruption counts.
+    /// Time from the start of the first trial to the end of the last one, interruptions included.
     pub(super) wall_seconds: f64,
-    /// Gait RMSE of the best action after 1, 2, ... results, rad; none before the first gait.
+    /// Gait RMSE of the best action after each result, rad; `None` before the first gait.
     pub(super) by_iteration: Vec<Option<f64>>,
     pub(super) best_trial: Option<u32>,
     pub(super) best_rmse_rad: Option<f64>,
     pub(super) best_cost_of_transport: Option<f64>,
     pub(super) best_bounds: Option<String>,
-    /// What the certificate of the best gait says.
+    /// State of the certificate of the best gait.
     pub(super) certificate: CertificateState,
-    /// Why that failed, in words.
+    /// Reasons if it failed.
     pub(super) objections: Vec<String>,
-    /// Where it failed: number and Gait RMSE, rad, of the best trial whose gait passed.
+    /// If it failed, number and Gait RMSE, rad, of the best trial whose gait passed.
     pub(super) passing: Option<(u32, Option<f64>)>,
     /// Best gait.
     pub(super) gait: Option<Gait>,
-    /// What Gait RMSE was measured by.
+    /// The reference gait of Gait RMSE.
     pub(super) reference: ReferenceGait,
 }
 
@@ -61,7 +61,7 @@ impl Outcome {
         self.gait.as_ref().map(Curve::of)
     }
 
-    /// What the certificate of the best gait says, and which gait passes where that one does not.
+    /// The certificate of the best gait, and the best gait that passes if it failed.
     pub(super) fn certificate_in_words(&self) -> String {
         match (self.certificate, self.passing) {
             (CertificateState::Passed, _) => "passed".to_owned(),
@@ -74,7 +74,7 @@ impl Outcome {
         }
     }
 
-    /// Why the certificate of the best gait failed; none: it did not.
+    /// Why the certificate of the best gait failed, if it did.
     pub(super) fn failure_in_words(&self) -> Option<String> {
         let with = if self.muscles { "with" } else { "without" };
         let objections = self.objections.join("; ");
@@ -83,7 +83,7 @@ impl Outcome {
     }
 }
 
-/// Fills the iterations between milestones: a recommendation holds until the next one.
+/// Fills the iterations between milestones. A recommendation holds until the next one.
 pub(super) fn by_iteration(milestones: &[Milestone], results: usize) -> Vec<Option<f64>> {
     (1..=results)
         .map(|iteration| {
@@ -98,9 +98,9 @@ pub(super) fn by_iteration(milestones: &[Milestone], results: usize) -> Vec<Opti
 pub(super) struct Verdict {
     pub(super) subject: u32,
     pub(super) seed: u64,
-    /// Iterations at which both studies had a gait.
+    /// Number of iterations at which both studies had a gait.
     pub(super) compared: usize,
-    /// Of these, how often muscles gave the lower Gait RMSE.
+    /// Number of these at which muscles gave the lower Gait RMSE.
     pub(super) lower: usize,
     /// Gait RMSE of the final best actions without and with muscles, rad.
     pub(super) last: Option<(f64, f64)>,
@@ -128,7 +128,7 @@ impl Verdict {
     }
 }
 
-/// One verdict per pair of studies.
+/// One comparison for each pair of studies.
 pub(super) fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
     let partner =
         |plain: &Outcome| outcomes.iter().find(|o| o.muscles && (o.subject, o.seed) == (plain.subject, plain.seed));
@@ -154,7 +154,7 @@ pub(super) fn verdicts(outcomes: &[Outcome]) -> Vec<Verdict> {
         .collect()
 }
 
-/// How firm the answer is over all pairs.
+/// The conclusion over all pairs, in words.
 pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
     let throughout = verdicts.iter().filter(|v| v.throughout()).count();
     let at_the_end = verdicts.iter().filter(|v| v.last.is_some_and(|(without, with)| with < without)).count();
@@ -178,7 +178,7 @@ pub(super) fn conclusion(verdicts: &[Verdict]) -> String {
     )
 }
 
-/// By how much muscles lower the Gait RMSE of the final best actions.
+/// How much muscles lower the Gait RMSE of the final best actions.
 fn spread(verdicts: &[Verdict]) -> String {
     let mut gains: Vec<f64> = verdicts.iter().filter_map(|v| v.last).map(|(without, with)| without - with).collect();
     gains.sort_by(f64::total_cmp);
@@ -211,7 +211,7 @@ pub(super) fn iterations_csv(outcomes: &[Outcome]) -> String {
     table.into_text()
 }
 
-/// One row per study.
+/// One row for each study.
 pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
     let mut table = CsvTable::new([
         "subject",
@@ -247,7 +247,7 @@ pub(super) fn studies_csv(outcomes: &[Outcome]) -> String {
     table.into_text()
 }
 
-/// Final joint angles, and the reference with its standard deviation where it has one.
+/// Final joint angles, and the reference gait with its standard deviation, if it has one.
 pub(super) fn angles_csv(outcomes: &[Outcome]) -> String {
     let columns = COORDINATES.map(|name| format!("{name}_rad"));
     let first = ["subject", "seed", "muscles", "percent"].map(str::to_owned);

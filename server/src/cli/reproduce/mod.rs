@@ -1,4 +1,4 @@
-//! `gaitwright reproduce`: the paper's comparison of gaits with and without muscles, unattended.
+//! `gaitwright reproduce`: repeats the paper's comparison of gaits with and without muscles, unattended.
 
 mod comparison;
 mod report;
@@ -37,7 +37,7 @@ enum Subjects {
     /// Male, 1.803 m, 75 kg.
     #[value(name = "2")]
     Second,
-    /// One after the other.
+    /// Both subjects.
     Both,
 }
 
@@ -57,31 +57,31 @@ fn seeds(text: &str) -> Result<u64, String> {
 
 #[derive(Debug, Args)]
 pub(super) struct Reproduce {
-    /// Which subjects of the paper.
+    /// Subjects of the paper.
     #[arg(long, value_enum, default_value = "both")]
     subject: Subjects,
-    /// Trials of each study.
+    /// Number of trials of each study.
     #[arg(long, default_value = "30", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
-    /// First seed; both studies of a subject have the same.
+    /// First seed. Both studies of a subject use the same seed.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
-    /// How many seeds in a row: local optima can turn the comparison either way.
+    /// Number of consecutive seeds. Several are needed, because local optima can turn the comparison either way.
     #[arg(long, default_value = "3", value_name = "NUMBER", value_parser = seeds, allow_negative_numbers = true)]
     seeds: u64,
     /// Reference gait (JSON), written by `gaitwright reference`; default: the built-in one.
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Folder of record, report and tables; what is finished in it is not done again.
+    /// Folder for the database, the report and the tables. Finished studies in it are not repeated.
     #[arg(long, default_value = "reproduction", value_name = "FOLDER")]
     folder: PathBuf,
 }
 
 impl Reproduce {
-    /// Two studies per subject and seed, one trial at a time: reproducible bit for bit.
+    /// Runs two studies for each subject and seed, one trial at a time, so that results are reproducible bit for bit.
     pub(super) async fn run(self) -> Result<Ended, Error> {
         let reference = reference_of(self.reference.as_deref())?;
-        let cannot = |e: std::io::Error| Error::Malformed(format!("cannot make {}: {e}", self.folder.display()));
+        let cannot = |e: std::io::Error| Error::Malformed(format!("Cannot create {}: {e}.", self.folder.display()));
         std::fs::create_dir_all(&self.folder).map_err(cannot)?;
         let files = ["report.html", "iterations.csv", "studies.csv", "angles.csv"];
         let files: Vec<OutFile> =
@@ -90,7 +90,7 @@ impl Reproduce {
         let outcomes = Box::pin(self.studies(&mut store, &reference)).await;
         store.close().await;
         let Some((outcomes, failures)) = outcomes? else {
-            tell("interrupted; the same command goes on from there");
+            tell("interrupted; run the same command again to continue");
             return Ok(Ended::Interrupted);
         };
         let texts = [
@@ -113,8 +113,8 @@ impl Reproduce {
         Ok(if failures.is_empty() { Ended::Done } else { Ended::Failed })
     }
 
-    /// Every study in order, and in which of them trials failed for reasons of the program or the machine; none when
-    /// somebody stopped it.
+    /// Runs every study in order. Returns the results and the engineering failures, or `None` if a person stopped the
+    /// command.
     async fn studies(
         &self,
         store: &mut Store,
@@ -137,7 +137,7 @@ impl Reproduce {
                         }
                         if ran.snapshot.study.state != StudyState::Finished {
                             let why = unattended::failure(&ran.snapshot).unwrap_or_default();
-                            return Err(Error::Internal(format!("{title}: {why}; nothing is compared")));
+                            return Err(Error::Internal(format!("{title}: {why}. The comparison was stopped.")));
                         }
                         (ran.snapshot, ran.beliefs)
                     };
@@ -151,7 +151,7 @@ impl Reproduce {
         Ok(Some((outcomes, failures)))
     }
 
-    /// The study of the folder, and whether it is finished.
+    /// The study in the folder, and whether it is finished.
     async fn study(
         &self,
         store: &Store,
@@ -186,7 +186,7 @@ impl Reproduce {
     }
 }
 
-/// What a study came to.
+/// The results of a study.
 #[allow(clippy::too_many_arguments)] // what is compared, and where from
 async fn outcome(
     store: &mut Store,
@@ -231,7 +231,7 @@ async fn outcome(
     })
 }
 
-/// From the first trial's start to the last one's end.
+/// Time from the start of the first trial to the end of the last one.
 fn wall_seconds(snapshot: &StudySnapshot) -> f64 {
     let begun = snapshot.trials.iter().filter_map(|trial| trial.started_at).min();
     let ended = snapshot.trials.iter().filter_map(|trial| trial.finished_at).max();

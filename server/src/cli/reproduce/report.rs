@@ -1,4 +1,4 @@
-//! The report: one HTML file that needs nothing beside it.
+//! The report of `gaitwright reproduce`: one self-contained HTML file.
 
 use super::comparison::{Outcome, Verdict, conclusion, verdicts};
 use super::statements::{Statement, statements};
@@ -9,7 +9,7 @@ use gaitwright_charts::gait_charts;
 use gaitwright_charts::{Chart, Stroke, band_in_words, gait_tiles};
 use gaitwright_service::error::Error;
 
-/// The style sheet of the pages: the charts' colours and dashes are its classes.
+/// The style sheet of the pages, which has the colours and dashes of charts.
 const STYLE: &str = include_str!("../../../../web/static/gaitwright.css");
 
 #[derive(Template)]
@@ -20,13 +20,13 @@ struct Report<'a> {
     trials: u32,
     conclusion: String,
     statements: Vec<Statement>,
-    /// Of all solves together, s.
+    /// Total time of all solves, s.
     solve_seconds: f64,
-    /// Of all studies, one after the other, s.
+    /// Total time of all studies, s.
     wall_seconds: f64,
-    /// Why certificates of best gaits failed.
+    /// Reasons of failed certificates of best gaits.
     failures: Vec<String>,
-    /// Name of the reference, and what is to be known of its band.
+    /// Name of the reference gait, and the meaning of its band.
     reference: Option<(&'a str, &'static str)>,
     verdicts: Vec<Verdict>,
     outcomes: &'a [Outcome],
@@ -38,7 +38,7 @@ struct Pair {
     title: String,
     /// Figures 3b and 3c of the paper.
     course_and_angles: Vec<Drawn>,
-    /// Figure 4: whose gait, and its tiles.
+    /// Figure 4: variant and tiles.
     tiles: Vec<(&'static str, String)>,
     /// Figure 5.
     orbits: Vec<Drawn>,
@@ -103,7 +103,7 @@ fn label(outcome: &Outcome) -> &'static str {
     if outcome.muscles { "with muscles" } else { "without muscles" }
 }
 
-/// Colour and stroke, those that its gait has among two: without muscles the first.
+/// Colour and stroke of the variant; without muscles comes first.
 fn look(outcome: &Outcome) -> (usize, Stroke) {
     if outcome.muscles { (1, Stroke::DashedSteps) } else { (0, Stroke::Steps) }
 }

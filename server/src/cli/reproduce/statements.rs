@@ -1,4 +1,4 @@
-//! What the paper says of its experiment, and what this comparison can say to it.
+//! The statements of the paper about its experiment, each with the result of this comparison.
 
 use super::comparison::{Outcome, Verdict};
 use gaitwright_service::studies::recommended::CertificateState;
@@ -6,11 +6,11 @@ use gaitwright_service::studies::recommended::CertificateState;
 /// A statement of the paper.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Statement {
-    /// What it says.
+    /// The statement.
     pub(super) paper: String,
-    /// What was found here.
+    /// The result here.
     pub(super) here: String,
-    /// Whether that agrees.
+    /// Whether they agree.
     pub(super) agrees: &'static str,
 }
 
@@ -21,7 +21,7 @@ pub(super) fn statements(outcomes: &[Outcome], verdicts: &[Verdict]) -> Vec<Stat
     subjects.dedup();
     let mut all: Vec<Statement> = subjects.iter().map(|subject| lower_rmse(*subject, verdicts)).collect();
     all.push(stable(outcomes));
-    let people = "not compared: people walk and wear electrodes for that; lab sessions of the service measure it";
+    let people = "not compared: this needs a subject with electrodes, in a lab session of the service";
     for paper in [
         "EMG RMSE is lower with muscles: 1.58 against 1.80 (subject 1), 1.84 against 2.34 (subject 2)",
         "Both subjects strongly prefer the gait with muscles after walking with both",

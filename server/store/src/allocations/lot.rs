@@ -1,8 +1,8 @@
-//! One draw of an order, and what it gives: a pure function of the lot and of the block that is open.
+//! Draws of allocations: permuted blocks for lab sessions and fair coins for pairs, as pure functions of a random lot.
 
 use crate::{StoreError, StoreResult};
 
-/// Random bytes for one allocation. Outside of tests only the operating system makes them.
+/// Random bytes for one allocation, from the operating system except in tests.
 #[derive(Debug, Clone, Copy)]
 pub struct Lot {
     number: u64,
@@ -12,11 +12,11 @@ pub struct Lot {
 /// A place in a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Place {
-    /// Whether the one comes first.
+    /// Whether gait one comes first.
     pub(super) one_first: bool,
-    /// So many places in the block: 2 or 4.
+    /// Size of the block, 2 or 4.
     pub(super) size: u8,
-    /// 1, 2, ...
+    /// Position in the block, from 1.
     pub(super) position: u8,
 }
 
@@ -24,7 +24,7 @@ impl Lot {
     /// Draws a lot.
     ///
     /// # Errors
-    /// When the system has no random numbers.
+    /// If the operating system gives no random numbers.
     pub fn draw() -> StoreResult<Self> {
         let mut bytes = [0_u8; 40];
         getrandom::fill(&mut bytes).map_err(|e| StoreError::NoRandomNumbers(e.to_string()))?;
@@ -34,7 +34,7 @@ impl Lot {
         Ok(Self { number: u64::from_le_bytes(number), nonce })
     }
 
-    /// A number for a draw that conceals nothing.
+    /// A random number for draws that are not concealed.
     pub fn number(self) -> u64 {
         self.number
     }
@@ -49,14 +49,14 @@ impl Lot {
         hex::encode(self.nonce)
     }
 
-    /// The next place, after those that are taken in the open block; without any, a block of two or four begins. Every
-    /// order with as many of the one as of the other is equally likely.
+    /// The next place after the taken ones of the open block. Without any, a new block of two or four begins. Every
+    /// balanced order of a block is equally likely.
     pub(super) fn place(self, taken: &[Place]) -> Place {
         let size = taken.first().map_or(if self.coin() { 2 } else { 4 }, |first| first.size);
         let ones = taken.iter().filter(|place| place.one_first).count() as u64;
         let (used, half) = (taken.len() as u64, u64::from(size) / 2);
         let left = u64::from(size).saturating_sub(used).max(1);
-        // The bit of the coin is not used twice.
+        // The lowest bit is used by the coin.
         let one_first = (self.number >> 1) % left < half.saturating_sub(ones);
         Place { one_first, size, position: u8::try_from(used + 1).unwrap_or(size) }
     }
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
     use sha2::{Digest, Sha256};
 
-    /// Of a chi-squared distribution with one degree of freedom, exceeded once in a thousand.
+    /// The 99.9th percentile of the chi-squared distribution with one degree of freedom.
     const CRITICAL: f64 = 10.83;
 
     fn lot(counter: u64) -> Lot {
@@ -80,7 +80,7 @@ mod tests {
         2.0 * (count as f64 - half).powi(2) / half
     }
 
-    /// Sessions drawn one after the other, block after block.
+    /// The places of consecutive sessions.
     fn drawn(sessions: u64) -> Vec<Place> {
         let (mut all, mut open): (Vec<Place>, Vec<Place>) = (Vec::new(), Vec::new());
         for counter in 0..sessions {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn every_block_is_balanced_and_blocks_of_two_and_four_are_equally_frequent() {
+    fn blocks_are_balanced_and_sizes_two_and_four_are_equally_frequent() {
         let all = drawn(30_000);
         let mut sizes = [0_usize; 2];
         let mut rest = &all[..];
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn orders_of_10_000_sessions_are_balanced_at_every_place_of_a_block() {
+    fn allocations_of_10_000_sessions_are_balanced_at_every_place() {
         let all = drawn(10_000);
         for (size, place) in [(2, 1), (2, 2), (4, 1), (4, 2), (4, 3), (4, 4)] {
             let here: Vec<_> = all.iter().filter(|drawn| (drawn.size, drawn.position) == (size, place)).collect();
@@ -133,12 +133,12 @@ mod tests {
         }
         assert_eq!(counts.len(), 6, "{counts:?}");
         let chi: f64 = counts.values().map(|count| (f64::from(*count) - 1000.0).powi(2) / 1000.0).sum();
-        // Five degrees of freedom, exceeded once in a thousand.
+        // The 99.9th percentile with five degrees of freedom.
         assert!(chi < 20.52, "{chi}: {counts:?}");
     }
 
     #[test]
-    fn sides_of_10_000_pairs_are_balanced_and_follow_from_no_earlier_one() {
+    fn sides_of_10_000_pairs_are_balanced_and_independent() {
         let coins: Vec<bool> = (0..10_000).map(|counter| lot(counter).coin()).collect();
         let ones = coins.iter().filter(|coin| **coin).count();
         let same = coins.windows(2).filter(|pair| pair[0] == pair[1]).count();
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn lots_of_the_system_differ_in_number_and_nonce() {
+    fn random_lots_differ_in_number_and_nonce() {
         let (a, b) = (Lot::draw().unwrap(), Lot::draw().unwrap());
         assert!(a.number != b.number && a.nonce() != b.nonce() && a.nonce().len() == 64);
     }

@@ -1,8 +1,8 @@
-//! Allocations: which gait comes first, in a lab session and in a rater's pair.
+//! Allocations: which gait comes first in a lab session or in a rater's pair.
 //!
-//! No other module reads these tables, and every statement here that gives an order out names in its own `where` why it may
-//! be known: the session or the rater was unblinded, the pair is the asking rater's own, or the device fetches its file and
-//! that is written down. The state of a block is read by the draw alone.
+//! No other module reads these tables. Every statement that returns an allocation states in its `where` why it may be
+//! known: the session or the rater is unblinded, the pair belongs to the rater, or the device fetches its file, which
+//! is recorded. Only the draw reads the state of a block.
 
 mod lot;
 
@@ -17,16 +17,16 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use utoipa::ToSchema;
 
-/// That an order was revealed, for `l.id` in a statement: the session was unblinded, or somebody who reads has its file.
+/// SQL condition that the allocation of session `l.id` is revealed: the session is unblinded, or a reader has its file.
 const REVEALED: &str = "(exists (select 1 from lab_acts t where t.session_id = l.id and t.act = 'unblinded') \
                         or exists (select 1 from lab_device_files f where f.session_id = l.id and f.to_device = 0))";
-/// A session belongs to a block of at most so many.
+/// Size of the largest block.
 const LARGEST_BLOCK: u32 = 4;
 
-/// Draws which gait walk 2 of a session is with. Sessions with the same number balance each other, subject by subject.
+/// Draws which gait walk 2 of a session uses. Sessions with the same number form a stratum across subjects.
 ///
 /// # Errors
-/// A violated constraint when the session has an allocation, or what the database reports.
+/// A violated constraint if the session has an allocation; errors of the database.
 pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32, lot: Lot) -> StoreResult<()> {
     let drawn = lot.place(&open_block(db, number).await?);
     sqlx::query(
@@ -45,8 +45,8 @@ pub async fn of_session(db: &mut Connection, session: LabSessionId, number: u32,
     Ok(())
 }
 
-/// The places that are taken in the block that is open, in order. A block also ends when an order in it was revealed: what
-/// is drawn next must not follow from it.
+/// The taken places of the open block, in order. A block also ends when one of its allocations is revealed, so that the
+/// next one cannot be derived from it.
 async fn open_block(db: &mut Connection, number: u32) -> StoreResult<Vec<Place>> {
     let sql = format!(
         "select a.gait_one_first, a.block_size, a.place, {REVEALED} as revealed \
@@ -73,34 +73,35 @@ async fn open_block(db: &mut Connection, number: u32) -> StoreResult<Vec<Place>>
     Ok(if taken.last().is_some_and(|last| last.position == last.size) { Vec::new() } else { taken })
 }
 
-/// What may be known of the order of a session.
+/// What may be known of the allocation of a session.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OfSession {
-    /// Whether the order is in this record. A study that came here while it was blinded has none.
+    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
+    /// it.
     pub included: bool,
-    /// Whether walk 2 is with gait one; none before the session is unblinded.
+    /// Whether walk 2 uses gait one; `None` while the session is blinded.
     pub gait_one_first: Option<bool>,
-    /// Who got a controller file of its walks, in order.
+    /// Who fetched controller files of its walks, in order.
     pub files: Vec<DeviceFile>,
 }
 
-/// That a controller file of a walk was given out.
+/// Release of the controller file of a walk.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct DeviceFile {
-    /// 2 or 3.
+    /// Number of the walk, 2 or 3.
     pub walk: u8,
-    /// Whether the device itself fetched it. Otherwise whoever fetched it could know which gait the walk is with.
+    /// Whether the device itself fetched the file. Otherwise the caller could know which gait the walk uses.
     pub to_device: bool,
-    /// Who.
+    /// Who fetched it.
     pub actor: String,
-    /// When.
+    /// Time.
     pub at: Instant,
 }
 
-/// What may be known of the order of a session.
+/// Reads what may be known of the allocation of a session.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<OfSession> {
     let order = sqlx::query(
         "select iif(exists (select 1 from lab_acts t where t.session_id = a.session_id and t.act = 'unblinded'), \
@@ -123,11 +124,11 @@ fn device_file(row: &SqliteRow) -> StoreResult<DeviceFile> {
     })
 }
 
-/// Writes down that the controller file of a walk is given out, and tells whether it is that of gait one; none when the order
-/// is not in this record.
+/// Records the release of the controller file of a walk. Returns whether the walk uses gait one, or `None` if the
+/// allocation is not in this record.
 ///
 /// # Errors
-/// A violated constraint or trigger, or what the database reports.
+/// A violated constraint or trigger; errors of the database.
 pub async fn for_device(
     db: &mut Connection,
     session: LabSessionId,
@@ -153,11 +154,11 @@ pub async fn for_device(
     Ok(row.bind(id).fetch_optional(db).await?.map(|row| row.try_get(0)).transpose()?)
 }
 
-/// Whether somebody who reads may have a controller file of a lab session of this study. Who holds a token is not known: a
-/// token may be anybody's, and anybody may hold one.
+/// Whether an actor may have a controller file of a lab session of this study. The holder of a token is unknown, so a
+/// token may belong to any actor.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> StoreResult<bool> {
     let row = sqlx::query(
         "select 1 from lab_device_files f join lab_sessions l on l.id = f.session_id \
@@ -167,12 +168,12 @@ pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> Sto
     Ok(row.bind(study).bind(actor.as_str()).bind(is_token).bind(of_tokens).fetch_optional(db).await?.is_some())
 }
 
-/// Draws which gait of a pair is shown first: a fair coin each time, because the answers that the study hears tell the orders
-/// of earlier pairs to whoever knows what the rater said. A pair that comes `again` after its answer was taken back keeps its
+/// Draws which gait of a pair is shown first, by a fair coin. Blocks would not do: answers in the study reveal earlier
+/// allocations to readers who know what the rater said. A pair that is shown `again` after a retraction keeps its
 /// sides.
 ///
 /// # Errors
-/// A violated constraint when the pair has an allocation, or what the database reports.
+/// A violated constraint if the pair has an allocation; errors of the database.
 pub async fn of_pair(
     db: &mut Connection,
     id: PresentationId,
@@ -208,37 +209,37 @@ impl Sided {
         if self.swapped { (other, one) } else { (one, other) }
     }
 
-    /// What was said of the sides, about the pair; and the other way round.
+    /// Converts an answer from sides to gaits of the pair, or back.
     pub fn turned(&self, said: Judgement) -> Judgement {
         if self.swapped { said.swapped() } else { said }
     }
 
-    /// The answer, about the sides.
+    /// The answer in terms of sides.
     pub fn answer(&self) -> Option<Judgement> {
         self.presentation.answer.map(|said| self.turned(said))
     }
 }
 
-/// The rater's own pair with this token.
+/// The pair with this token, if it belongs to the rater.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreResult<Option<Sided>> {
     let found = sided("where p.token = ? and p.rater = ?", &[token, rater], db).await?;
     Ok(found.into_iter().next())
 }
 
-/// The pairs of the raters who were unblinded in a study, in the order in which they were drawn.
+/// The pairs of unblinded raters of a study, in the order of the draws.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<Sided>> {
     let rest = "where p.study_id = ? and exists \
                 (select 1 from unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
     sided(rest, &[&study.to_string()], db).await
 }
 
-/// The pairs of which `rest` says why their sides may be known.
+/// Reads pairs with their sides. `rest` states why the sides may be known.
 async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> StoreResult<Vec<Sided>> {
     let columns = SELECT.replacen("select p.*", "select p.*, s.swapped", 1);
     let sql = format!("{columns} join presentation_allocations s on s.presentation_id = p.id {rest}");
@@ -255,7 +256,7 @@ async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> Stor
 /// Whether the sides of a pair are in this record.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn is_included(db: &mut Connection, id: PresentationId) -> StoreResult<bool> {
     let row = sqlx::query("select 1 from presentation_allocations where presentation_id = ?").bind(id);
     Ok(row.fetch_optional(db).await?.is_some())

@@ -1,5 +1,5 @@
-//! What an archive must keep to be believed: every value by the rules of its noun, as if it came in by its own way, and
-//! every figure that follows from another one computed anew.
+//! Checks an imported archive: every value by the rules that apply when people enter it, and every derived figure by
+//! computing it again.
 
 use super::file::refuse;
 use crate::access::Reach;
@@ -26,7 +26,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use uuid::Uuid;
 
-/// Texts that a noun reads by itself: their characters are its business.
+/// Columns that the modules of their tables parse and check.
 const READ_BY_NOUN: [&str; 12] = [
     "definition",
     "gait_settings",
@@ -41,14 +41,14 @@ const READ_BY_NOUN: [&str; 12] = [
     "document",
     "status",
 ];
-/// Longest other text, characters: longer than any note.
+/// Maximum length of any other text, characters. Longer than any note.
 const LONGEST_TEXT: usize = 20_000;
-/// Clocks of two machines differ by less, s.
+/// Tolerance for the difference between the clocks of two machines, s.
 const CLOCKS_DIFFER_S: i64 = 86_400;
-/// Two computations of a Gait RMSE agree to this share: sums are the same, machines round alike.
+/// Relative tolerance between two computations of a Gait RMSE.
 const SAME_RMSE: f64 = 1e-9;
 
-/// Checks what can be said of a row alone: that texts print, instants have passed, identifiers are some.
+/// Checks a row by itself: text is printable, times have passed, identifiers are well-formed.
 pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
     for (column, cell) in row.cells() {
         let Cell::Text(text) = cell else { continue };
@@ -60,35 +60,35 @@ pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
         if column == "id" || column.ends_with("_id") {
             let is_written_so = Uuid::parse_str(text).is_ok_and(|id| id.hyphenated().to_string() == *text);
             if !is_written_so {
-                return Err(refuse(format!("{field}: {text:?} is no identifier")));
+                return Err(refuse(format!("{field} is {text:?}, which is not an identifier")));
             }
         } else if column.ends_with("_at") || column.ends_with("_until") {
-            let at: Instant = text.parse().map_err(|_| refuse(format!("{field}: {text:?} is no instant")))?;
+            let at: Instant = text.parse().map_err(|_| refuse(format!("{field} is {text:?}, which is not a time")))?;
             if at > now().plus_seconds(CLOCKS_DIFFER_S) && column != "lease_until" {
-                return Err(refuse(format!("{field}: {text} has not come yet")));
+                return Err(refuse(format!("{field} is {text}, which is in the future")));
             }
         }
     }
     Ok(())
 }
 
-/// What checking found.
+/// The result of the checks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Checked {
     /// The study.
     pub(super) study: StudyId,
-    /// Trials whose Gait RMSE could not be computed anew.
+    /// Number of trials whose Gait RMSE could not be computed again.
     pub(super) unchecked_rmse: u32,
 }
 
-/// What a trial must agree with.
+/// The study data that trials must agree with.
 struct Context {
     study: Study,
     device: gait_optimizer::Device,
     reference: ReferenceGait,
 }
 
-/// Names what is wrong where an error says only what.
+/// Adds to an error where it occurred.
 fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E>) -> Result<T, Error> {
     result.map_err(|error| refuse(format!("{what}: {error}")))
 }
@@ -96,7 +96,7 @@ fn at<T, E: std::fmt::Display>(what: impl std::fmt::Display, result: Result<T, E
 /// Checks everything in quarantine.
 pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Checked, Error> {
     if let Some(parent) = quarantine.forked_from() {
-        at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is no identifier")))?;
+        at("studies.forked_from", parent.parse::<StudyId>().map_err(|_| format!("{parent:?} is not an identifier")))?;
     }
     let db = quarantine.db();
     let found = at("studies", studies::page(db, Reach::Every, None, 2).await)?;
@@ -106,7 +106,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
 
     let subject = at("subject", subjects::get(db, study.plan.subject_id).await)?;
     if at("subjects", subjects::all(db).await)?.len() != 1 {
-        return Err(refuse("it holds subjects that are not of its study"));
+        return Err(refuse("it has subjects that do not belong to its study"));
     }
     at(
         format!("subject {}", subject.id),
@@ -128,11 +128,11 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     for (place, trial) in trials.iter().enumerate() {
         let what = format!("trial {} ({})", trial.number, trial.id);
         if trial.number as usize != place + 1 {
-            return Err(refuse(format!("{what}: expected number {}", place + 1)));
+            return Err(refuse(format!("{what} should have number {}", place + 1)));
         }
         for (column, other) in [("best_before", trial.best_before), ("warm_started_from", trial.warm_started_from)] {
             if other.is_some_and(|other| !earlier.contains(&other)) {
-                return Err(refuse(format!("{what}: {column} is no earlier trial")));
+                return Err(refuse(format!("{what}: {column} is not an earlier trial")));
             }
         }
         earlier.insert(trial.id);
@@ -142,14 +142,14 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
         at(&what, brought(db, trial).await)?;
     }
     if let Some(number) = at("jobs", archive::trial_unlike_its_job(db).await)? {
-        return Err(refuse(format!("trial {number}: its job says otherwise than its state")));
+        return Err(refuse(format!("trial {number}: its state contradicts its job")));
     }
     answers(db, &context.study, &trials).await?;
     lab(db, pool, id).await?;
     Ok(Checked { study: id, unchecked_rmse })
 }
 
-/// Checks a definition against the name and the hash beside it.
+/// Checks a definition against its stored name and hash.
 fn of_definition(table: &str, name: &str, written: &Definition) -> Result<(), Error> {
     if written.name != name || written.sha256 != gaitwright_store::sha256(written.text.as_bytes()) {
         return Err(refuse(format!("{table}: name, definition and hash do not agree")));
@@ -164,7 +164,7 @@ fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     }
     let action = search::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
     if action.map_err(|e| e.to_string())? != trial.action {
-        return Err("the action is not that of its index".to_owned());
+        return Err("the action does not match its index".to_owned());
     }
     let figures = [trial.gait_rmse_rad, trial.cost_of_transport, trial.max_violation, trial.seconds_total];
     if figures.iter().flatten().any(|figure| !figure.is_finite() || *figure < 0.0) {
@@ -172,14 +172,18 @@ fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     }
     if trial.asked_by.is_some() || !trial.state.is_result() {
         let none = trial.report.is_none() && trial.status.is_none();
-        return if none { Ok(()) } else { Err("a trial without a solve has the report of one".to_owned()) };
+        return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
     }
     let state = trial.status.and_then(trial_state::result_of);
     if state != Some(trial.state) {
-        return Err(format!("status {:?} does not make it {}", trial.status, trial.state.as_str()));
+        return Err(format!("status {:?} contradicts the state {}", trial.status, trial.state.as_str()));
     }
     let Some(report) = &trial.report else {
-        return if trial.state == TrialState::Converged { Err("it has no report".to_owned()) } else { Ok(()) };
+        return if trial.state == TrialState::Converged {
+            Err("the solve report is missing".to_owned())
+        } else {
+            Ok(())
+        };
     };
     let converged = trial.state == TrialState::Converged;
     let of_gait = |figure: f64| converged.then_some(figure);
@@ -191,22 +195,22 @@ fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         && trial.iterations.is_some_and(|count| count as usize == report.iterations)
         && trial.seconds_total == Some(report.seconds_total);
     if !same {
-        return Err("its figures are not those of its report".to_owned());
+        return Err("its figures differ from its solve report".to_owned());
     }
     if converged && report.max_violation > CONVERGED_VIOLATION {
-        return Err(format!("it converged with a violation of {}", report.max_violation));
+        return Err(format!("it is converged, but its violation is {}", report.max_violation));
     }
     Ok(())
 }
 
-/// Checks the gait of a trial and computes its Gait RMSE anew. Whether it has one.
+/// Checks the gait of a trial and computes its Gait RMSE again. Returns whether the trial has a gait.
 async fn gait(db: &mut Connection, pool: &Pool, trial: &Trial, context: &Arc<Context>) -> Result<bool, String> {
     let text = |error: StoreError| error.to_string();
     if !gaits::is_here(db, trial.id).await.map_err(text)? {
         return Ok(false);
     }
     if trial.asked_by.is_some() || !trial.state.is_result() {
-        return Err("it has a gait without a solve".to_owned());
+        return Err("it has a gait but no solve".to_owned());
     }
     let gait = gaits::get(db, trial.id).await.map_err(text)?;
     let warm_start = gaits::warm_start(db, trial.id).await.map_err(text)?;
@@ -222,12 +226,12 @@ async fn gait(db: &mut Connection, pool: &Pool, trial: &Trial, context: &Arc<Con
     };
     let gait = pool.run(checked).await.map_err(|e| e.to_string())??;
     if !gaits::is_described(db, id, &gait).await.map_err(text)? {
-        return Err("its gait is not as its row describes it".to_owned());
+        return Err("its gait does not match its row".to_owned());
     }
     Ok(true)
 }
 
-/// Checks what a solve left against its trial.
+/// Checks the stored outcome of a solve against its trial.
 fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart) -> Result<(), String> {
     gait.validate().map_err(|e| e.to_string())?;
     let plan = &context.study.plan;
@@ -236,10 +240,10 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
         || gait.settings != *plan.gait_settings
         || gait.bounds != trial.action
     {
-        return Err("its gait is of another device, problem or action".to_owned());
+        return Err("its gait belongs to another device, problem or action".to_owned());
     }
     if warm_start.muscles != plan.muscles || warm_start.mesh != plan.gait_settings.mesh {
-        return Err("its warm start is of another problem".to_owned());
+        return Err("its warm start belongs to another problem".to_owned());
     }
     same_rmse(trial, gait, &context.reference)
 }
@@ -252,19 +256,19 @@ fn same_rmse(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<()
     if agree(report.gait_rmse_rad, anew.total) && parts {
         return Ok(());
     }
-    Err(format!("its Gait RMSE is stated as {} rad, but its gait has {} rad", report.gait_rmse_rad, anew.total))
+    Err(format!("its stated Gait RMSE is {} rad, but that of its gait is {} rad", report.gait_rmse_rad, anew.total))
 }
 
-/// Checks what workers brought for a trial.
+/// Checks the results that workers delivered for a trial.
 async fn brought(db: &mut Connection, trial: &Trial) -> Result<(), String> {
     let results = results::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
     let mut taken = results.iter().filter(|result| result.taken);
     let Some(result) = taken.next() else { return Ok(()) };
     if taken.next().is_some() {
-        return Err("two results were taken".to_owned());
+        return Err("two results were accepted".to_owned());
     }
     if Some(result.status) != trial.status || result.report != trial.report {
-        return Err("its result is not the one that was taken".to_owned());
+        return Err("its result differs from the accepted one".to_owned());
     }
     Ok(())
 }
@@ -281,7 +285,7 @@ async fn answers(db: &mut Connection, study: &Study, trials: &[Trial]) -> Result
     }
     let results = trials.iter().filter(|trial| trial.state.is_result()).count();
     if labelled != results {
-        return Err(refuse(format!("{results} trials have a result and {labelled} a label")));
+        return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
     }
     let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.said)?))).collect();
     for remark in at("remarks", remarks::of_study(db, id).await)? {
@@ -307,18 +311,19 @@ fn pair(said: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     }
 }
 
-/// Checks one row that the learner hears against the trials that it is of.
+/// Checks a row of the feedback log against the trials that it names.
 fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) -> Result<(), String> {
-    let trial = |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} is not of this study"));
+    let trial =
+        |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} does not belong to this study"));
     match row.said {
         FeedbackContent::Label { trial: id, category } => {
             let state = trial(id)?.state;
             let converged = state == TrialState::Converged;
             if !state.is_result() || category != u32::from(converged) {
-                return Err(format!("category {category} is not that of a trial that is {}", state.as_str()));
+                return Err(format!("category {category} does not match the trial state {}", state.as_str()));
             }
             if !matches!(row.source, Source::Convergence | Source::Script) {
-                return Err(format!("a label by {}", row.source.as_str()));
+                return Err(format!("the source of a label is {}", row.source.as_str()));
             }
         }
         FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
@@ -327,20 +332,20 @@ fn heard(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &Trial>) ->
                 return Err("it compares a trial that did not converge".to_owned());
             }
             match row.source {
-                Source::Convergence => return Err("convergence compares nothing".to_owned()),
+                Source::Convergence => return Err("the source of a preference is convergence".to_owned()),
                 Source::GaitRmse => {
                     if study.plan.feedback_mode == FeedbackMode::Human {
-                        return Err("Gait RMSE answers in a study of people".to_owned());
+                        return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());
                     }
                     let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {
-                        return Err("Gait RMSE compares a trial that has none".to_owned());
+                        return Err("Gait RMSE compares a trial without a Gait RMSE".to_owned());
                     };
                     let expected = by_gait_rmse((a.id, one), (b.id, other));
                     if pair(&expected) != pair(&row.said)
                         || std::mem::discriminant(&expected) != std::mem::discriminant(&row.said)
                         || matches!((expected, row.said), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
                     {
-                        return Err("Gait RMSE says otherwise".to_owned());
+                        return Err("the preference contradicts Gait RMSE".to_owned());
                     }
                 }
                 Source::Subject | Source::Clinician | Source::Script => {}

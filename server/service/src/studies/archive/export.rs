@@ -1,4 +1,4 @@
-//! Writing an archive.
+//! Exports a study as an archive.
 
 use super::file::Packer;
 use super::signature::SigningKey;
@@ -10,15 +10,15 @@ use std::io::Write;
 use std::path::Path;
 use tokio::sync::mpsc;
 
-/// Rows that were read and not yet written: few, because a row may be large.
+/// Length of the queue between reading and writing. Short, because rows can be large.
 const ROWS_AHEAD: usize = 2;
 
-/// Writes the study of a record into an archive. Reads on a connection of its own, as of one instant; rows are hashed and
-/// compressed on another thread as they come.
+/// Writes a study of the record into an archive. Reads one consistent state on its own connection, while another thread
+/// hashes and compresses the rows.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when the subject withdrew or a row is not as the program wrote it, or what the
-/// database or the writer reports; what was written until then has no end, and is refused by every import.
+/// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent or a row was changed outside the program;
+/// errors of the database or the writer. The partial archive then has no end line, so every import refuses it.
 pub async fn export<W: Write + Send + 'static>(
     database: &Path,
     study: StudyId,
@@ -35,8 +35,9 @@ pub async fn export<W: Write + Send + 'static>(
                 return packer.finish(key.as_ref()).map(Some).map_err(Error::Output);
             };
             if sealed && seal.as_ref() != Some(&row.sha256()) {
-                let reason = format!("a row of {table} was changed outside the program: see `gaitwright audit verify`");
-                return Err(Error::conflict(format!("the study cannot be exported: {reason}")));
+                let reason =
+                    format!("a row of {table} was changed outside the program. Run `gaitwright audit verify`.");
+                return Err(Error::conflict(format!("The study cannot be exported: {reason}")));
             }
             packer.add(table, &masked(table, row)).map_err(Error::Output)?;
         }
@@ -51,7 +52,7 @@ pub async fn export<W: Write + Send + 'static>(
             done
         };
         let handing = async {
-            // Moved in here, so that reading ends when nobody writes any more.
+            // Owned by this task, so that reading ends when the writer ends.
             let mut read = read;
             while let Some(row) = read.recv().await {
                 if sender.send(Some(row)).await.is_err() {
@@ -61,7 +62,7 @@ pub async fn export<W: Write + Send + 'static>(
         };
         let (done, ()) = tokio::join!(reading, handing);
         done?;
-        // Only a study that was read to its end has an end.
+        // An archive gets its end line only if the whole study was read.
         let _ = sender.send(None).await;
         Ok::<_, StoreError>(())
     }

@@ -1,7 +1,7 @@
-//! The form of an archive: a line that names the format, then zstd-compressed lines of JSON, one for each row with its
-//! table and hash, and a last one with the hash over all of them and the signature.
+//! The file format of archives: a line with the name of the format, then zstd-compressed lines of JSON. Each line has a
+//! row, its table and its hash; the last line has the hash over all rows and the signature.
 //!
-//! Reading one takes memory for one line, however large it is and whatever it expands to.
+//! Reading an archive needs memory for one line only.
 
 use super::signature::{PublicKey, SigningKey};
 use crate::error::Error;
@@ -11,21 +11,21 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io::{BufRead, BufReader, Read, Write};
 
-/// Format of the files that are written and read.
+/// Name and version of the format.
 const FORMAT: &str = "gaitwright study 3";
 /// zstd level.
 const COMPRESSION: i32 = 3;
-/// Largest window that is accepted, as a power of two: the level above needs 2 MiB.
+/// Largest accepted zstd window, as a power of two. The level above needs 2 MiB.
 const WINDOW_LOG: u32 = 23;
-/// Largest line: bytes are written as two digits each.
+/// Largest accepted line. Bytes are written as two hexadecimal digits.
 const LARGEST_LINE_BYTES: usize = 2 * LARGEST_BLOB_BYTES + LARGEST_TEXT_BYTES;
-/// Largest archive that is read, uncompressed.
+/// Largest accepted archive, uncompressed.
 const LARGEST_BYTES: u64 = 16 << 30;
-/// A study has at most so many trials.
+/// Maximum number of trials.
 const MOST_TRIALS: u64 = 10_000;
-/// A refusal says at most so much, characters.
+/// Maximum length of the reason of a refusal, characters.
 const LONGEST_REASON: usize = 500;
-/// And so many rows of any other table.
+/// Maximum number of rows of any other table.
 const MOST_ROWS: u64 = 200_000;
 
 #[derive(Serialize)]
@@ -53,19 +53,19 @@ struct Line {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct End {
-    /// How many rows came before.
+    /// Number of rows.
     rows: u64,
-    /// SHA-256 over their lines.
+    /// SHA-256 over the lines of all rows.
     sha256: String,
-    /// Public key of whoever signed.
+    /// Public key of the signature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     signed_by: Option<String>,
-    /// Signature of format and hash.
+    /// Signature of the format and the hash.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     signature: Option<String>,
 }
 
-/// What is signed.
+/// The signed message.
 fn message(sha256: &str) -> String {
     format!("{FORMAT}\n{sha256}")
 }
@@ -88,14 +88,14 @@ impl<W: Write> Packer<W> {
         let mut line = serde_json::to_vec(&RowLine { table, sha256: &row.sha256(), row })?;
         line.push(b'\n');
         if line.len() > LARGEST_LINE_BYTES {
-            return Err(std::io::Error::other(format!("a row of {table} is too large for an archive")));
+            return Err(std::io::Error::other(format!("A row of {table} is too large for an archive.")));
         }
         self.hash.update(&line);
         self.rows += 1;
         self.out.write_all(&line)
     }
 
-    /// Ends the archive.
+    /// Writes the end line.
     pub(super) fn finish(self, key: Option<&SigningKey>) -> std::io::Result<W> {
         let Self { mut out, hash, rows } = self;
         let sha256 = hex::encode(hash.finalize());
@@ -109,7 +109,7 @@ impl<W: Write> Packer<W> {
     }
 }
 
-/// Hashes what is read through it.
+/// A reader that hashes its bytes.
 struct Hashed<R> {
     from: R,
     hash: Sha256,
@@ -125,14 +125,14 @@ impl<R: Read> Read for Hashed<R> {
 
 type Source<R> = BufReader<Hashed<R>>;
 
-/// What an archive that was read to its end is.
+/// Facts about a completely read archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Whole {
     /// SHA-256 of the file.
     pub file_sha256: String,
-    /// Who signed it; the signature was checked.
+    /// Public key of the signer. The signature was checked.
     pub signed_by: Option<PublicKey>,
-    /// How many rows it holds.
+    /// Number of rows.
     pub rows: u64,
 }
 
@@ -142,19 +142,19 @@ pub(super) struct Unpacker<R: Read> {
     hash: Sha256,
     bytes: u64,
     rows: u64,
-    /// Rows of the present table, and its place in the order.
+    /// Number of rows of the current table so far.
     of_table: u64,
     place: usize,
 }
 
-/// What is wrong with an archive.
+/// The error for an archive that is refused.
 pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
-    // What a row holds may be repeated in the reason, at any length.
+    // The reason may quote a row, which can have any length.
     let reason: String = reason.to_string().chars().take(LONGEST_REASON).collect();
-    Error::Malformed(format!("the archive is refused, nothing was changed: {reason}"))
+    Error::Malformed(format!("The archive was refused and nothing was changed: {reason}."))
 }
 
-/// What a read gives next.
+/// The next part of an archive.
 pub(super) enum Next {
     Row(&'static str, Row),
     End(Whole),
@@ -168,9 +168,9 @@ impl<R: Read> Unpacker<R> {
         let first = String::from_utf8_lossy(&first);
         if first.trim_end_matches('\n') != FORMAT || !first.ends_with('\n') {
             let older = first.contains("gaitwright study ");
-            let hint = if older { ": export the study again with this version" } else { "" };
+            let hint = if older { ". Export the study again with this version" } else { "" };
             let shown: String = first.chars().take(40).collect();
-            return Err(refuse(format!("it begins with {shown:?}, expected {FORMAT:?}{hint}")));
+            return Err(refuse(format!("it starts with {shown:?} instead of {FORMAT:?}{hint}")));
         }
         let mut decoder = zstd::Decoder::with_buffer(source).map_err(refuse)?;
         decoder.window_log_max(WINDOW_LOG).map_err(refuse)?;
@@ -188,10 +188,10 @@ impl<R: Read> Unpacker<R> {
             return Err(refuse(format!("row {row} is larger than {LARGEST_LINE_BYTES} bytes")));
         }
         if self.bytes > LARGEST_BYTES {
-            return Err(refuse(format!("it holds more than {LARGEST_BYTES} bytes")));
+            return Err(refuse(format!("it expands to more than {LARGEST_BYTES} bytes")));
         }
         if text.pop() != Some(b'\n') {
-            return Err(refuse("it is cut off"));
+            return Err(refuse("it is truncated"));
         }
         let line: Line = serde_json::from_slice(&text).map_err(|e| refuse(format!("row {row}: {e}")))?;
         match line {
@@ -201,10 +201,10 @@ impl<R: Read> Unpacker<R> {
                 self.rows = row;
                 drop(text);
                 let Some((place, table)) = table(&name) else {
-                    return Err(refuse(format!("row {row} is of a table {name:?} that no archive holds")));
+                    return Err(refuse(format!("row {row} belongs to the table {name:?}, which no archive has")));
                 };
                 if place < self.place {
-                    return Err(refuse(format!("row {row} is of table {table}, which comes earlier")));
+                    return Err(refuse(format!("row {row} belongs to table {table}, which must come earlier")));
                 }
                 self.of_table = if place == self.place { self.of_table + 1 } else { 1 };
                 self.place = place;
@@ -213,40 +213,40 @@ impl<R: Read> Unpacker<R> {
                     return Err(refuse(format!("it has more than {most} rows of table {table}")));
                 }
                 if found.sha256() != sha256 {
-                    return Err(refuse(format!("row {row}, of table {table}, is not what its hash says")));
+                    return Err(refuse(format!("row {row}, of table {table}, does not match its hash")));
                 }
                 Ok(Next::Row(table, found))
             }
             Line { table: None, sha256: None, row: None, end: Some(end) } => self.end(&end).map(Next::End),
-            _ => Err(refuse(format!("row {row} is neither a row nor the end"))),
+            _ => Err(refuse(format!("line {row} is neither a row nor the end"))),
         }
     }
 
     fn end(&mut self, end: &End) -> Result<Whole, Error> {
         let sha256 = hex::encode(std::mem::take(&mut self.hash).finalize());
         if end.rows != self.rows || end.sha256 != sha256 {
-            return Err(refuse("its rows are not those that were written: they do not fit the hash at its end"));
+            return Err(refuse("its rows were changed: they do not match the hash at its end"));
         }
         if self.lines.read(&mut [0]).map_err(refuse)? != 0 {
-            return Err(refuse("something follows its end"));
+            return Err(refuse("it has data after its end"));
         }
         let signed_by = match (&end.signed_by, &end.signature) {
             (None, None) => None,
             (Some(key), Some(signature)) => {
                 let key: PublicKey = key.parse().map_err(refuse)?;
                 if !key.signed(&message(&sha256), signature) {
-                    return Err(refuse(format!("its signature is not of the key {key} that it names")));
+                    return Err(refuse(format!("its signature was not made with the key {key} that it names")));
                 }
                 Some(key)
             }
-            _ => return Err(refuse("it has half a signature")),
+            _ => return Err(refuse("its signature is incomplete")),
         };
         let hashed = std::mem::take(&mut self.lines.get_mut().get_mut().get_mut().hash);
         Ok(Whole { file_sha256: hex::encode(hashed.finalize()), signed_by, rows: self.rows })
     }
 }
 
-/// Reads an archive to its end: whether it is one, and whether its rows are those that were written.
+/// Reads an archive to its end, and checks its format, hashes and signature.
 ///
 /// # Errors
 /// [`Error::Malformed`] with the reason.

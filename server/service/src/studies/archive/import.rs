@@ -1,4 +1,4 @@
-//! Reading an archive into a record.
+//! Imports an archive into the record.
 
 use super::check;
 use super::file::{Next, Unpacker, Whole, refuse};
@@ -18,7 +18,7 @@ use tokio::sync::mpsc;
 /// Rows that were read and not yet written: few, because a row may be large.
 const ROWS_AHEAD: usize = 2;
 
-/// An archive that was unpacked and checked, not yet written anywhere.
+/// An unpacked and checked archive, ready to be imported.
 #[derive(Debug)]
 pub struct Archive {
     quarantine: Quarantine,
@@ -26,10 +26,10 @@ pub struct Archive {
     origin: NewImport,
 }
 
-/// Unpacks and checks an archive. Where keys are given, it must be signed by one of them.
+/// Unpacks and checks an archive. If `trusted` is not empty, one of its keys must have signed the archive.
 ///
 /// # Errors
-/// [`Error::Malformed`] naming the row and what is wrong with it.
+/// [`Error::Malformed`] naming the row and its fault.
 pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> Result<Archive, Error> {
     let (sender, mut rows) = mpsc::channel::<(&'static str, Row)>(ROWS_AHEAD);
     #[allow(clippy::disallowed_methods, reason = "works while rows come in, which no pool of finished data can")]
@@ -64,11 +64,11 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
     if let Some(refused) = refused {
         return Err(refused);
     }
-    let whole = whole?.ok_or_else(|| refuse("it has no end"))?;
+    let whole = whole?.ok_or_else(|| refuse("it is truncated"))?;
     let trusted_key = whole.signed_by.as_ref().is_some_and(|key| trusted.contains(key));
     if !trusted.is_empty() && !trusted_key {
         let by = whole.signed_by.as_ref().map_or("nobody", PublicKey::as_str);
-        return Err(refuse(format!("it is signed by {by}, which is none of the keys to trust")));
+        return Err(refuse(format!("it is signed by {by}, which is not a trusted key")));
     }
     quarantine.settle().await.map_err(refuse)?;
     let checked = check::study(&mut quarantine, &Pool::default()).await?;
@@ -81,15 +81,15 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
     Ok(Archive { quarantine, study: checked.study, origin })
 }
 
-/// Writes the study of an archive into a record, and where it came from.
+/// Writes the study of an archive and its origin into a record.
 ///
 /// # Errors
-/// [`Error::Conflict`] when the study is there or does not fit; nothing is changed then.
+/// [`Error::Conflict`] if the record has the study already, or contradicts it. Nothing is changed then.
 pub async fn import(store: &Store, actor: &Actor, archive: Archive) -> Result<StudyId, Error> {
     let Archive { mut quarantine, study, origin } = archive;
     let mut writer = store.write().await?;
     match studies::get(&mut writer, study).await {
-        Ok(_) => return Err(Error::conflict(format!("study {study} is in this record already"))),
+        Ok(_) => return Err(Error::conflict(format!("Study {study} is already in this record."))),
         Err(StoreError::Missing { .. }) => {}
         Err(other) => return Err(other.into()),
     }
@@ -140,11 +140,11 @@ async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer) 
 }
 
 fn does_not_fit(reason: impl std::fmt::Display) -> Error {
-    Error::conflict(format!("the archive does not fit this record, nothing was changed: {reason}"))
+    Error::conflict(format!("The archive contradicts this record, so nothing was changed: {reason}."))
 }
 
-/// Whether a subject, device or reference gait is to be written. The very same row may be here already; another one under
-/// its identifier or name is a contradiction that a person must settle.
+/// Whether a subject, device or reference gait must be written. An identical row may exist already. A different row
+/// with the same identifier or name is a contradiction that a person must resolve.
 async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unpacking) -> Result<bool, Error> {
     let id = row.text("id").unwrap_or_default().to_owned();
     let what = match table {
@@ -160,10 +160,10 @@ async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unp
         }
         Known::Differs(columns) => {
             let differing: Vec<String> = columns.iter().map(|column| format!("{column} differs")).collect();
-            Err(does_not_fit(format!("{what} {id} is known here with other content ({})", differing.join(", "))))
+            Err(does_not_fit(format!("{what} {id} exists here with different content ({})", differing.join(", "))))
         }
-        Known::NameTaken(name) => {
-            Err(does_not_fit(format!("another {what} here is named {name:?}: rename one of them where they come from")))
-        }
+        Known::NameTaken(name) => Err(does_not_fit(format!(
+            "another {what} here has the name {name:?}. Rename one of them where it was made"
+        ))),
     }
 }

@@ -1,7 +1,7 @@
-//! A whole study as one file: every row that belongs to it, as written, so that it can be taken to another record.
+//! Archives: a whole study as one file, for export to another record.
 //!
-//! An archive comes from outside. It is unpacked into a record of its own first ([`open`]): every hash, every reference
-//! and every value is checked there by the rules of its noun, and only what passed is written ([`import`]).
+//! An archive is untrusted input. [`open`] unpacks it into a temporary record and checks every hash, reference and
+//! value there; [`import`] writes only an archive that passed.
 
 mod check;
 mod export;

@@ -1,14 +1,14 @@
-//! Signatures of archives (Ed25519): who vouches for one.
+//! Ed25519 keys and signatures of archives.
 
 use crate::error::Error;
 use ring::rand::SystemRandom;
 use ring::signature::{ED25519, Ed25519KeyPair, KeyPair, UnparsedPublicKey};
 use std::str::FromStr;
 
-/// Before the bytes of a key in its file.
+/// Prefix of the key in a key file.
 const PREFIX: &str = "gaitwright signing key 1 ";
 
-/// The secret half.
+/// A private key.
 pub struct SigningKey(Ed25519KeyPair);
 
 impl std::fmt::Debug for SigningKey {
@@ -18,44 +18,44 @@ impl std::fmt::Debug for SigningKey {
 }
 
 impl SigningKey {
-    /// The text of a key file with a new key.
+    /// Generates a key and returns the text of its key file.
     ///
     /// # Errors
-    /// When the system gives no random numbers.
+    /// When the operating system gives no random numbers.
     pub fn generate() -> Result<String, Error> {
         let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new())
-            .map_err(|_| Error::Internal("the system gives no random numbers".to_owned()))?;
+            .map_err(|_| Error::Internal("the operating system gives no random numbers".to_owned()))?;
         Ok(format!("{PREFIX}{}\n", hex::encode(document.as_ref())))
     }
 
-    /// The key of a key file.
+    /// Reads the text of a key file.
     ///
     /// # Errors
-    /// [`Error::Malformed`] when the text is none.
+    /// [`Error::Malformed`] for any other text.
     pub fn read(text: &str) -> Result<Self, Error> {
-        let refuse = || Error::Malformed("not a key file of `gaitwright signing-key`".to_owned());
+        let refuse = || Error::Malformed("This is not a key file of `gaitwright signing-key`.".to_owned());
         let document = text.trim().strip_prefix(PREFIX.trim_end()).ok_or_else(refuse)?;
         let document = hex::decode(document.trim()).map_err(|_| refuse())?;
         Ed25519KeyPair::from_pkcs8(&document).map(Self).map_err(|_| refuse())
     }
 
-    /// The public half.
+    /// The public key.
     pub fn public(&self) -> PublicKey {
         PublicKey(hex::encode(self.0.public_key().as_ref()))
     }
 
-    /// A signature, hexadecimal.
+    /// Signs a message; hexadecimal.
     pub(super) fn sign(&self, message: &str) -> String {
         hex::encode(self.0.sign(message.as_bytes()))
     }
 }
 
-/// The public half of a key: 64 hexadecimal digits.
+/// A public key: 64 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PublicKey(String);
 
 impl PublicKey {
-    /// As shown and stored.
+    /// The hexadecimal digits.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -80,7 +80,7 @@ impl FromStr for PublicKey {
         if text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
             Ok(Self(text))
         } else {
-            Err("a public key is 64 hexadecimal digits, as `gaitwright signing-key` prints it".to_owned())
+            Err("A public key has 64 hexadecimal digits, as `gaitwright signing-key` prints it.".to_owned())
         }
     }
 }
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_signature_is_of_one_message_and_one_key() {
+    fn signature_verifies_one_message_with_one_key() {
         let key = SigningKey::read(&SigningKey::generate().unwrap()).unwrap();
         let other = SigningKey::read(&SigningKey::generate().unwrap()).unwrap();
         let signature = key.sign("a");

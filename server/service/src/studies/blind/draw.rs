@@ -1,31 +1,31 @@
-//! The draw: which pair a rater is shown next. A pure function of what the study asks, what the rater was shown before and
-//! a lot of the operating system. On which side a gait is shown is drawn apart, in `store::allocations`.
+//! Chooses the pair that a rater is shown next, as a pure function of the pending comparison, earlier presentations and
+//! a random number of the operating system. `store::allocations` draws the sides.
 
 use gaitwright_store::presentations::{Judgement, Kind, Presentation};
 use gaitwright_store::{PresentationId, TrialId};
 
-/// One in so many presentations repeats an earlier pair.
+/// One in this many presentations repeats an earlier pair.
 const REPEAT_ONE_IN: u64 = 10;
 
-/// What is shown.
+/// The chosen pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Drawn {
-    /// Why.
+    /// Why it is shown.
     pub kind: Kind,
     /// The two gaits, the newer one first.
     pub pair: (TrialId, TrialId),
-    /// The presentation that it repeats.
+    /// The earlier presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// The presentation whose answer was taken back: it comes again, with the same sides.
+    /// The presentation whose answer was retracted: the pair is shown again, with the same sides.
     pub again: Option<PresentationId>,
 }
 
-/// Draws what a rater is shown next. `question`: the newer and the older trial of the pair that the study asks for;
-/// `before`: what this rater was shown, in order; `closed`: trials that nobody may be shown.
+/// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
+/// earlier presentations of this rater; `closed` lists trials with an open safety report.
 pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], closed: &[TrialId]) -> Drawn {
     let taken_back = before.last().filter(|last| last.answer == Some(Judgement::Withdrawn) && last.kind != Kind::Null);
     if let Some(last) = taken_back.filter(|last| !last.has_one_of(closed)) {
-        // Whoever mistook one side for the other must not find them exchanged.
+        // A rater who confused the sides must find them unchanged.
         let again = Drawn { kind: last.kind, pair: last.pair(), repeats: last.repeats, again: Some(last.id) };
         let is_question = is_same_pair(last.pair(), question);
         if last.kind == Kind::Repeat || is_question {
@@ -45,7 +45,7 @@ pub fn draw(lot: u64, question: (TrialId, TrialId), before: &[Presentation], clo
     repeatable(before, closed, lot / REPEAT_ONE_IN).map_or(new, repeat)
 }
 
-/// An earlier pair with a plain answer that was not repeated yet.
+/// An earlier pair with a plain answer that has not been repeated.
 fn repeatable<'a>(before: &'a [Presentation], closed: &[TrialId], lot: u64) -> Option<&'a Presentation> {
     let plain = |shown: &&Presentation| {
         shown.kind == Kind::New
@@ -63,7 +63,7 @@ pub(super) fn is_plain(said: Judgement) -> bool {
     matches!(said, Judgement::First | Judgement::Second | Judgement::NoDifference)
 }
 
-/// Whether two pairs are of the same gaits.
+/// Whether two pairs have the same gaits.
 pub(super) fn is_same_pair((a, b): (TrialId, TrialId), other: (TrialId, TrialId)) -> bool {
     other == (a, b) || other == (b, a)
 }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn one_presentation_in_ten_repeats_an_earlier_pair_and_each_pair_once() {
+    fn one_presentation_in_ten_repeats_an_earlier_pair_once() {
         let mut before: Vec<Presentation> = Vec::new();
         for number in 1..=400 {
             let drawn = draw(u64::from(number) * 7, question(), &before, &[]);
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_whose_answer_was_taken_back_comes_again_with_its_sides() {
+    fn pair_with_retracted_answer_comes_again_with_the_same_sides() {
         for lot in [1, 10] {
             let asked = question();
             let earlier = shown(1, draw(1, question(), &[], &[]));
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_question_that_the_study_asks_no_more_does_not_come_again() {
+    fn settled_comparison_does_not_come_again() {
         let taken_back = Presentation { answer: Some(Judgement::Withdrawn), ..shown(1, draw(1, question(), &[], &[])) };
         let asked = question();
         assert_eq!(draw(1, asked, &[taken_back], &[]).pair, asked);

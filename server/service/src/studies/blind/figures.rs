@@ -1,4 +1,4 @@
-//! How far a rater can be relied on: agreement with itself, position bias, and how many answers were not blind.
+//! Reliability of raters: agreement with their own earlier answers, position bias, and unblinded answers.
 
 use super::draw::{is_plain, is_same_pair};
 use gaitwright_store::allocations::Sided;
@@ -6,23 +6,23 @@ use gaitwright_store::presentations::{Judgement, Kind, Presentation};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A share of so many, with its 95 % interval (Wilson).
+/// A proportion with its 95 % confidence interval (Wilson).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Share {
-    /// Of so many.
+    /// Number of trials of the proportion.
     pub of: u32,
-    /// So many.
+    /// Number of successes.
     pub count: u32,
-    /// The share.
+    /// `count / of`.
     pub share: Option<f64>,
-    /// Lower end of the interval.
+    /// Lower bound of the interval.
     pub low: Option<f64>,
-    /// Upper end of the interval.
+    /// Upper bound of the interval.
     pub high: Option<f64>,
 }
 
 impl Share {
-    /// `count` of `of`.
+    /// The proportion `count / of`.
     pub fn new(count: u32, of: u32) -> Self {
         if of == 0 {
             return Self { of, count, share: None, low: None, high: None };
@@ -35,29 +35,29 @@ impl Share {
     }
 }
 
-/// What is known of a rater in a study.
+/// Reliability of a rater in a study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RaterFigures {
-    /// Who.
+    /// Name of the rater.
     pub rater: String,
-    /// How many presentations were drawn.
+    /// Number of presentations.
     pub shown: u32,
-    /// How many were answered.
+    /// Number of answers.
     pub answered: u32,
-    /// Of the blind answers with a preference, those that preferred the gait shown first: far from a half is position bias.
-    /// None until the rater is unblinded, because it would tell the order of pairs.
+    /// Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Absent
+    /// until the rater is unblinded, because it would reveal allocations.
     pub first_preferred: Option<Share>,
-    /// Of the pairs that were answered blindly once more, those answered as the time before.
+    /// Share of repeated pairs with the same answer as before, among blind answers.
     pub repeats_agree: Share,
-    /// Answers "cannot tell".
+    /// Number of answers "cannot tell".
     pub cannot_tell: u32,
-    /// Answers that called a gait unsafe.
+    /// Number of answers that reported a gait as unsafe.
     pub unsafe_gaits: u32,
-    /// Presentations of which the rater could have known which gait is which. The shares leave them out.
+    /// Number of presentations in which the rater could have known the allocation. The shares exclude them.
     pub unblinded: u32,
 }
 
-/// The figures of every rater of a study, by name. `sides`: the pairs of the raters who were unblinded.
+/// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
 pub fn figures(presentations: &[Presentation], sides: &[Sided]) -> Vec<RaterFigures> {
     let mut raters: Vec<&str> = presentations.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
@@ -93,7 +93,7 @@ fn first_preferred(rater: &str, sides: &[Sided]) -> Option<Share> {
     Some(Share::new(first, first.saturating_add(second)))
 }
 
-/// Each plain answer beside the one before to the same two gaits.
+/// Compares each plain answer with the previous one to the same pair.
 fn repeats_agree(own: &[&Presentation]) -> Share {
     let plain =
         |shown: &&Presentation| !shown.unblinded && shown.kind != Kind::Null && shown.answer.is_some_and(is_plain);
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn intervals_are_those_of_wilson() {
+    fn intervals_match_wilsons_formula() {
         // Wilson 1927; 8 of 10: 0.490 to 0.943.
         let share = Share::new(8, 10);
         assert!((share.low.unwrap() - 0.4902).abs() < 1e-3, "{share:?}");

@@ -1,4 +1,4 @@
-//! Who could have known which gait is which.
+//! Decides whether a caller could have known the allocation, so that the answer does not count as blind.
 
 use crate::access::{Caller, Right};
 use crate::error::Error;

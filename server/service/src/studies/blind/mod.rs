@@ -1,8 +1,8 @@
-//! Blind comparisons: the server draws who is shown what on which side, stores it, and keeps it to itself.
+//! Blind comparisons: the server draws pairs and sides for raters, and conceals them until unblinding.
 //!
-//! A rater sees a token and two motions. The side of a gait is a fair coin for each pair. Every answer is heard by the
-//! learner, also of a pair that is asked again: no presentation is a secret control that something served could tell from
-//! the others. Answers of somebody who could have known which gait is which are recorded as such.
+//! A rater sees a token and two motions. A fair coin decides the sides of each pair. The learner uses every answer,
+//! also of repeated pairs, so no response of the service can reveal a repeated pair. Answers of raters who could have
+//! known the allocation are marked.
 
 mod draw;
 mod figures;

@@ -1,4 +1,4 @@
-//! What a rater does: takes the next pair, answers it. And the act that unblinds a rater.
+//! The actions of a rater (take a pair, answer it, retract the answer), and unblinding of a rater.
 
 use super::could_have_known;
 use super::draw::draw;
@@ -24,13 +24,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// What a rater answers.
+/// Answer of a rater.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RaterAnswer {
-    /// What the rater says; `withdrawn` is the program's own word.
+    /// The answer. `withdrawn` is reserved for the service.
     pub answer: Judgement,
-    /// How long the rater took, ms.
+    /// Response time of the rater, ms.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub response_ms: Option<i64>,
@@ -40,15 +40,15 @@ pub struct RaterAnswer {
     pub note: String,
 }
 
-/// An answer as read back to the rater: nothing in it says which gaits they were. The answer itself is left out, because the
-/// copy that is kept for a repeated request would tell the sides to whoever knows what the study heard.
+/// Confirmation of a rater's answer. It has neither gaits nor the answer: the copy that is kept for repeated requests
+/// would otherwise reveal the sides to readers of the study.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Answered {
     /// Number of the pair for this rater.
     pub number: u32,
 }
 
-/// What a study asks, computed outside any transaction: the newer and the older gait.
+/// The pending comparison of a study, the newer gait first. Computed outside any transaction.
 async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
@@ -60,12 +60,13 @@ async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, 
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let found = store.compute(move |pool| open_question(pool, &snapshot)).await?;
-    // What the learner says names bounds: it is logged, and the rater hears that the program failed.
-    let found = found.map_err(|error| Error::Internal(format!("the question of study {study_id}: {error}")))?;
+    // The learner's error may name bounds, so the rater sees only an internal error.
+    let found =
+        found.map_err(|error| Error::Internal(format!("choosing the comparison of study {study_id}: {error}")))?;
     Ok(found.trials())
 }
 
-/// What a rater is shown: the open presentation, or a new one. `None`: the study asks for nothing now.
+/// The presentation for a rater: the open one, or a new one. `None` if no comparison is pending.
 ///
 /// # Errors
 /// [`Error::NotFound`], or what the database and the learner report.
@@ -81,7 +82,7 @@ pub async fn next<'a>(
     let mut own = presentations::of_study(&mut writer, study).await?;
     own.retain(|shown| shown.rater == caller.name);
     if let Some(open) = own.iter().find(|shown| shown.answer.is_none()) {
-        // A study that came here from elsewhere has no sides of the pairs that were blind there.
+        // An imported study does not have the sides of pairs that were still blinded.
         if walkable::are_walkable(&mut writer, open.pair()).await?
             && allocations::is_included(&mut writer, open.id).await?
         {
@@ -132,10 +133,11 @@ async fn note(writer: &mut Writer, caller: &Caller, shown: &Presentation, action
     Ok(audit::append(writer, &caller.actor, action, &format!("presentation {}", shown.id), &detail).await?)
 }
 
-/// Records what a rater says.
+/// Records the answer of a rater.
 ///
 /// # Errors
-/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it was answered, [`Error::Invalid`].
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the pair was already answered,
+/// [`Error::Invalid`] naming the field.
 pub async fn answer(
     writer: &mut Writer,
     caller: &Caller,
@@ -145,7 +147,11 @@ pub async fn answer(
     let sided = own(writer, caller, token).await?;
     let shown = &sided.presentation;
     if given.answer == Judgement::Withdrawn {
-        return Err(Error::invalid("answer", "withdrawn", "what a rater can say"));
+        return Err(Error::invalid(
+            "answer",
+            "withdrawn",
+            "one of the other answers, because only the service withdraws pairs",
+        ));
     }
     printable::note("note", &given.note, 2000)?;
     if given.response_ms.is_some_and(|ms| ms < 0) {
@@ -153,15 +159,15 @@ pub async fn answer(
     }
     let source = if caller.source() == Source::Script { Source::Subject } else { caller.source() };
     let attribution = Attribution { source, author: &caller.name, note: &given.note };
-    // From here on it is about the pair and not about its sides.
+    // From here on the answer refers to gaits, not to sides.
     let said = sided.turned(given.answer);
-    // An earlier version showed the same gait twice, of which there is nothing to hear.
+    // A presentation of the same gait twice, as in older records, states no preference.
     let heard = if shown.kind == Kind::Null {
         None
     } else {
         let fields = ("first", "second");
         let (study, pair) = (shown.study_id, shown.pair());
-        // The server drew the pair; that this rater is asked again is meant.
+        // The server chose the pair, so a repetition is intended.
         let statement = GivenJudgement { study, pair, fields, said, attribution, again: Again::Meant };
         preference::hear(writer, statement).await.map_err(without_gaits)?
     };
@@ -172,47 +178,45 @@ pub async fn answer(
     }
     let payload = json!({ "feedback_id": heard, "presentation_id": shown.id });
     events::append(writer, shown.study_id, "feedback_given", &payload).await?;
-    // What the rater said of the sides stays out of the trail: it would tell the order.
+    // The audit trail omits the answer in terms of sides, because it would reveal the allocation.
     let detail = json!({ "study": shown.study_id, "number": shown.number, "could_have_known": could_have_known });
     audit::append(writer, &caller.actor, "presentation.answer", &format!("presentation {}", shown.id), &detail).await?;
     Ok((shown.study_id, Answered { number: shown.number }))
 }
 
-/// A refusal that names no gait.
+/// Replaces an error by one that names no gait.
 fn without_gaits(error: Error) -> Error {
     match error {
-        Error::Invalid(_) => Error::conflict("this pair is not asked about any more: go on to the next one"),
+        Error::Invalid(_) => Error::conflict("This pair is no longer compared. Continue with the next one."),
         other => other,
     }
 }
 
-/// Why a second answer is not taken, and what counts.
+/// Explains which answer counts after a second one was refused.
 fn answered_already(before: Option<Judgement>) -> String {
     match before {
-        Some(Judgement::Withdrawn) => "this pair was answered already, and that answer counts no more".to_owned(),
+        Some(Judgement::Withdrawn) => "This pair was already answered, and the answer was retracted.".to_owned(),
         Some(said) => {
             let said = said.as_str().replace('_', " ");
-            format!(
-                "this pair was answered already: your answer \u{201c}{said}\u{201d} counts, and this one was not taken"
-            )
+            format!("This pair was already answered. Your first answer, \u{201c}{said}\u{201d}, counts.")
         }
-        None => "this pair was answered already".to_owned(),
+        None => "This pair was already answered.".to_owned(),
     }
 }
 
-/// Takes a rater's last answer back: what was said stays in the record, and counts no more.
+/// Retracts the last answer of a rater. It stays on record, but no longer counts.
 ///
 /// # Errors
-/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] when it cannot be taken back.
+/// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the answer cannot be retracted.
 pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Result<Answered, Error> {
     let shown = own(writer, caller, token).await?.presentation;
     if !can_be_taken_back(writer, &shown).await? {
-        let why = "only the last answer can be taken back, once; and a gait that was called unsafe stays closed: tell \
-                   whoever runs the study";
+        let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted here: ask the study \
+                   coordinator.";
         return Err(Error::conflict(why));
     }
     if let Some(heard) = presentations::heard_of(writer, shown.id).await?
-        // Somebody else may have.
+        // Staff may have retracted it already.
         && feedback::get(writer, heard).await?.retraction.is_none()
     {
         answering::retract(writer, caller, Some(shown.study_id), heard, None, "the rater took it back").await?;
@@ -257,7 +261,7 @@ fn unknown_pair() -> Error {
     Error::NotFound { what: "comparison".to_owned(), id: "with this token".to_owned() }
 }
 
-/// A pair of a rater who was unblinded, with its sides.
+/// Pair of an unblinded rater, with its sides.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Presentation)]
 pub struct UnblindedPair {
@@ -265,25 +269,25 @@ pub struct UnblindedPair {
     pub id: PresentationId,
     /// The study.
     pub study_id: StudyId,
-    /// Who was shown it.
+    /// Name of the rater.
     pub rater: String,
-    /// 1, 2, ... of this rater in this study.
+    /// Number of the pair for this rater in this study, from 1.
     pub number: u32,
     /// Why it was shown.
     pub kind: Kind,
-    /// The trial shown first.
+    /// Trial shown first.
     pub shown_first: TrialId,
-    /// The trial shown second.
+    /// Trial shown second.
     pub shown_second: TrialId,
-    /// The presentation that it repeats.
+    /// Earlier presentation that it repeats.
     pub repeats: Option<PresentationId>,
-    /// Whether the rater could have known which gait is which, when it was drawn or when it was answered.
+    /// Whether the rater could have known the allocation.
     pub unblinded: bool,
-    /// When it was drawn.
+    /// Time of the draw.
     pub created_at: Instant,
-    /// What the rater said of what was shown; none: nothing yet.
+    /// Answer in terms of what was shown. Absent if there is none yet.
     pub answer: Option<Judgement>,
-    /// When.
+    /// Time of the answer.
     pub answered_at: Option<Instant>,
 }
 
@@ -308,11 +312,11 @@ impl From<&Sided> for UnblindedPair {
     }
 }
 
-/// Unblinds a rater: says which gaits the rater was shown on which side. From now on the rater's pairs are marked.
+/// Unblinds a rater: reveals the sides of all pairs. Later answers of the rater do not count as blind.
 ///
 /// # Errors
-/// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`], [`Error::Conflict`] when the sides are
-/// not in this record.
+/// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`], [`Error::Conflict`] if the sides
+/// are not in this record.
 pub async fn unblind(
     writer: &mut Writer,
     caller: &Caller,
@@ -322,17 +326,17 @@ pub async fn unblind(
 ) -> Result<Vec<UnblindedPair>, Error> {
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
-    let reason = printable::reason("reason", reason, ": why the rater is unblinded")?;
+    let reason = printable::reason("reason", reason, " that say why the rater is unblinded")?;
     if !presentations::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
-        return Err(Error::invalid("rater", rater, "somebody who was shown a pair of this study"));
+        return Err(Error::invalid("rater", rater, "a rater who was shown a pair of this study"));
     }
     presentations::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
     let mut pairs = allocations::of_unblinded_raters(writer, study).await?;
     pairs.retain(|sided| sided.presentation.rater == rater);
     if pairs.is_empty() {
         return Err(Error::conflict(
-            "the archive that this study came from left the sides of this rater's pairs out: unblind the rater where the \
-             study was made",
+            "The archive of this study did not include the sides of this rater's pairs. Unblind the rater where the study \
+             was made.",
         ));
     }
     let detail = json!({ "rater": rater, "reason": reason });

@@ -1,4 +1,4 @@
-//! Which walk the person who walked found better, in terms of walks.
+//! The subject's answer in a lab session: which walk was better.
 //!
 //! It becomes a preference, or a remark, at unblinding: what the learner hears is shown to everybody who may
 //! read, and whoever was in the lab would know the order from it.
@@ -19,25 +19,25 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Longest note, characters.
+/// Maximum length of a note, characters.
 const LONGEST_NOTE: usize = 2000;
 
-/// An answer as read back: walks, and no gait.
+/// Answer of the subject, in terms of walks.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = LabAnswer)]
 pub struct AnswerView {
-    /// 1; a further one when the one before was taken back.
+    /// Number of the answer, from 1. It grows when an answer is retracted.
     pub number: u32,
-    /// What was said; first is walk 2, the first one with the device.
+    /// The answer. First is walk 2, second is walk 3.
     pub answer: Judgement,
     /// Free text.
     pub note: String,
-    /// Who wrote it down.
+    /// Who recorded it.
     pub actor: String,
-    /// When.
+    /// Time of recording.
     pub at: Instant,
-    /// Whether it was written after the session was unblinded, or by somebody who had fetched a controller file: then it is
-    /// no blind answer.
+    /// Whether the answer is not blind: it was recorded after unblinding, or by a user who had fetched a controller
+    /// file.
     pub could_have_known: bool,
 }
 
@@ -55,15 +55,15 @@ impl AnswerView {
     }
 }
 
-/// What the person who walked says.
+/// Answer of the subject.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = NewLabAnswer)]
 pub struct NewAnswer {
-    /// Number of the answer, as asked for: sent twice, it counts once.
+    /// Number of the answer, as in the question. An answer that is sent twice counts once.
     #[schema(minimum = 1)]
     pub number: u32,
-    /// What the person says; first is walk 2, second is walk 3. `withdrawn` is the program's own word.
+    /// The answer. First is walk 2, second is walk 3. `withdrawn` is reserved for the service.
     pub answer: Judgement,
     /// Free text, at most 2000 characters.
     #[serde(default)]
@@ -71,7 +71,7 @@ pub struct NewAnswer {
     pub note: String,
 }
 
-/// The number under which the question is asked now; none: it is not.
+/// The number of the answer that is asked for now, if any.
 pub(super) fn asks(session: &LabSession) -> Option<u32> {
     let open = session.done(Act::Closed).is_none() && next_walk(session).is_none() && session.answer().is_none();
     open.then(|| next_number(session))
@@ -81,36 +81,44 @@ fn next_number(session: &LabSession) -> u32 {
     u32::try_from(session.answers.len()).unwrap_or(u32::MAX).saturating_add(1)
 }
 
-/// Whether the answer that stands may go: nobody drew anything from it yet, and it is not about safety.
+/// Whether the current answer can be retracted: the session is blinded, and it is not a safety report.
 pub(super) fn can_be_taken_back(session: &LabSession) -> bool {
     let open = session.done(Act::Closed).is_none() && session.done(Act::Unblinded).is_none();
     open && session.answer().is_some_and(|answer| !answer.said.is_about_safety())
 }
 
-/// Writes what the person who walked says.
+/// Records the answer of the subject.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::Conflict`] before every walk was recorded and when another answer stands.
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] before all walks are recorded or if there is another
+/// answer.
 pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &NewAnswer) -> Result<InTheLab, Error> {
     if new.answer == Judgement::Withdrawn {
-        return Err(Error::invalid("answer", "withdrawn", "what a person can say"));
+        return Err(Error::invalid(
+            "answer",
+            "withdrawn",
+            "one of the other answers, because only the service withdraws pairs",
+        ));
     }
     printable::note("note", &new.note, LONGEST_NOTE)?;
     let session = still_open(writer, id).await?;
     if let Some(walk) = next_walk(&session) {
-        return Err(Error::conflict(format!("walk {walk} was not recorded yet: the question comes after every walk")));
+        return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record all walks before the answer.")));
     }
     if let Some(stands) = session.answer() {
         let same = (stands.number, stands.said, stands.note.as_str()) == (new.number, new.answer, new.note.as_str());
-        let other = "another answer stands: it is the one that is recorded. To change it, take it back first";
+        let other = "There is already an answer. To change it, retract it first.";
         return if same { in_the_lab(writer, id).await } else { Err(Error::conflict(other)) };
     }
     let number = next_number(&session);
     if new.number != number {
-        return Err(Error::conflict(format!("answer {} was taken back; asked for is answer {number}", new.number)));
+        return Err(Error::conflict(format!(
+            "Answer {} was retracted. The current answer has number {number}.",
+            new.number
+        )));
     }
     if !lab_answers::insert(writer, &caller.actor, id, number, (new.answer, &new.note)).await? {
-        return Err(Error::conflict("another answer was written at the same moment"));
+        return Err(Error::conflict("Another answer was recorded at the same time."));
     }
     let session = lab_sessions::get(writer, id).await?;
     if session.done(Act::Unblinded).is_some() {
@@ -118,21 +126,21 @@ pub async fn give(writer: &mut Writer, caller: &Caller, id: LabSessionId, new: &
     }
     let detail = json!({ "number": number, "answer": new.answer, "note": new.note });
     audit::append(writer, &caller.actor, "lab_session.answer", &format!("lab session {id}"), &detail).await?;
-    // What is unsafe is closed at once, and pages that are open say so.
+    // A safety report takes effect at once, so open pages must update.
     events::append(writer, session.study_id, "lab_session_answered", &json!({ "lab_session_id": id })).await?;
     in_the_lab(writer, id).await
 }
 
-/// Takes the answer back that stands: it stays in the record, and counts no more.
+/// Retracts the current answer. It stays on record, but no longer counts.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when none stands, or one that cannot be taken back here.
+/// [`Error::NotFound`], [`Error::Conflict`] if there is no answer, or one that cannot be retracted here.
 pub async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> Result<InTheLab, Error> {
     let session = still_open(writer, id).await?;
-    let answer = session.answer().ok_or_else(|| Error::conflict("there is no answer to take back"))?;
+    let answer = session.answer().ok_or_else(|| Error::conflict("There is no answer to retract."))?;
     if !can_be_taken_back(&session) {
-        let why = "a walk that was called unsafe stays so, and what the learner has heard is taken back on the page of the \
-                   study: tell whoever runs the study";
+        let why = "This answer cannot be retracted here, because it is a safety report or the session is unblinded. Ask the study \
+                   coordinator to change it on the page of the study.";
         return Err(Error::conflict(why));
     }
     lab_answers::take_back(writer, &caller.actor, id, answer.number).await?;
@@ -141,8 +149,8 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, id: LabSessionId) -
     in_the_lab(writer, id).await
 }
 
-/// Tells the learner the answer that stands, if one does, as said by the subject. An answer about a gait that was reported
-/// unsafe since then stays in the record of the session, and the learner does not hear it.
+/// Passes the current answer, if any, to the learner with the subject as its author. If a gait has been reported as
+/// unsafe since the answer, the answer stays on record but does not reach the learner.
 pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
     let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
     let study = studies::get(writer, session.study_id).await?;
@@ -153,7 +161,7 @@ pub(super) async fn hear(writer: &mut Writer, session: &LabSession) -> Result<()
         fields: ("walk 2", "walk 3"),
         said: given.said,
         attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
-        // The same two gaits may be walked with in several sessions.
+        // Several sessions may compare the same two gaits.
         again: Again::Meant,
     };
     let heard = if given.said.is_remark() {

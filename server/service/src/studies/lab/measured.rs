@@ -1,5 +1,5 @@
-//! What was made of the recordings: muscle activity over the cycle, limit cycles; beside the model where the gait of a
-//! walk may be known.
+//! Results of lab measurements: muscle activity over the gait cycle and limit cycles, with the model's values for
+//! unblinded walks.
 
 use super::recording::{EmgReading, MotionReading, WHAT};
 use super::session::{gait_of, still_shown};
@@ -19,7 +19,7 @@ use utoipa::ToSchema;
 /// Muscle activity of a walk over the gait cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WalkActivity {
-    /// 1, 2, 3.
+    /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// What it was made of.
     pub recording_id: LabRecordingId,
@@ -27,20 +27,20 @@ pub struct WalkActivity {
     /// the peak of walk 1.
     #[schema(value_type = Vec<Object>)]
     pub channels: Vec<CycleActivity>,
-    /// Mean over the cycle of each channel.
+    /// Mean of each channel over the cycle.
     pub averages: Vec<f64>,
     /// Distance from walk 1: in all, and of each channel; none for walk 1.
     #[schema(value_type = Option<Object>)]
     pub emg_rmse: Option<EmgRmse>,
 }
 
-/// What was made of a session's electromyograms.
+/// Processed EMG recordings of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EmgResult {
     /// How they were filtered.
     #[schema(value_type = Object)]
     pub settings: EmgSettings,
-    /// The walks that were recorded.
+    /// Walks with an EMG recording.
     pub walks: Vec<WalkActivity>,
 }
 
@@ -50,10 +50,10 @@ fn newest(recordings: &[LabRecording], kind: RecordingKind) -> Vec<&LabRecording
     (1..=super::WALKS).filter_map(of_walk).collect()
 }
 
-/// Filters, cuts and normalises the newest electromyograms of a session.
+/// Filters, cuts and normalises the newest EMG recordings of a session.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming a setting, [`Error::Conflict`] without a recording of walk 1.
+/// [`Error::Invalid`] naming a setting, [`Error::Conflict`] without an EMG recording of walk 1.
 pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings) -> Result<EmgResult, Error> {
     let mut db = store.read().await?;
     still_shown(&mut db, id).await?;
@@ -65,7 +65,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     }
     drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
-        return Err(Error::conflict("there is no electromyogram of walk 1, which the others are measured by"));
+        return Err(Error::conflict("Walk 1 has no EMG recording, which the other walks are compared with."));
     }
     let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();
@@ -87,10 +87,10 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     store.compute(process).await?
 }
 
-/// Keeps what was made of a session's electromyograms.
+/// Stores the processed EMG of a session.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn keep_result(
     writer: &mut Writer,
     actor: &Actor,
@@ -104,30 +104,29 @@ pub async fn keep_result(
     Ok(())
 }
 
-/// The model's muscles beside the channels of a walk.
+/// Muscle activity of the model for a walk.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WalkModel {
-    /// 2 or 3.
+    /// Number of the walk, 2 or 3.
     pub walk: u8,
     /// Each channel whose muscle the model has.
     #[schema(value_type = Vec<Object>)]
     pub muscles: Vec<ModelActivity>,
 }
 
-/// What was made of a session's electromyograms, and the model beside it.
+/// Processed EMG of a session, with the model's muscle activity.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EmgView {
-    /// What was measured.
+    /// Measured activity.
     pub result: EmgResult,
-    /// The activations of the gaits that were walked with; empty as long as the order is blinded, and for gaits without
-    /// muscles.
+    /// Muscle activity of the model. Empty while the session is blinded, and for gaits without muscles.
     pub model: Vec<WalkModel>,
 }
 
-/// The newest result of a session; none: nothing was processed yet.
+/// The newest processed EMG of a session, if any.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>, Error> {
     let mut db = store.read().await?;
     let Some(result) = lab_recordings::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
@@ -135,10 +134,10 @@ pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>,
     beside_model(store, id, result).await.map(Some)
 }
 
-/// A result of a session with the model's muscles beside it, where its gaits may be known.
+/// Adds the model's muscle activity to a result, if the session is unblinded.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn beside_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<EmgView, Error> {
     let mut db = store.read().await?;
     let mut gaits = Vec::new();
@@ -149,7 +148,7 @@ pub async fn beside_model(store: &mut Store, id: LabSessionId, result: EmgResult
     store.compute(move |pool| view(pool, result, &gaits)).await?
 }
 
-/// A result with the model's muscles beside it.
+/// Combines a result with the model's muscle activity.
 fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Result<EmgView, Error> {
     let mut model = Vec::new();
     for (number, gait) in gaits {
@@ -163,20 +162,20 @@ fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Resul
     Ok(EmgView { result, model })
 }
 
-/// The gait of a walk; none without the device, as long as the order is blinded, and where its trajectory was dropped.
+/// The gait of a walk. `None` without the device, while the session is blinded, and if the trajectory was pruned.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn known_gait(db: &mut Connection, id: LabSessionId, walk: u8) -> Result<Option<Packed<Gait>>, Error> {
     let session = lab_sessions::get(db, id).await?;
     let Some(gait) = gait_of(&session, walk) else { return Ok(None) };
     Ok(gaits::find(db, gait).await?)
 }
 
-/// The limit cycles of a walk.
+/// Limit cycles of a walk.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LimitCycles {
-    /// 1, 2, 3.
+    /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// What they were made of.
     pub recording_id: LabRecordingId,
@@ -187,10 +186,10 @@ pub struct LimitCycles {
     pub joints: Vec<PhasePortrait>,
 }
 
-/// The limit cycles of the newest motion of each walk.
+/// The limit cycles of the newest joint angles of each walk.
 ///
 /// # Errors
-/// What the database reports.
+/// Errors of the database.
 pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
     let mut db = store.read().await?;
     let recordings = lab_recordings::of_session(&mut db, id).await?;

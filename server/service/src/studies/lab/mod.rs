@@ -1,9 +1,9 @@
-//! The paper's experiment: a person walks without the device and with two gaits, blind to which is which.
+//! Lab sessions: a subject walks without the device and with two gaits, blinded, as in the experiment of the paper.
 //!
-//! Walk 1 is the one without the device, which nobody can be blind to. The order of the two gaits is an allocation
-//! (`store::allocations`), drawn by the operating system in balanced blocks; an administrator unblinds the session. Until
-//! then the device alone gets the controller files, or a person of whom that is recorded. What is measured is known by the
-//! number of its walk, and so is what the person says of it: the learner hears that when the session is unblinded.
+//! Walk 1 is without the device. The order of the two gaits is an allocation (`store::allocations`), drawn in balanced
+//! blocks and concealed until an administrator unblinds the session. Before that, only the device gets the controller
+//! files; if a person fetches one, the record says so. Measurements and the subject's answer refer to walk numbers, and
+//! the answer reaches the learner at unblinding.
 
 mod answer;
 mod measured;

@@ -1,4 +1,4 @@
-//! What is measured in a walk: brought as a file, read whole or refused with line, column and reason, kept as it was.
+//! Measurement files of lab walks (EMG recordings and joint angles): parses, checks and stores uploads.
 
 use super::session::{checked_walk, still_open};
 use crate::error::Error;
@@ -16,36 +16,37 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// How a file that was brought is named in errors.
+/// Name of an uploaded file in errors.
 pub(super) const WHAT: &str = "recording";
 
-/// Forms of files.
+/// Format of a measurement file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FileForm {
-    /// Comma-separated values, names in the first line that is no comment.
+    /// Comma-separated values, with column names in the first line that is not a comment.
     #[default]
     Csv,
     /// OpenSim motion or storage file (.mot, .sto).
     Opensim,
 }
 
-/// How a file with electromyograms is to be read.
+/// How to read an EMG recording.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EmgReading {
-    /// Form of the file.
+    /// File format.
     pub form: FileForm,
-    /// Samples per second of a CSV file without a column `time_s`.
+    /// Sampling rate of a CSV file without a column `time_s`, Hz.
     #[schema(minimum = 100, maximum = 20000)]
     pub rate_hz: Option<f64>,
-    /// Column of each channel: RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R; empty: columns of these very names.
+    /// Column of each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R). By default the columns have the names of the
+    /// channels.
     pub channels: BTreeMap<String, String>,
-    /// Right heel strikes, s from the start of the file's time; empty: from a column.
+    /// Times of right heel strikes, s, on the time axis of the file. Empty: detect them in `heel_strike_column`.
     pub heel_strikes_s: Vec<f64>,
     /// Column of a switch under the right heel, or of the vertical force under the right foot.
     pub heel_strike_column: Option<String>,
-    /// The foot is on the ground where that column is above this.
+    /// Value of that column above which the foot is on the ground.
     pub heel_strike_threshold: f64,
 }
 
@@ -63,7 +64,7 @@ impl Default for EmgReading {
 }
 
 impl EmgReading {
-    /// The channels and the heel strikes of a file, which is named `what` in errors.
+    /// Reads channels and heel strikes. `what` names the file in errors.
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
@@ -75,7 +76,11 @@ impl EmgReading {
             (FileForm::Csv, rate_hz) => EmgRecording::from_csv(what, text, rate_hz)?,
             (FileForm::Opensim, None) => EmgRecording::from_opensim(what, text)?,
             (FileForm::Opensim, Some(rate_hz)) => {
-                return Err(Error::invalid("reading.rate_hz", rate_hz, "nothing: an OpenSim file has its time"));
+                return Err(Error::invalid(
+                    "reading.rate_hz",
+                    rate_hz,
+                    "absent, because an OpenSim file has its own time axis",
+                ));
             }
         };
         let same = CHANNELS.map(|name| (name, name));
@@ -88,14 +93,14 @@ impl EmgReading {
                 given.to_vec()
             }
             (_, given) => {
-                let allowed = "two times or more, or heel_strike_column in their place";
+                let allowed = "at least two times, or absent if heel_strike_column is given";
                 return Err(Error::invalid("reading.heel_strikes_s", json!(given), allowed));
             }
         };
         Ok((recording, strikes))
     }
 
-    /// Checks that a file has signals of muscles and can be cut into strides, whatever it is filtered with later.
+    /// Checks that a file has EMG signals and can be cut into strides, for any filter settings.
     fn check(&self, text: &str) -> Result<(), Error> {
         let (recording, strikes) = self.read(WHAT, text)?;
         recording.check_channels()?;
@@ -107,30 +112,30 @@ impl EmgReading {
     }
 }
 
-/// Electromyograms of a walk.
+/// EMG recording of a walk.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewEmg {
-    /// Of which walk.
+    /// Number of the walk.
     #[schema(minimum = 1, maximum = 3)]
     pub walk: u8,
-    /// The file's text.
+    /// Content of the file.
     pub recording: String,
-    /// How it is to be read.
+    /// How to read the file.
     #[serde(default)]
     pub reading: EmgReading,
 }
 
-/// How a file with joint angles is to be read.
+/// How to read a file with joint angles.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionReading {
-    /// Form of the file. CSV: `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad, knee_R_rad,
-    /// ankle_R_rad.
+    /// File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
+    /// knee_R_rad, ankle_R_rad.
     pub form: FileForm,
-    /// Unit of an OpenSim file whose header does not say it.
+    /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
-    /// Edge of the low-pass before velocities are taken, Hz.
+    /// Cut-off frequency of the low-pass filter before differentiation, Hz.
     pub cutoff_hz: f64,
 }
 
@@ -161,7 +166,7 @@ impl MotionReading {
         })
     }
 
-    /// Checks that a file has a limit cycle, and portraits with these settings.
+    /// Checks that a file gives a limit cycle and phase portraits with these settings.
     fn check(&self, text: &str) -> Result<(), Error> {
         self.joints(text)?.check_walking(WHAT)?;
         self.portraits(text).map(|_| ())
@@ -172,17 +177,17 @@ impl MotionReading {
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewMotion {
-    /// Of which walk.
+    /// Number of the walk.
     #[schema(minimum = 1, maximum = 3)]
     pub walk: u8,
-    /// The file's text.
+    /// Content of the file.
     pub recording: String,
-    /// How it is to be read.
+    /// How to read the file.
     #[serde(default)]
     pub reading: MotionReading,
 }
 
-/// A file that was read whole, ready to be kept.
+/// A checked measurement file, ready to be stored.
 #[derive(Debug)]
 pub struct Checked {
     walk: u8,
@@ -190,7 +195,7 @@ pub struct Checked {
 }
 
 impl NewEmg {
-    /// Reads the file, on a thread of its own.
+    /// Reads and checks the file on the thread pool.
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
@@ -206,7 +211,7 @@ impl NewEmg {
 }
 
 impl NewMotion {
-    /// Reads the file, on a thread of its own.
+    /// Reads and checks the file on the thread pool.
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
@@ -221,7 +226,7 @@ impl NewMotion {
     }
 }
 
-/// Checks a recording that is kept already, as if it were brought now.
+/// Checks a stored measurement file like a new upload.
 ///
 /// # Errors
 /// [`Error::Invalid`] with line and column, or the field.
@@ -239,18 +244,18 @@ pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &LabRecording) -
     }
 }
 
-/// A file as it was brought.
+/// A measurement file as uploaded, byte for byte.
 #[derive(Debug)]
 pub struct Brought {
     /// What is known of it.
     pub recording: LabRecording,
     /// Its form.
     pub form: FileForm,
-    /// The file.
+    /// Its content.
     pub file: PackedText,
 }
 
-/// A recording as it was brought.
+/// Reads a measurement file as uploaded.
 ///
 /// # Errors
 /// [`Error::NotFound`], or that the file is not what its hash says.
@@ -265,11 +270,11 @@ pub async fn brought(db: &mut Connection, id: LabRecordingId) -> Result<Brought,
     Ok(Brought { recording, form, file })
 }
 
-/// Keeps a file with the walk that it is of.
+/// Stores a measurement file with its walk.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when the session is closed, the walk was not recorded, or the very same file was
-/// brought of another walk.
+/// [`Error::NotFound`], [`Error::Conflict`] if the session is closed, the walk is not recorded yet, or the same file
+/// was uploaded for another walk.
 pub async fn keep(
     writer: &mut Writer,
     actor: &Actor,
@@ -278,13 +283,13 @@ pub async fn keep(
 ) -> Result<LabRecording, Error> {
     let walk = checked.walk;
     if still_open(writer, id).await?.done(Act::Walk(walk)).is_none() {
-        return Err(Error::conflict(format!("walk {walk} was not recorded yet: say so in the lab first")));
+        return Err(Error::conflict(format!("Walk {walk} is not recorded yet. Record it in the lab session first.")));
     }
     let brought = lab_recordings::of_session(writer, id).await?;
     if let Some(other) = brought.iter().find(|other| other.walk != walk && checked.packed.is_file_of(other)) {
         let other = other.walk;
         return Err(Error::conflict(format!(
-            "this very file was brought as that of walk {other}: no two walks are alike"
+            "The same file was already uploaded for walk {other}. Choose the file of this walk."
         )));
     }
     let added = lab_recordings::insert(writer, actor, id, walk, &checked.packed).await?;

@@ -1,4 +1,4 @@
-//! The life of a session: planned, walk after walk recorded, closed; and who may see what of it.
+//! Lab sessions: planning, recording of walks, closing, unblinding, and the views that conceal the allocation.
 
 use super::answer::{self, AnswerView};
 use crate::access::Caller;
@@ -13,18 +13,18 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-/// Walks of a session.
+/// Number of walks of a session.
 pub const WALKS: u8 = 3;
-/// Longest note, characters.
+/// Maximum length of a note, characters.
 const LONGEST_NOTE: usize = 2000;
 
-/// A session to plan.
+/// Lab session to plan.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewSession {
-    /// One of the two gaits: a converged trial of the study.
+    /// Converged trial of one gait.
     pub gait_one: TrialId,
-    /// The other one.
+    /// Converged trial of the other gait.
     pub gait_two: TrialId,
     /// Free text, at most 2000 characters.
     #[serde(default)]
@@ -32,7 +32,7 @@ pub struct NewSession {
     pub notes: String,
 }
 
-/// What a walk is done with.
+/// Condition of a walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Condition {
@@ -44,20 +44,20 @@ pub enum Condition {
     GaitTwo,
 }
 
-/// Where a session stands.
+/// State of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SessionState {
-    /// Nobody has walked yet.
+    /// No walk is recorded yet.
     Planned,
-    /// At least one walk was recorded.
+    /// At least one walk is recorded.
     UnderWay,
-    /// Nothing is recorded any more.
+    /// The session accepts no more data.
     Closed,
 }
 
 impl SessionState {
-    /// As shown.
+    /// The name of the state.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Planned => "planned",
@@ -77,51 +77,52 @@ impl SessionState {
     }
 }
 
-/// A walk of a session.
+/// Walk of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct WalkView {
-    /// 1, 2, 3.
+    /// Number of the walk, 1 to 3.
     pub number: u8,
-    /// What it is done with; none as long as that is blinded.
+    /// Condition of the walk. Absent while it is blinded.
     pub condition: Option<Condition>,
-    /// That it was recorded.
+    /// Who recorded the walk, and when.
     pub recorded: Option<Done>,
-    /// Whether it was recorded after the session was unblinded, or by somebody who had fetched a controller file.
+    /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
     pub after_unblinding: bool,
 }
 
-/// A session, without what is blinded.
+/// Lab session, without blinded data.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SessionView {
     /// Identifier.
     pub id: LabSessionId,
     /// The study.
     pub study_id: StudyId,
-    /// 1, 2, ... of this study.
+    /// Number of the session in this study, from 1.
     pub number: u32,
-    /// Where it stands.
+    /// State of the session.
     pub state: SessionState,
-    /// One of the two gaits; not the one that is walked first.
+    /// Trial of one gait. Does not imply the order of the walks.
     pub gait_one: TrialId,
-    /// The other one.
+    /// Trial of the other gait.
     pub gait_two: TrialId,
     /// Free text.
     pub notes: String,
-    /// Its three walks.
+    /// The three walks.
     pub walks: Vec<WalkView>,
-    /// What the person who walked said of the two gaits; none: nothing that stands.
+    /// Current answer of the subject. Absent if there is none.
     pub answer: Option<AnswerView>,
-    /// Who unblinded it and why; none: it is blind.
+    /// Who unblinded the session, when and why. Absent while it is blinded.
     pub unblinded: Option<Done>,
-    /// Whether the order is in this record. A study that came here while the session was blind has none.
+    /// Whether the allocation is in this record. A study that was imported while the session was blinded does not have
+    /// it.
     pub order_included: bool,
-    /// Who got the controller files of its walks.
+    /// Who fetched controller files of the walks.
     pub device_files: Vec<DeviceFile>,
-    /// That it was closed.
+    /// Who closed the session, and when.
     pub closed: Option<Done>,
-    /// Who planned it.
+    /// Who planned the session.
     pub planned_by: String,
-    /// When.
+    /// Time of planning.
     pub created_at: Instant,
 }
 
@@ -161,7 +162,7 @@ impl From<&LabSession> for SessionView {
     }
 }
 
-/// What a walk is done with; none as long as that is blinded.
+/// The condition of a walk; `None` while it is blinded.
 fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
     if walk == 1 {
         return Some(Condition::Normal);
@@ -170,7 +171,7 @@ fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
     Some(if one_first == (walk == 2) { Condition::GaitOne } else { Condition::GaitTwo })
 }
 
-/// The gait of a walk; none without the device, and as long as the session is blinded.
+/// The gait of a walk; `None` without the device, and while the session is blinded.
 pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     match condition(session, walk)? {
         Condition::Normal => None,
@@ -179,8 +180,8 @@ pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     }
 }
 
-/// Whether somebody may have fetched a controller file of this session before an instant. Who holds a token is not known: a
-/// token may be anybody's, and anybody may hold one.
+/// Whether an actor may have fetched a controller file of this session before an instant. Any actor counts if a token
+/// fetched one, because its holder is unknown.
 pub(super) fn has_file(session: &LabSession, actor: &str, at: Instant) -> bool {
     let may_be = |other: &str| other == actor || Actor::is_token(other) || Actor::is_token(actor);
     session.allocation.files.iter().any(|file| !file.to_device && may_be(&file.actor) && file.at <= at)
@@ -195,12 +196,12 @@ pub enum GaitOfWalk {
     Two,
 }
 
-/// Gives out the controller file of a walk: the file reveals the gait, so the record names whoever took it. Only the device's own
-/// token leaves the session blind to its caller.
+/// Releases the controller file of a walk and records who fetched it, because the file reveals the gait. Only the
+/// device's token leaves the session blinded for its caller.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a walk without the device and for one that there is not, [`Error::Conflict`] when the order is not
-/// in this record or the subject withdrew.
+/// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the allocation is not in
+/// this record or the subject withdrew consent.
 pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, walk: u8) -> Result<GaitOfWalk, Error> {
     let walk = checked_device_walk(walk)?;
     let session = still_shown(writer, id).await?;
@@ -214,29 +215,29 @@ pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
     Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::One } else { GaitOfWalk::Two })
 }
 
-/// The number of a walk, if it is one with the device.
+/// Checks that a number is that of a walk with the device.
 ///
 /// # Errors
 /// [`Error::Invalid`].
 fn checked_device_walk(walk: u8) -> Result<u8, Error> {
     match checked_walk(walk)? {
-        1 => Err(Error::invalid("walk", walk, "2 or 3: walk 1 is without the device")),
+        1 => Err(Error::invalid("walk", walk, "2 or 3, because walk 1 is without the device")),
         with_device => Ok(with_device),
     }
 }
 
 fn not_included() -> Error {
     Error::conflict(
-        "the archive that this session came from left its order out, because the session was blind: unblind it where it was \
-         planned",
+        "The archive of this session did not include the allocation, because the session was blinded. Unblind it where it was \
+         planned.",
     )
 }
 
-/// The two gaits of a session in which the subject is about to walk: gait one and gait two.
+/// The two gaits of a session for the next walk, gait one first.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a walk without the device and for one that there is not, [`Error::Conflict`] when the session is
-/// closed or one of its two gaits may not be walked with.
+/// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the session is closed or
+/// one of its gaits is not walkable.
 pub async fn gaits_to_walk_with(
     db: &mut Connection,
     session: &LabSession,
@@ -244,25 +245,25 @@ pub async fn gaits_to_walk_with(
 ) -> Result<(WalkableGait, WalkableGait), Error> {
     checked_device_walk(walk)?;
     if session.done(Act::Closed).is_some() {
-        return Err(Error::conflict("the session is closed: nobody walks in it any more"));
+        return Err(Error::conflict("The session is closed."));
     }
     both_walkable(db, session).await
 }
 
-/// Both gaits of a session. The refusal does not say which of them may not be walked with: that would tell the order to
-/// whoever knows which walk is next.
+/// Both gaits of a session. The error does not say which one is not walkable: to a user who knows which walk is next,
+/// that would reveal the allocation.
 async fn both_walkable(db: &mut Connection, session: &LabSession) -> Result<(WalkableGait, WalkableGait), Error> {
     let one = walkable::admit(db, session.gait_one).await?;
     let two = walkable::admit(db, session.gait_two).await?;
     one.and_then(|one| Ok((one, two?))).map_err(|reason| match reason {
         NotWalkable::Withdrawn => reason.into(),
         _ => Error::conflict(
-            "one of the two gaits of this session may not be walked with any more: close the session and plan another one",
+            "One of the two gaits of this session must no longer be walked. Close the session and plan another one.",
         ),
     })
 }
 
-/// The number of a walk, if there is such a walk.
+/// Checks the number of a walk.
 ///
 /// # Errors
 /// [`Error::Invalid`].
@@ -270,10 +271,10 @@ pub fn checked_walk(walk: u8) -> Result<u8, Error> {
     if (1..=WALKS).contains(&walk) { Ok(walk) } else { Err(Error::invalid("walk", walk, "1, 2 or 3")) }
 }
 
-/// Plans a session: draws its order and writes it.
+/// Plans a session and draws its allocation.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`], or what the database reports.
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`]; errors of the database.
 pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewSession) -> Result<LabSession, Error> {
     studies::get(writer, study).await?;
     printable::note("notes", &new.notes, LONGEST_NOTE)?;
@@ -293,31 +294,31 @@ pub async fn plan(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewS
     Ok(lab_sessions::get(writer, id).await?)
 }
 
-/// What a person in the lab sees of a session: nothing that could tell a gait.
+/// Session as shown in the lab, without anything that reveals a gait.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct InTheLab {
-    /// What the session is known by.
+    /// Identifier of the session.
     pub session: LabSessionId,
-    /// The walk that is next, 1 to 3; none when all were recorded or the session is closed.
+    /// Next walk, 1 to 3. Absent after the last walk and in a closed session.
     pub walk: Option<u8>,
-    /// Of how many.
+    /// Number of walks.
     pub walks: u8,
-    /// When the last walk was recorded.
+    /// Time at which the last walk was recorded.
     pub last_recorded: Option<Instant>,
-    /// Which walk was better is asked now, under this number: every walk was recorded, and no answer stands.
+    /// Number of the answer that is asked for. Absent before the last walk and after an answer.
     pub asks: Option<u32>,
-    /// The answer that stands.
+    /// Current answer of the subject.
     pub answer: Option<AnswerView>,
-    /// Whether that answer can be taken back here.
+    /// Whether that answer can be retracted here.
     pub can_be_taken_back: bool,
-    /// Whether nothing is recorded any more.
+    /// Whether the session is closed.
     pub closed: bool,
 }
 
-/// The session as the person who walks and the rater see it.
+/// The session as shown in the lab.
 ///
 /// # Errors
-/// [`Error::NotFound`], a conflict when the subject withdrew, or what the database reports.
+/// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent; errors of the database.
 pub async fn in_the_lab(db: &mut Connection, id: LabSessionId) -> Result<InTheLab, Error> {
     let session = still_shown(db, id).await?;
     let closed = session.done(Act::Closed).is_some();
@@ -337,11 +338,11 @@ pub(super) fn next_walk(session: &LabSession) -> Option<u8> {
     (1..=WALKS).find(|walk| session.done(Act::Walk(*walk)).is_none())
 }
 
-/// A walk that was recorded.
+/// Walk to record.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedWalk {
-    /// Its number: walks are recorded in their order.
+    /// Number of the walk. Walks are recorded in order.
     #[schema(minimum = 1, maximum = 3)]
     pub walk: u8,
     /// Free text, at most 2000 characters.
@@ -350,10 +351,10 @@ pub struct RecordedWalk {
     pub note: String,
 }
 
-/// Writes that a walk was recorded.
+/// Records a walk.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a walk that there is not, [`Error::Conflict`] when it is not the next one.
+/// [`Error::Invalid`] for an unknown walk, [`Error::Conflict`] if it is not the next one.
 pub async fn record_walk(
     writer: &mut Writer,
     actor: &Actor,
@@ -365,8 +366,8 @@ pub async fn record_walk(
     let session = still_open(writer, id).await?;
     match next_walk(&session) {
         Some(next) if next == walk => {}
-        Some(next) => return Err(Error::conflict(format!("walk {next} is next, not walk {walk}"))),
-        None => return Err(Error::conflict("every walk of this session was recorded")),
+        Some(next) => return Err(Error::conflict(format!("Walk {next} comes next, not walk {walk}."))),
+        None => return Err(Error::conflict("All walks of this session are already recorded.")),
     }
     if walk > 1 {
         both_walkable(writer, &session).await?;
@@ -377,41 +378,41 @@ pub async fn record_walk(
     in_the_lab(writer, id).await
 }
 
-/// Whether this very walk was recorded, with this note: a form that was sent twice.
+/// Whether the last recorded walk is this one, with the same note, as when a form is sent twice.
 ///
 /// # Errors
-/// [`Error::NotFound`], a conflict when the subject withdrew, or what the database reports.
+/// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent; errors of the database.
 pub async fn was_recorded(db: &mut Connection, id: LabSessionId, walked: &RecordedWalk) -> Result<bool, Error> {
     let session = still_shown(db, id).await?;
     Ok(session.done(Act::Walk(walked.walk)).is_some_and(|done| done.note == walked.note))
 }
 
-/// The session, if its subject did not withdraw.
+/// The session, unless its subject withdrew consent.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when the subject withdrew.
+/// [`Error::NotFound`], [`Error::Conflict`] if the subject withdrew consent.
 pub(super) async fn still_shown(db: &mut Connection, id: LabSessionId) -> Result<LabSession, Error> {
     let session = lab_sessions::get(db, id).await?;
     consents::may_be_shown(db, session.study_id).await?;
     Ok(session)
 }
 
-/// The session, if something may still be added to it.
+/// The session, if it is open.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when it is closed or the subject withdrew.
+/// [`Error::NotFound`], [`Error::Conflict`] if it is closed or the subject withdrew consent.
 pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSession, Error> {
     let session = still_shown(writer, id).await?;
     if session.done(Act::Closed).is_some() {
-        return Err(Error::conflict("the session is closed: nothing is added to it"));
+        return Err(Error::conflict("The session is closed and accepts no more data."));
     }
     Ok(session)
 }
 
-/// Closes a session: nothing is recorded any more.
+/// Closes a session, which then accepts no more data.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Conflict`] when it was closed before.
+/// [`Error::NotFound`], [`Error::Conflict`] if it is already closed.
 pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &str) -> Result<LabSession, Error> {
     printable::note("note", note, LONGEST_NOTE)?;
     still_open(writer, id).await?;
@@ -421,18 +422,19 @@ pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &
     Ok(lab_sessions::get(writer, id).await?)
 }
 
-/// Unblinds a session: everybody who may read sees which walk is with which gait from now on. The learner then hears what the
-/// person who walked said.
+/// Unblinds a session: reveals which gait each walk used to all readers, and passes the subject's answer to the
+/// learner.
 ///
 /// # Errors
-/// [`Error::Invalid`] without a reason, [`Error::Conflict`] when it is unblinded, or its order is not in this record.
+/// [`Error::Invalid`] without a reason, [`Error::Conflict`] if it is already unblinded, or its allocation is not in
+/// this record.
 pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
-    let reason = printable::reason("reason", reason, ": why the session is unblinded")?;
+    let reason = printable::reason("reason", reason, " that say why the session is unblinded")?;
     if !still_shown(writer, id).await?.allocation.included {
         return Err(not_included());
     }
     if !lab_sessions::act(writer, actor, id, Act::Unblinded, reason).await? {
-        return Err(Error::conflict("this session was unblinded before"));
+        return Err(Error::conflict("This session is already unblinded."));
     }
     let detail = json!({ "reason": reason });
     audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;

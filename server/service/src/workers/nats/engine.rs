@@ -1,4 +1,4 @@
-//! The service's end: jobs out, signs of life and results in.
+//! The engine of the service for remote workers: publishes jobs, receives heartbeats and results.
 
 use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
 use super::{AGAIN, BROKER_HEARTBEAT, EXPIRES, Link, unreachable};
@@ -16,29 +16,29 @@ use tokio::sync::mpsc::{self, Receiver, Sender};
 use tokio::sync::{Mutex, watch};
 use tokio_util::sync::{CancellationToken, DropGuard};
 
-/// News that wait for the service; more wait in the broker.
+/// Length of the queue of messages. Further messages wait in the broker.
 const WAITING: usize = 256;
 
-/// A result that could not be recorded so often, a lease after the other, is left out: its job was run again long ago.
+/// Number of deliveries of a result, one per lease, after which it is dropped. Its job was run again long ago.
 const MOST_DELIVERIES: i64 = 10;
 
-/// Jobs are run by whoever asks a NATS broker for them.
+/// An engine whose jobs are run by remote workers.
 pub struct JetStream {
     link: Link,
     size: usize,
     heard: Mutex<Receiver<News>>,
-    /// Packs jobs.
+    /// Threads that compress jobs.
     pool: Pool,
-    /// Why nothing is heard of workers; none: it is.
+    /// Why the engine does not receive messages, if it does not.
     listening: watch::Receiver<Option<String>>,
     _ends: DropGuard,
 }
 
 impl JetStream {
-    /// Hands jobs to a broker, at most `size` at the same time. A broker that is not there yet is waited for.
+    /// Connects to a broker, for at most `size` dispatched jobs. Waits for a broker that is not available yet.
     ///
     /// # Errors
-    /// [`DispatchError::Unreachable`] for an address that is none.
+    /// [`DispatchError::Unreachable`] for a malformed address.
     pub async fn connect(url: &str, queue: &str, size: usize, lease: Duration) -> Result<Self, DispatchError> {
         let link = Link::open(url, queue, lease).await?;
         let (news, heard) = mpsc::channel(WAITING);
@@ -53,7 +53,7 @@ impl JetStream {
                         _ => results(&link, &news, &trouble).await,
                     };
                     if let Err(error) = ended {
-                        tracing::warn!(%error, "listening to workers; trying again");
+                        tracing::warn!(%error, "cannot receive messages of workers; retrying");
                         if task == 1 {
                             trouble.send_replace(Some(error.to_string()));
                         }
@@ -79,7 +79,7 @@ impl JetStream {
         self.link.fits("a job", &bytes)?;
         let jobs = self.link.jobs().await?;
         match jobs.get_last_raw_message_by_subject(&subject).await {
-            // It waits already, or a worker has it.
+            // Already queued, or held by a worker.
             Ok(_) => return Ok(()),
             Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => {}
             Err(error) => return Err(unreachable(error)),
@@ -123,8 +123,8 @@ impl Dispatch for JetStream {
     fn withdraw(&self, trial: TrialId) -> BoxFuture<'_, ()> {
         Box::pin(async move {
             if let Err(error) = self.recall(trial).await {
-                // Its result will come late, and not count.
-                tracing::warn!(%trial, %error, "a job cannot be taken back from the broker");
+                // Its result will arrive late and be ignored.
+                tracing::warn!(%trial, %error, "cannot remove a job from the broker");
             }
         })
     }
@@ -133,7 +133,7 @@ impl Dispatch for JetStream {
         Box::pin(async move {
             match self.heard.lock().await.recv().await {
                 Some(news) => news,
-                // The listening tasks live as long as this engine.
+                // Unreachable: the receiving tasks live as long as this engine.
                 None => std::future::pending().await,
             }
         })
@@ -146,12 +146,12 @@ impl fmt::Debug for JetStream {
     }
 }
 
-/// The service went away.
+/// The error after the service has stopped receiving.
 fn gone<T>(_: T) -> DispatchError {
-    DispatchError::Unreachable("nobody listens".to_owned())
+    DispatchError::Unreachable("The service is shutting down.".to_owned())
 }
 
-/// Tells signs of life until the subscription ends.
+/// Forwards heartbeats until the subscription ends.
 async fn signs(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
     let mut signs = link.context.client().subscribe(link.sign_subject()).await.map_err(unreachable)?;
     while let Some(message) = signs.next().await {
@@ -164,13 +164,13 @@ async fn signs(link: &Link, news: &Sender<News>) -> Result<(), DispatchError> {
                     news.send(News::Iterated { attempt, record }).await.map_err(gone)?;
                 }
             }
-            Err(error) => tracing::warn!(%error, "a sign of life cannot be read"),
+            Err(error) => tracing::warn!(%error, "ignoring a malformed heartbeat"),
         }
     }
     Ok(())
 }
 
-/// Brings results until the broker refuses.
+/// Forwards results until the broker reports an error.
 async fn results(
     link: &Link,
     news: &Sender<News>,
@@ -200,14 +200,14 @@ async fn bring(message: jetstream::Message, news: &Sender<News>, pool: &Pool) ->
     let brought = match read {
         Ok(brought) => brought,
         Err(error) => {
-            tracing::error!(%error, "a result cannot be read; it is left out");
+            tracing::error!(%error, "ignoring a malformed result");
             return acker.ack_with(AckKind::Term).await.map_err(unreachable);
         }
     };
     let receipt = Receipt::new(async move {
         if let Err(error) = acker.double_ack().await {
-            // It comes again, and is known then.
-            tracing::warn!(%error, "a receipt did not reach the broker");
+            // The result will be delivered again, and recognised.
+            tracing::warn!(%error, "cannot acknowledge a result to the broker");
         }
     });
     let Brought { attempt, worker, finding } = brought;

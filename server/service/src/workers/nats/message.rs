@@ -1,4 +1,4 @@
-//! What service and workers send each other: MessagePack, which keeps every bit of a number, compressed.
+//! Messages between service and workers: compressed MessagePack, which preserves every bit of a number.
 
 use crate::workers::dispatch::{Attempt, DispatchError, Finding};
 use crate::workers::evaluate::Assignment;
@@ -7,42 +7,42 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
 
-/// No message unpacks to more than this: who sends more means harm.
+/// Largest uncompressed message, against decompression bombs.
 const LARGEST_BYTES: u64 = 256 << 20;
-/// zstd level: the broker is near, time matters more than the last percent.
+/// zstd level. Speed matters more than size on a local network.
 const COMPRESSION: i32 = 3;
 
-/// The version of the program: another one may solve the same problem to other bits.
+/// Version of the program. Another version may give different bits.
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
 /// A job.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
-    /// The version of the program that wrote it.
+    /// Version of the program that sent it.
     pub program: String,
-    /// What to solve.
+    /// The solve.
     pub assignment: Assignment,
 }
 
-/// A sign of life.
+/// A heartbeat.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sign {
-    /// Of which try.
+    /// The attempt.
     pub attempt: Attempt,
-    /// Who runs it.
+    /// Name of the worker.
     pub worker: String,
-    /// The iterations since the last sign; none: it was just begun.
+    /// The iterations since the last heartbeat; empty when the solve has just started.
     pub records: Vec<IterationRecord>,
 }
 
 /// A result.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Brought {
-    /// Of which try.
+    /// The attempt.
     pub attempt: Attempt,
-    /// Who ran it.
+    /// Name of the worker.
     pub worker: String,
-    /// What came of it.
+    /// The result.
     pub finding: Finding,
 }
 
@@ -58,14 +58,14 @@ pub fn pack<T: Serialize>(message: &T) -> Result<Vec<u8>, DispatchError> {
 /// Reads a message.
 ///
 /// # Errors
-/// [`DispatchError::Message`] when these bytes are none.
+/// [`DispatchError::Message`] for malformed bytes.
 pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DispatchError> {
     let unreadable = |reason: String| DispatchError::Message(reason);
     let reader = zstd::Decoder::new(bytes).map_err(|e| unreadable(e.to_string()))?;
     let mut plain = Vec::new();
     reader.take(LARGEST_BYTES + 1).read_to_end(&mut plain).map_err(|e| unreadable(e.to_string()))?;
     if plain.len() as u64 > LARGEST_BYTES {
-        return Err(unreadable(format!("it unpacks to more than {LARGEST_BYTES} bytes")));
+        return Err(unreadable(format!("it expands to more than {LARGEST_BYTES} bytes")));
     }
     rmp_serde::from_slice(&plain).map_err(|e| unreadable(e.to_string()))
 }
@@ -77,7 +77,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_message_comes_back_to_the_bit_also_with_numbers_that_are_not_finite() {
+    fn messages_preserve_every_bit_even_of_infinite_numbers() {
         let numbers = [0.1 + 0.2, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE, -0.0];
         let back: Vec<f64> = unpack(&pack(&numbers.to_vec()).unwrap()).unwrap();
         let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn what_unpacks_to_too_much_is_refused() {
+    fn decompression_bombs_are_refused() {
         let zeros = zstd::encode_all(std::io::repeat(0).take(LARGEST_BYTES + 1), 1).unwrap();
         assert!(unpack::<Sign>(&zeros).unwrap_err().to_string().contains("more than"));
     }

@@ -22,15 +22,15 @@ use gaitwright_store::TrialId;
 use std::fmt::Display;
 use std::time::Duration;
 
-/// A job goes to another worker well before its lease in the record runs out.
+/// A silent worker loses its job well before the lease in the record expires.
 const ACK_WAITS_PER_LEASE: u32 = 3;
-/// Pause before something that the broker refused is tried again.
+/// Pause before a retry after an error of the broker.
 const AGAIN: Duration = Duration::from_secs(1);
-/// How long the broker holds a request for messages, and how often it says that it is still there.
+/// How long the broker holds a request for messages, and the interval of its heartbeats.
 const EXPIRES: Duration = Duration::from_secs(10);
 const BROKER_HEARTBEAT: Duration = Duration::from_secs(2);
 
-/// A connection to a broker, and the names of what is ours on it.
+/// A connection to a broker, and the names of our streams and subjects.
 #[derive(Debug, Clone)]
 pub(super) struct Link {
     context: Context,
@@ -39,7 +39,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Connects when the broker is there; the connection is made again by itself whenever it breaks.
+    /// Connects once the broker is available, and reconnects whenever the connection breaks.
     async fn open(url: &str, queue: &str, lease: Duration) -> Result<Self, DispatchError> {
         let client = async_nats::ConnectOptions::new()
             .name(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
@@ -47,7 +47,7 @@ impl Link {
             .retry_on_initial_connect()
             .connect(url)
             .await
-            .map_err(|error| DispatchError::Unreachable(format!("the NATS broker cannot be reached: {error}")))?;
+            .map_err(|error| DispatchError::Unreachable(format!("The NATS broker cannot be reached: {error}")))?;
         Ok(Self { context: jetstream::new(client), queue: queue.to_owned(), lease })
     }
 
@@ -63,7 +63,7 @@ impl Link {
         format!("{}.result.{}.{}", self.queue, attempt.trial, attempt.number)
     }
 
-    /// Signs of life, with the iterations since the last one.
+    /// Heartbeats, with the iterations since the last one.
     fn sign_subject(&self) -> String {
         format!("{}.sign", self.queue)
     }
@@ -72,13 +72,13 @@ impl Link {
         format!("{}.cancel", self.queue)
     }
 
-    /// The stream of jobs: each stays until a worker says that it is done.
+    /// The stream of jobs. Each stays until a worker acknowledges it.
     async fn jobs(&self) -> Result<Stream, DispatchError> {
         let config = Config {
             name: format!("{}-jobs", self.queue),
             subjects: vec![format!("{}.job.>", self.queue)],
             retention: RetentionPolicy::WorkQueue,
-            // One message for each attempt, whoever submits it again.
+            // One message for each attempt, even if it is submitted twice.
             max_messages_per_subject: 1,
             discard: DiscardPolicy::New,
             discard_new_per_subject: true,
@@ -97,7 +97,7 @@ impl Link {
         self.jobs().await?.get_or_create_consumer("workers", config).await.map_err(unreachable)
     }
 
-    /// The stream of results: each stays until it is in the record.
+    /// The stream of results. Each stays until it is on record.
     async fn results(&self) -> Result<Stream, DispatchError> {
         let config = Config {
             name: format!("{}-results", self.queue),
@@ -118,20 +118,20 @@ impl Link {
         self.results().await?.get_or_create_consumer("recorder", config).await.map_err(unreachable)
     }
 
-    /// A worker without a sign of life for so long loses its job to another one.
+    /// Time without a heartbeat after which a worker loses its job.
     fn ack_wait(&self) -> Duration {
         self.lease / ACK_WAITS_PER_LEASE
     }
 
-    /// Why nothing reaches the broker now.
+    /// Why the broker cannot be reached now, if it cannot.
     fn trouble(&self) -> Option<String> {
         (self.context.client().connection_state() != State::Connected)
-            .then(|| "the NATS broker cannot be reached".to_owned())
+            .then(|| "The NATS broker cannot be reached".to_owned())
     }
 
-    /// Refuses what the broker would cut the connection for.
+    /// Refuses a message that is too large, for which the broker would close the connection.
     fn fits(&self, what: &'static str, bytes: &[u8]) -> Result<(), DispatchError> {
-        // Subject and headers count as well.
+        // Subject and headers count too.
         let Some(info) = self.context.client().try_server_info() else { return Err(unreachable("not connected yet")) };
         let limit = info.max_payload.saturating_sub(1024);
         if bytes.len() > limit {
@@ -142,5 +142,5 @@ impl Link {
 }
 
 fn unreachable(error: impl Display) -> DispatchError {
-    DispatchError::Unreachable(format!("the NATS broker: {error}"))
+    DispatchError::Unreachable(format!("The NATS broker failed: {error}."))
 }

@@ -1,4 +1,4 @@
-//! The worker's end: asks for jobs, solves them on threads of its own, tells how far they are, brings the results.
+//! The remote worker: pulls jobs from the broker, solves them on its own threads, and publishes heartbeats and results.
 
 use super::message::{Brought, Order, PROGRAM, Sign, pack, unpack};
 use super::{AGAIN, Link, unreachable};
@@ -20,13 +20,13 @@ use tokio_util::task::TaskTracker;
 
 /// How long the broker holds a request for one job.
 const PULL: Duration = Duration::from_secs(5);
-/// Results that were not brought when the worker is told to stop have so long to reach the broker.
+/// Time to publish remaining results when the worker stops.
 const DRAIN: Duration = Duration::from_secs(20);
-/// A result that the broker refuses for so many leases is given up: by then its job is lost or run elsewhere.
+/// Number of leases after which an unpublished result is dropped. By then its job is lost or runs elsewhere.
 const GIVE_UP_AFTER_LEASES: u32 = 10;
-/// Longest pause before a result is brought again.
+/// Longest pause before publishing a result is retried.
 const LONGEST_PAUSE: Duration = Duration::from_secs(15);
-/// Signs of life are not sent more often than this, however fast the iterations are.
+/// Least time between two heartbeats of a solve.
 const SIGN_EVERY: Duration = Duration::from_millis(300);
 
 /// Runs jobs of a broker.
@@ -36,17 +36,17 @@ pub struct Worker {
     engine: InProcess,
     slots: Arc<Semaphore>,
     results: TaskTracker,
-    /// Packs results.
+    /// Threads that compress results.
     pool: Pool,
 }
 
-/// A job that was taken from the broker.
+/// A job that this worker holds.
 struct Held {
     number: u32,
     acker: Acker,
-    /// Iterations that were not sent yet.
+    /// Iterations that are not sent yet.
     untold: Vec<IterationRecord>,
-    /// When the solve last came further.
+    /// Time of the last iteration.
     lived: Instant,
     told: Instant,
     permit: OwnedSemaphorePermit,
@@ -55,10 +55,10 @@ struct Held {
 type Job = (jetstream::Message, OwnedSemaphorePermit);
 
 impl Worker {
-    /// Runs at most `size` jobs of a broker at the same time. A broker that is not there yet is waited for.
+    /// Connects to a broker, for at most `size` parallel jobs. Waits for a broker that is not available yet.
     ///
     /// # Errors
-    /// [`DispatchError::Unreachable`] for an address that is none.
+    /// [`DispatchError::Unreachable`] for a malformed address.
     pub async fn connect(
         url: &str,
         queue: &str,
@@ -73,7 +73,7 @@ impl Worker {
         Ok(Self { link, name, engine, slots, results: TaskTracker::new(), pool: Pool::default() })
     }
 
-    /// Works until told to stop; jobs that run then are given back to the broker.
+    /// Runs until `stop`. Running jobs then return to the broker.
     ///
     /// # Errors
     /// When the broker refuses the subscription to cancellations.
@@ -104,12 +104,12 @@ impl Worker {
         }
         self.results.close();
         if tokio::time::timeout(DRAIN, self.results.wait()).await.is_err() {
-            tracing::warn!("a result did not reach the broker; its job will be run again");
+            tracing::warn!("a result was not published; its job will be run again");
         }
         Ok(())
     }
 
-    /// Asks for a job whenever a slot is free.
+    /// Pulls a job whenever a slot is free.
     async fn pull(&self, jobs: Sender<Job>) {
         while let Ok(permit) = Arc::clone(&self.slots).acquire_owned().await {
             let mut slot = Some(permit);
@@ -122,7 +122,7 @@ impl Worker {
                     }
                     Ok(None) => slot = Some(permit),
                     Err(error) => {
-                        tracing::warn!(%error, "asking for a job; trying again");
+                        tracing::warn!(%error, "cannot pull a job; retrying");
                         tokio::time::sleep(AGAIN).await;
                         slot = Some(permit);
                     }
@@ -142,20 +142,20 @@ impl Worker {
         let order = match unpack::<Order>(&message.payload) {
             Ok(order) => order,
             Err(error) => {
-                tracing::error!(%error, "a job cannot be read; it is left out");
+                tracing::error!(%error, "ignoring a malformed job");
                 return answer(&acker, AckKind::Term).await;
             }
         };
         if order.program != PROGRAM {
-            tracing::error!(theirs = order.program, ours = PROGRAM, "a job of another version; it is left to others");
+            tracing::error!(theirs = order.program, ours = PROGRAM, "ignoring a job of another version of the program");
             return answer(&acker, AckKind::Nak(Some(self.link.lease))).await;
         }
         let attempt = order.assignment.attempt;
-        // The broker gives a job anew that was silent: what hangs here is nobody's business any more.
+        // The broker redelivers jobs without heartbeats, so an older solve of this trial is obsolete.
         self.engine.withdraw(attempt.trial).await;
-        tracing::info!(trial = %attempt.trial, attempt = attempt.number, "took a job");
+        tracing::info!(trial = %attempt.trial, attempt = attempt.number, "started a job");
         if let Err(error) = self.engine.submit(order.assignment).await {
-            tracing::error!(%error, "a job cannot be begun; it is left to others");
+            tracing::error!(%error, "cannot start a job; leaving it to other workers");
             return answer(&acker, AckKind::Nak(Some(AGAIN))).await;
         }
         let now = Instant::now();
@@ -195,12 +195,12 @@ impl Worker {
         }
     }
 
-    /// Gives the jobs back whose solve does not come further.
+    /// Returns jobs whose solve makes no progress.
     async fn give_up_hanging(&self, held: &mut HashMap<TrialId, Held>) {
         let hangs = |job: &Held| job.lived.elapsed() > self.link.ack_wait();
         let hanging: Vec<TrialId> = held.iter().filter(|(_, job)| hangs(job)).map(|(trial, _)| *trial).collect();
         for trial in hanging {
-            tracing::warn!(%trial, "a solve hangs; its job is given back");
+            tracing::warn!(%trial, "a solve hangs; returning its job");
             self.drop_job(held, trial, AckKind::Nak(None)).await;
         }
     }
@@ -222,13 +222,13 @@ impl Worker {
             Err(error) => Err(error),
         };
         if let Err(error) = sent {
-            tracing::warn!(%error, "a sign of life was not sent");
+            tracing::warn!(%error, "cannot send a heartbeat");
         }
     }
 }
 
-/// Publishes a result, again and again with longer pauses where the broker refuses it, then says that the job is done. A result
-/// that cannot be brought is given up, its slot freed and its job left to others.
+/// Publishes a result, with retries, then acknowledges the job. A result that cannot be published is dropped: its slot
+/// is freed and its job left to other workers.
 async fn bring(link: Link, pool: Pool, worker: String, attempt: Attempt, finding: Finding, job: Held) {
     let Held { acker, permit, .. } = job;
     let brought = Brought { attempt, worker, finding };
@@ -243,27 +243,27 @@ async fn bring(link: Link, pool: Pool, worker: String, attempt: Attempt, finding
     match bytes {
         Ok(bytes) => {
             if let Err(error) = publish_within(&link, attempt, &bytes, link.lease * GIVE_UP_AFTER_LEASES).await {
-                tracing::error!(trial = %attempt.trial, %error, "a result is given up; its job is left to others");
-                // After a pause: a job that is given anew comes before all that wait.
+                tracing::error!(trial = %attempt.trial, %error, "dropping a result; leaving its job to other workers");
+                // After a pause, because a redelivered job comes before all queued ones.
                 return answer(&acker, AckKind::Nak(Some(link.lease))).await;
             }
             if let Err(error) = acker.double_ack().await {
-                tracing::warn!(%error, "the broker does not know that a job is done; it will be run again in vain");
+                tracing::warn!(%error, "cannot acknowledge a completed job; it will be run again");
             }
         }
-        Err(error) => tracing::error!(%error, "a result cannot be written"),
+        Err(error) => tracing::error!(%error, "cannot serialise a result"),
     }
     drop(permit);
 }
 
-/// Publishes a result, tried again with longer and longer pauses until `limit`.
+/// Publishes a result, with retries and growing pauses until `limit`.
 async fn publish_within(link: &Link, attempt: Attempt, bytes: &[u8], limit: Duration) -> Result<(), DispatchError> {
     let begun = Instant::now();
     let mut pause = AGAIN;
     loop {
         match publish(link, attempt, bytes).await {
             Err(error) if begun.elapsed() < limit => {
-                tracing::warn!(trial = %attempt.trial, %error, "a result did not reach the broker; trying again");
+                tracing::warn!(trial = %attempt.trial, %error, "cannot publish a result; retrying");
                 tokio::time::sleep(pause).await;
                 pause = (pause * 2).min(LONGEST_PAUSE);
             }
@@ -281,6 +281,6 @@ async fn publish(link: &Link, attempt: Attempt, bytes: &[u8]) -> Result<(), Disp
 
 async fn answer(acker: &Acker, kind: AckKind) {
     if let Err(error) = acker.ack_with(kind).await {
-        tracing::warn!(%error, "a job could not be acknowledged; the broker gives it to another worker");
+        tracing::warn!(%error, "cannot acknowledge a job; the broker will give it to another worker");
     }
 }
