@@ -1,8 +1,7 @@
-//! Time of one whole iteration of a study on Table I's grid of 11,664 actions: the newest answers are taken in and the
-//! next action is proposed.
+//! Time of one iteration of a study on the grid of Table I (11,664 actions): posterior and proposal.
 //!
-//! `cargo bench -p gait-learner`. One comparison and one label per action tried; the log before the newest answers is
-//! in the cache, as in a running study (`warm`), or nothing is (`cold`: a program just started).
+//! `cargo bench -p gait-learner`. Each visited action has one comparison and one label. `warm`: the cache holds the
+//! posterior before the last action, as in a running study. `cold`: the cache is empty, as after a start.
 
 #![allow(clippy::expect_used, missing_docs, unreachable_pub)]
 
@@ -12,7 +11,7 @@ use divan::{Bencher, black_box};
 use gait_learner::{Learner, LearnerSettings, Method};
 use study::{earlier, page, space, study};
 
-/// Counts what an iteration allocates: the column "max alloc" is the memory it holds at once beside the study's cache.
+/// Counts allocations: the column "max alloc" is the peak memory of an iteration without the cache.
 #[global_allocator]
 static ALLOCATOR: divan::AllocProfiler = divan::AllocProfiler::system();
 
@@ -59,7 +58,7 @@ fn eubo_cold(bencher: Bencher, comparisons: usize) {
 }
 
 #[divan::bench(args = [50, 200], max_time = 2)]
-fn page_of_answers(bencher: Bencher, comparisons: usize) {
+fn study_page(bencher: Bencher, comparisons: usize) {
     let space = space();
     let log = study(&space, comparisons);
     let belief = gait_learner::posterior(&space, &log, &LearnerSettings::default()).expect("valid");

@@ -1,8 +1,7 @@
-//! Processor time of one whole iteration of a study, whatever else the machine is doing.
+//! Processor time of one iteration of a study. On a loaded machine it is more reliable than wall time.
 //!
-//! `cargo bench -p gait-learner --bench processor_time [-- NAME [COMPARISONS]]`. A wall clock also counts the time in which other
-//! programs had the processor; this one counts what the thread itself used. Fastest, median and slowest of the runs,
-//! the median by the wall clock beside it, and the machine's load.
+//! `cargo bench -p gait-learner --bench processor_time [-- NAME [COMPARISONS]]` prints fastest, median and slowest run,
+//! the median wall time, and the load of the machine.
 
 #![allow(clippy::expect_used, missing_docs, unreachable_pub)]
 
@@ -15,12 +14,12 @@ use gait_learner::{Learner, LearnerSettings, Method};
 use rustix::time::{ClockId, clock_gettime};
 use study::{earlier, page, space, study};
 
-/// Processor time that this thread has used.
+/// Processor time of this thread so far.
 fn used() -> Duration {
     Duration::try_from(clock_gettime(ClockId::ThreadCPUTime)).unwrap_or_default()
 }
 
-/// Runs to take, and the time after which a case with slow runs is content with fewer.
+/// Largest number of runs of a case, and the time after which no further run starts.
 const RUNS: usize = 300;
 const ENOUGH: Duration = Duration::from_secs(3);
 
@@ -28,7 +27,7 @@ fn quantile(sorted: &[Duration], numerator: usize) -> f64 {
     1e3 * sorted[(sorted.len() - 1) * numerator / 2].as_secs_f64()
 }
 
-/// Measures `run` on fresh inputs and prints a row of the table.
+/// Measures `run`, each time on a new input, and prints a row of the table.
 fn measure<T>(name: &str, comparisons: usize, mut input: impl FnMut() -> T, mut run: impl FnMut(&mut T)) {
     let (mut own, mut wall) = (Vec::new(), Vec::new());
     let start = Instant::now();
@@ -82,7 +81,7 @@ fn main() {
             );
         }
     }
-    if "page_of_answers".contains(&filter) {
+    if "study_page".contains(&filter) {
         for comparisons in [50, 200].into_iter().filter(|&count| only.is_none_or(|only| only == count)) {
             let log = study(&space, comparisons);
             for (name, method) in [("page, linecospar", Method::LineCoSpar), ("page, eubo", Method::Eubo)] {

@@ -1,15 +1,15 @@
-//! What can be wrong with a request to the learner.
+//! Errors of the learner.
 
-use crate::space::ActionIndex;
+use crate::action::ActionIndex;
 
-/// Why a space, a log, a setting or a request was refused.
+/// Why the learner rejected a search space, a log, a setting or a request.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnerError {
-    /// A search space needs at least one dimension.
-    #[error("the search space has no dimension")]
+    /// The search space has no dimension.
+    #[error("the search space needs at least one dimension")]
     NoDimension,
-    /// A dimension cannot be used as given.
+    /// A dimension has invalid values, or its name is taken.
     #[error("dimension `{dimension}`: {reason}")]
     InvalidDimension {
         /// Name of the dimension.
@@ -17,60 +17,60 @@ pub enum LearnerError {
         /// What is wrong with it.
         reason: String,
     },
-    /// A lengthscale at which an action would tell nothing of another, or all actions would be the same.
-    #[error("dimension `{dimension}`: lengthscale {lengthscale} is not between {shortest} and {longest}")]
+    /// The lengthscale is so short that actions are uncorrelated, or so long that they are indistinguishable.
+    #[error("dimension `{dimension}`: lengthscale {lengthscale} is outside the range from {shortest} to {longest}")]
     InvalidLengthscale {
         /// Name of the dimension.
         dimension: String,
         /// The lengthscale given.
         lengthscale: f64,
-        /// The shortest that is accepted, to three digits.
+        /// Lower limit, to three digits.
         shortest: f64,
-        /// The longest.
+        /// Upper limit, to three digits.
         longest: f64,
     },
-    /// The grid has more actions than an [`ActionIndex`] may count.
-    #[error("the search space has more than {limit} actions")]
+    /// The grid has too many actions.
+    #[error("the search space has more than {limit} actions, the largest number allowed")]
     TooManyActions {
-        /// The largest number of actions accepted.
+        /// Largest number of actions allowed.
         limit: u64,
     },
-    /// An action index outside the grid.
-    #[error("action {action} is not in the search space of {actions} actions")]
+    /// The action index is outside the search space.
+    #[error("action {action} does not exist: the search space has {actions} actions, counted from 0")]
     UnknownAction {
         /// The index given.
         action: ActionIndex,
         /// Number of actions in the space.
         actions: u64,
     },
-    /// A list of levels or values with the wrong number of entries.
-    #[error("{given} coordinates were given for a search space of {expected} dimensions")]
+    /// The number of levels or values differs from the number of dimensions.
+    #[error("{given} coordinates given, but the search space has {expected} dimensions")]
     WrongDimensionCount {
         /// Number of coordinates given.
         given: usize,
         /// Number of dimensions of the space.
         expected: usize,
     },
-    /// A dimension's number beyond the last dimension.
-    #[error("dimension {dimension} does not exist, there are {dimensions} (counted from 0)")]
+    /// The dimension index is out of range.
+    #[error("dimension {dimension} does not exist: there are {dimensions}, counted from 0")]
     UnknownDimension {
-        /// The number given, counted from 0.
+        /// The index given, counted from 0.
         dimension: usize,
         /// Number of dimensions of the space.
         dimensions: usize,
     },
-    /// A level number beyond a dimension's last level.
-    #[error("dimension `{dimension}` has {levels} levels, level {level} does not exist")]
+    /// The level index is out of range.
+    #[error("dimension `{dimension}`: level {level} does not exist: there are {levels}, counted from 0")]
     UnknownLevel {
         /// Name of the dimension.
         dimension: String,
-        /// The level given, counted from 0.
+        /// The level index given, counted from 0.
         level: usize,
         /// Number of levels.
         levels: usize,
     },
-    /// A value that is not one of a dimension's levels.
-    #[error("dimension `{dimension}` has no level {value}; its levels are {levels:?}")]
+    /// The value is not a level of its dimension.
+    #[error("dimension `{dimension}`: {value} is not a level; the levels are {levels:?}")]
     UnknownValue {
         /// Name of the dimension.
         dimension: String,
@@ -79,7 +79,7 @@ pub enum LearnerError {
         /// The dimension's levels.
         levels: Vec<f64>,
     },
-    /// A comparison or suggestion names the same action twice.
+    /// A comparison or a suggestion names the same action twice.
     #[error("feedback {entry}: action {action} cannot be compared with itself")]
     SelfComparison {
         /// Position in the log, counted from 0.
@@ -87,8 +87,8 @@ pub enum LearnerError {
         /// The action.
         action: ActionIndex,
     },
-    /// A label beyond the last category.
-    #[error("feedback {entry}: category {category} does not exist, there are {categories} (counted from 0)")]
+    /// A label names a category that does not exist.
+    #[error("feedback {entry}: category {category} does not exist: there are {categories}, counted from 0")]
     UnknownCategory {
         /// Position in the log, counted from 0.
         entry: usize,
@@ -97,7 +97,7 @@ pub enum LearnerError {
         /// Number of categories.
         categories: usize,
     },
-    /// A setting outside its range.
+    /// A setting is out of range or contradicts another one.
     #[error("setting `{setting}`: {reason}")]
     InvalidSetting {
         /// Name of the setting.
@@ -105,24 +105,16 @@ pub enum LearnerError {
         /// What is wrong with it.
         reason: String,
     },
-    /// Every action has been visited or is pending; where actions may be repeated, every one is pending.
-    #[error("all {actions} actions have been visited or are pending")]
+    /// No action is left to propose: each has been visited or is pending. If actions may be repeated, each is pending.
+    #[error("no action is left to propose: all {actions} have been visited or are pending")]
     Exhausted {
         /// Number of actions in the space.
         actions: u64,
     },
-    /// A stored state of a version this crate does not read.
-    #[error("learner state of version {version}; this program reads version {newest}")]
-    UnknownVersion {
-        /// Version of the document.
-        version: u32,
-        /// Version read.
-        newest: u32,
-    },
-    /// A covariance matrix could not be factored even after regularisation.
+    /// A covariance matrix is not positive definite, or an iteration did not converge.
     #[error("numerical failure: {0}")]
     Numerical(String),
 }
 
-/// `Result` with this crate's error.
+/// `Result` with [`LearnerError`].
 pub(crate) type Result<T> = std::result::Result<T, LearnerError>;

@@ -1,48 +1,50 @@
-//! What people (or a computed figure of merit) say about actions, and the log of it.
+//! Feedback about actions, from people or from a computed figure of merit, and its log.
 
 use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
+use crate::action::ActionIndex;
 use crate::error::{LearnerError, Result};
-use crate::space::{ActionIndex, SearchSpace};
+use crate::search_space::SearchSpace;
 
-/// One answer. Repeated and contradictory answers are information, not errors.
+/// One piece of feedback. Repeated and contradictory feedback is valid: it is evidence of noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Feedback {
-    /// An ordinal category, 0 the worst. With the default single threshold: 0 not converged, 1 converged.
+    /// An ordinal category. Category 0 is the worst. With the default single threshold, 0 means not converged and 1
+    /// converged.
     Label {
         /// The labelled action.
         action: ActionIndex,
         /// Its category, counted from 0.
         category: usize,
     },
-    /// One action was better than another.
+    /// One action is better than another.
     Preference {
         /// The better one.
         winner: ActionIndex,
         /// The worse one.
         loser: ActionIndex,
     },
-    /// No difference between two actions was noticed.
+    /// Two actions feel the same.
     Tie {
         /// One action.
         a: ActionIndex,
         /// The other.
         b: ActionIndex,
     },
-    /// Coactive feedback: this would have been better than what was tried.
+    /// Coactive feedback: a suggested action would be better than a visited one.
     Suggestion {
-        /// The action suggested (it need not have been visited).
+        /// The suggested action, visited or not.
         suggested: ActionIndex,
-        /// The action it would improve on.
+        /// The action that it improves on.
         over: ActionIndex,
     },
 }
 
 impl Feedback {
-    /// The actions spoken of, in the order in which they enter the model.
+    /// The actions that the feedback is about, in the order in which they enter the model.
     pub fn actions(&self) -> (ActionIndex, Option<ActionIndex>) {
         match *self {
             Self::Label { action, .. } => (action, None),
@@ -53,18 +55,18 @@ impl Feedback {
     }
 }
 
-/// The record: what was tried and what was said, each in order.
+/// Visited actions and feedback, each in order.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FeedbackLog {
-    /// Actions tried, in order. A repeated trial may appear twice.
+    /// Visited actions, one entry per trial.
     pub visited: Vec<ActionIndex>,
-    /// Answers, in order.
+    /// Feedback, in the order in which it was given.
     pub feedback: Vec<Feedback>,
 }
 
 impl FeedbackLog {
-    /// The actions whose last label is the lowest of several categories.
+    /// The actions whose last label is category 0, if there are several categories.
     pub(crate) fn in_lowest_category(&self, categories: usize) -> HashSet<ActionIndex> {
         let mut lowest = HashSet::new();
         for &feedback in &self.feedback {
@@ -79,10 +81,10 @@ impl FeedbackLog {
         lowest
     }
 
-    /// Checks that the log speaks of this space and of existing categories only.
+    /// Checks that every action is in the space and every category exists.
     ///
     /// # Errors
-    /// At the first action outside the space, comparison of an action with itself, or category that does not exist.
+    /// The first violation: an action outside the space, an action compared with itself, or an unknown category.
     pub fn validate(&self, space: &SearchSpace, categories: usize) -> Result<()> {
         for &action in &self.visited {
             space.check(action)?;

@@ -1,48 +1,51 @@
-//! Lengthscales and noise learned from the answers, off by default.
+//! Learning of lengthscales and preference noise from the evidence (off by default).
 //!
-//! The evidence of the approximation times priors is climbed by a coordinate search: factors on every dimension's
-//! lengthscale, log-normal around 1 and never below 1 (a grid cannot tell of anything shorter than its steps), and a
-//! factor on the preference noise, log-normal around 1. The search starts anew from 1 each time, on the answers about
-//! the first `n` actions tried, `n` the last multiple of the learning interval: it depends on nothing but the log.
+//! A coordinate search maximises evidence times prior over one factor for each lengthscale and one for the preference
+//! noise. Priors are log-normal around 1. Lengthscale factors are at least 1, because the data cannot resolve less than
+//! the steps of the grid.
+//!
+//! Each search starts from 1 and uses the feedback about the first `n` visited actions, `n` the last multiple of the
+//! learning interval. The result therefore depends on the log only.
 
 use crate::error::Result;
-use crate::space::SearchSpace;
+use crate::search_space::SearchSpace;
 
-/// Factors on the settings' lengthscales and preference noise.
+/// Factors on the lengthscales and the preference noise of the settings.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Hyperparameters {
     pub(crate) lengthscales: Vec<f64>,
     pub(crate) preference_noise: f64,
 }
 
-/// Standard deviation of the logarithm of a lengthscale's factor.
+/// Prior standard deviation of the logarithm of a lengthscale factor.
 const LENGTHSCALE_SPREAD: f64 = 0.8;
-/// Standard deviation of the logarithm of the noise's factor.
+/// Prior standard deviation of the logarithm of the noise factor.
 const NOISE_SPREAD: f64 = 1.5;
-/// Ratio of neighbouring values that are tried.
+/// Ratio of successive candidates.
 const STEP: f64 = 1.6;
 /// Largest lengthscale factor.
 const LONGEST: f64 = 20.0;
-/// Passes over the dimensions.
+/// Largest number of passes over the dimensions.
 const PASSES: usize = 2;
 
 impl Hyperparameters {
+    /// All factors 1.
     pub(crate) fn neutral(space: &SearchSpace) -> Self {
         Self { lengthscales: vec![1.0; space.dimensions().len()], preference_noise: 1.0 }
     }
 
     fn ln_prior(&self) -> f64 {
-        let term = |factor: f64, spread: f64| -0.5 * (crate::math::ln(factor) / spread).powi(2);
+        let term = |factor: f64, spread: f64| -0.5 * (crate::special_functions::ln(factor) / spread).powi(2);
         self.lengthscales.iter().map(|&l| term(l, LENGTHSCALE_SPREAD)).sum::<f64>()
             + term(self.preference_noise, NOISE_SPREAD)
     }
 
-    /// Climbs `evidence` plus the priors.
-    pub(crate) fn learn(space: &SearchSpace, evidence: impl Fn(&Self) -> Result<f64>) -> Result<Self> {
+    /// Maximises the logarithm of evidence times prior.
+    pub(crate) fn learn(space: &SearchSpace, log_evidence: impl Fn(&Self) -> Result<f64>) -> Result<Self> {
         let mut best = Self::neutral(space);
-        // A candidate that cannot be factored is no candidate.
-        let score = |candidate: &Self| evidence(candidate).map_or(f64::NEG_INFINITY, |e| e + candidate.ln_prior());
-        let mut highest = evidence(&best)? + best.ln_prior();
+        // A candidate whose covariance cannot be factored is rejected.
+        let score = |candidate: &Self| log_evidence(candidate).map_or(f64::NEG_INFINITY, |e| e + candidate.ln_prior());
+        let mut highest = log_evidence(&best)? + best.ln_prior();
         let mut consider = |best: &mut Self, change: &dyn Fn(&mut Self)| {
             let mut candidate = best.clone();
             change(&mut candidate);
@@ -78,14 +81,15 @@ impl Hyperparameters {
 
 #[cfg(test)]
 mod tests {
+    use crate::action::ActionIndex;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::posterior::posterior;
+    use crate::learner::posterior;
     use crate::random::Random;
+    use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::{LearnerSettings, Method};
-    use crate::space::{ActionIndex, Dimension, SearchSpace};
 
     #[test]
-    fn a_dimension_that_does_not_matter_gets_a_longer_lengthscale() {
+    fn learned_lengthscales_improve_predictions_of_unvisited_actions() {
         let dimension =
             |name: &str| Dimension { name: name.into(), values: (0..8).map(f64::from).collect(), lengthscale: 1.0 };
         let space = SearchSpace::new(vec![dimension("matters"), dimension("does not")]).unwrap();
@@ -106,7 +110,7 @@ mod tests {
         }
         let settings = LearnerSettings { preference_noise: 0.1, ..LearnerSettings::published(Method::Eubo) };
         let learning = LearnerSettings { learn_every: Some(10), ..settings.clone() };
-        // What was learned shows in what is believed of actions that were not tried.
+        // Number of pairs of actions that the posterior mean orders wrongly.
         let wrong = |settings: &LearnerSettings| {
             let belief = posterior(&space, &log, settings).unwrap();
             let actions: Vec<ActionIndex> = (0..64).map(ActionIndex).collect();

@@ -1,33 +1,32 @@
-//! The prior covariance over the grid, from small tables over pairs of levels.
+//! The prior covariance of the utility, from one table of correlations between levels for each dimension.
 //!
-//! The literature's kernel is the product over dimensions of squared exponentials `k_d`. Beside it stand the mean of
-//! the `k_d` (a sum of functions of one quantity each) and the mean of their pairwise products (functions of two
-//! quantities): `k = s2 (p prod_d k_d + a mean_d k_d + q mean_{d<e} k_d k_e)`, `p + a + q = 1`. All three are
-//! polynomials in the tables, so the covariances of a whole grid split into two halves of its dimensions.
+//! The kernel is `k = s2 (p prod_d k_d + a mean_d b_d + q mean_{d<e} b_d b_e)`, `p + a + q = 1`, with squared
+//! exponentials `k_d` and `b_d` in dimension `d`. The first part is the kernel of the literature. The second is a sum
+//! of functions of one dimension, the third a sum of functions of two; both have broad lengthscales. All parts are
+//! polynomials in the tables, so that the covariances of a grid split into the two halves of its dimensions
+//! (`whole_grid.rs`).
 
 use crate::linalg::Square;
-use crate::space::SearchSpace;
+use crate::search_space::SearchSpace;
 
-/// Shares and reach of the parts of a kernel.
+/// Shares and lengthscales of the parts of a kernel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct KernelShape {
     pub(crate) variance: f64,
     pub(crate) nugget: f64,
-    /// Share of the pure product.
+    /// Share `p` of the product.
     pub(crate) product: f64,
-    /// Share of functions of one quantity.
+    /// Share `a` of functions of one dimension.
     pub(crate) additive: f64,
-    /// Share of functions of two quantities.
+    /// Share `q` of functions of two dimensions.
     pub(crate) pairwise: f64,
-    /// Lengthscales of the product, one per dimension, in the unit of the values.
+    /// Lengthscale of the product in each dimension, in the unit of its values.
     pub(crate) lengthscales: Vec<f64>,
-    /// Lengthscales of the additive and pairwise parts.
+    /// Lengthscale of the additive and pairwise parts in each dimension.
     pub(crate) broad_lengthscales: Vec<f64>,
-    /// Weight of every dimension in the additive and pairwise parts; mean 1.
-    pub(crate) relevance: Vec<f64>,
 }
 
-/// Tables of the factors of the covariance.
+/// A kernel on the grid of a search space of `D` dimensions.
 #[derive(Debug, Clone)]
 pub(crate) struct Kernel {
     pub(crate) variance: f64,
@@ -38,73 +37,75 @@ pub(crate) struct Kernel {
     additive: f64,
     /// `s2 q 2 / (D (D - 1))`.
     pairwise: f64,
+    /// Tables of `k_d`.
     factors: Vec<Square>,
+    /// Tables of `b_d`.
     broad: Vec<Square>,
 }
 
-/// The symmetric functions of the factors over some of the dimensions.
+/// Elementary symmetric functions over some of the dimensions, from which the kernel follows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Symmetric {
+    /// `prod k_d`.
     product: f64,
+    /// `sum b_d`.
     first: f64,
+    /// `sum_{d<e} b_d b_e`.
     second: f64,
 }
 
 impl Kernel {
     pub(crate) fn new(space: &SearchSpace, shape: &KernelShape) -> Self {
-        let tables = |lengthscales: &[f64], weights: Option<&[f64]>| {
+        let tables = |lengthscales: &[f64]| {
             space
                 .dimensions()
                 .iter()
                 .zip(lengthscales)
-                .enumerate()
-                .map(|(d, (dimension, lengthscale))| {
-                    let weight = weights.map_or(1.0, |w| w[d]);
+                .map(|(dimension, lengthscale)| {
                     Square::from_fn(dimension.values.len(), |i, j| {
                         let r = (dimension.values[i] - dimension.values[j]) / lengthscale;
-                        weight * crate::math::exp(-0.5 * r * r)
+                        crate::special_functions::exp(-0.5 * r * r)
                     })
                 })
                 .collect::<Vec<_>>()
         };
         let count = space.dimensions().len() as f64;
-        // e_2 of the weights, so that the pairwise part has its share of the variance
-        let total: f64 = shape.relevance.iter().sum();
-        let squares: f64 = shape.relevance.iter().map(|w| w * w).sum();
-        let pairs = 0.5 * (total * total - squares);
-        let pairwise = if pairs > 1e-9 * count { shape.variance * shape.pairwise / pairs } else { 0.0 };
+        let pairs = 0.5 * (count * count - count);
+        // One dimension has no pair: its share is additive.
+        let pairwise = if pairs > 0.0 { shape.variance * shape.pairwise / pairs } else { 0.0 };
         let additive_share = if pairwise > 0.0 { shape.additive } else { shape.additive + shape.pairwise };
         Self {
             variance: shape.variance,
             nugget: shape.nugget,
             product: shape.variance * shape.product,
-            additive: shape.variance * additive_share / total,
+            additive: shape.variance * additive_share / count,
             pairwise,
-            factors: tables(&shape.lengthscales, None),
-            broad: tables(&shape.broad_lengthscales, Some(&shape.relevance)),
+            factors: tables(&shape.lengthscales),
+            broad: tables(&shape.broad_lengthscales),
         }
     }
 
-    /// Whether the kernel is the pure product of its tables.
+    /// Whether the kernel has the product part only.
     pub(crate) fn is_product(&self) -> bool {
         self.additive == 0.0 && self.pairwise == 0.0
     }
 
-    /// The table of correlations of the levels of a dimension in the product part.
+    /// Table of `k_d`: correlations between the levels of a dimension in the product part.
     pub(crate) fn factor(&self, dimension: usize) -> &Square {
         &self.factors[dimension]
     }
 
-    /// The table of a dimension in the additive and pairwise parts.
+    /// Table of `b_d`: correlations between the levels of a dimension in the additive and pairwise parts.
     pub(crate) fn broad(&self, dimension: usize) -> &Square {
         &self.broad[dimension]
     }
 
-    /// Weights of the product, the sum of tables and the sum of products of two tables.
+    /// Weights of `prod k_d`, `sum b_d` and `sum_{d<e} b_d b_e`.
     pub(crate) fn weights(&self) -> [f64; 3] {
         [self.product, self.additive, self.pairwise]
     }
 
+    /// The symmetric functions of two lists of levels of some of the dimensions, starting with dimension `from`.
     pub(crate) fn symmetric(&self, from: usize, a: &[usize], b: &[usize]) -> Symmetric {
         let mut s = Symmetric { product: 1.0, first: 0.0, second: 0.0 };
         for (d, (&i, &j)) in a.iter().zip(b).enumerate() {
@@ -120,8 +121,7 @@ impl Kernel {
         s
     }
 
-    /// [`Self::symmetric`] of every combination of levels of some of the dimensions with one, the last dimension
-    /// running fastest.
+    /// [`Self::symmetric`] of every combination of levels with `b`; the last dimension varies fastest.
     pub(crate) fn combinations(&self, from: usize, b: &[usize]) -> Vec<Symmetric> {
         let pure = self.is_product();
         let mut all = vec![Symmetric { product: 1.0, first: 0.0, second: 0.0 }];
@@ -140,11 +140,11 @@ impl Kernel {
         all
     }
 
-    /// The first term of [`Self::split`] of [`Self::combinations`].
+    /// The product term of [`Self::split`] of all [`Self::combinations`], without the others.
     pub(crate) fn products(&self, from: usize, b: &[usize], left: bool, into: &mut Vec<f64>) {
         into.clear();
         into.push(if left { self.product } else { 1.0 });
-        // The last dimension first, from behind: the combinations of the dimensions done so far stay together.
+        // From the last dimension to the first, so that the combinations computed so far stay contiguous.
         for (d, &j) in b.iter().enumerate().rev() {
             let done = into.len();
             let factors = self.factors[from + d].row(j);
@@ -157,7 +157,7 @@ impl Kernel {
         }
     }
 
-    /// Covariance from the symmetric functions of two complementary parts of the dimensions.
+    /// Covariance from the symmetric functions of two complementary sets of dimensions.
     pub(crate) fn join(&self, y: Symmetric, z: Symmetric) -> f64 {
         let product = self.product * y.product * z.product;
         if self.is_product() {
@@ -166,12 +166,12 @@ impl Kernel {
         product + self.additive * (y.first + z.first) + self.pairwise * (y.second + y.first * z.first + z.second)
     }
 
-    /// Covariance of the utilities of two actions given by their levels.
+    /// Prior covariance of two actions, given by their levels.
     pub(crate) fn covariance(&self, a: &[usize], b: &[usize]) -> f64 {
         self.join(self.symmetric(0, a, b), Symmetric { product: 1.0, first: 0.0, second: 0.0 })
     }
 
-    /// Covariance from the factors of every dimension.
+    /// Covariance from `(k_d, b_d)` of every dimension.
     fn combine(&self, factors: impl Iterator<Item = (f64, f64)>) -> f64 {
         let mut s = Symmetric { product: 1.0, first: 0.0, second: 0.0 };
         for (product, broad) in factors {
@@ -182,7 +182,7 @@ impl Kernel {
         self.join(s, Symmetric { product: 1.0, first: 0.0, second: 0.0 })
     }
 
-    /// Covariance of one action with the average over all levels of the dimensions that a profile leaves open.
+    /// Prior covariance of an action with the average over all levels of the dimensions that are `None` in `profile`.
     pub(crate) fn average_with(&self, profile: &[Option<usize>], point: &[usize]) -> f64 {
         let mean = |table: &Square, j: usize| table.row(j).iter().sum::<f64>() / table.order() as f64;
         self.combine(profile.iter().zip(point).zip(self.factors.iter().zip(&self.broad)).map(
@@ -193,7 +193,7 @@ impl Kernel {
         ))
     }
 
-    /// Prior variance of the average over all levels of the dimensions that a profile leaves open.
+    /// Prior variance of the average over all levels of the dimensions that are `None` in `profile`.
     pub(crate) fn average_variance(&self, profile: &[Option<usize>]) -> f64 {
         let mean = |table: &Square| {
             let n = table.order();
@@ -207,12 +207,13 @@ impl Kernel {
         }))
     }
 
-    /// Covariances of one action with many.
+    /// Prior covariances of one action with many, all given by their levels.
     pub(crate) fn column(&self, a: &[usize], points: &[Vec<usize>]) -> Vec<f64> {
         points.iter().map(|b| self.covariance(a, b)).collect()
     }
 
-    /// The terms of [`Self::join`]: `(coupled, separate)` with `k = y.coupled . z.coupled + y.separate + z.separate`.
+    /// The terms of [`Self::join`]: `(coupled, separate)` such that
+    /// `k = y.coupled . z.coupled + y.separate + z.separate` for a left part `y` and a right part `z`.
     pub(crate) fn split(&self, s: Symmetric, left: bool) -> ([f64; 2], f64) {
         let (p, q) = if left { (self.product, self.pairwise) } else { (1.0, 1.0) };
         ([p * s.product, q * s.first], self.additive * s.first + self.pairwise * s.second)

@@ -1,42 +1,78 @@
-//! Preference-based Bayesian learning over a finite grid of actions.
+//! Preference-based Bayesian optimisation over a finite grid of actions.
 //!
-//! Somebody tries actions of a [`SearchSpace`] and says, of each, how good it was ([`Feedback::Label`]), which of two
-//! was better ([`Feedback::Preference`], [`Feedback::Tie`]) or what would have been better
-//! ([`Feedback::Suggestion`]). The learner keeps a Gaussian-process belief about the hidden utility
-//! ([`posterior`]) and says what to try next ([`propose`]) and what to ask about it ([`what_to_ask`]).
+//! A person, or a computed figure of merit, evaluates actions of a [`SearchSpace`] and gives [`Feedback`]: labels,
+//! preferences, ties and suggestions. The learner infers a Gaussian-process posterior over the latent utility
+//! ([`posterior`]), proposes the next action ([`propose`]) and the comparisons worth asking ([`comparisons_to_ask`],
+//! [`what_to_ask`]), and recommends an action ([`Posterior::best`]).
 //!
-//! Everything here is a pure function of `(space, log, settings, seed)`: no clock, no file, no hidden state. Equal
-//! arguments give equal results, bit for bit.
+//! All functions are pure functions of space, log, settings and seed. They do no I/O and read no clock. Equal arguments
+//! give equal bits on every machine.
+//!
+//! ```
+//! use gait_learner::*;
+//!
+//! let dimension = |name: &str| Dimension { name: name.into(), values: vec![0.0, 0.1, 0.2, 0.3], lengthscale: 0.1 };
+//! let space = SearchSpace::new(vec![dimension("foot clearance"), dimension("torso lean")])?;
+//! let settings = LearnerSettings::of(Method::LineCoSpar);
+//! // The person likes 0.2 in both dimensions best.
+//! let distance = |a: ActionIndex| space.values(a).iter().map(|x| (x - 0.2).powi(2)).sum::<f64>();
+//!
+//! let mut log = FeedbackLog::default();
+//! for _ in 0..12 {
+//!     let action = propose(&space, &log, &[], &settings, 1)?.action;
+//!     for comparison in comparisons_to_ask(&space, &log, action, &settings)? {
+//!         let other = comparison.against;
+//!         let (winner, loser) = if distance(action) < distance(other) { (action, other) } else { (other, action) };
+//!         log.feedback.push(Feedback::Preference { winner, loser });
+//!     }
+//!     log.visited.push(action);
+//! }
+//!
+//! let posterior = posterior(&space, &log, &settings)?;
+//! let best = posterior.best().ok_or("no action visited")?;
+//! let prediction = posterior.predict(best)?;
+//! println!("{:?}: utility {:.2} +/- {:.2}", space.values(best), prediction.mean, prediction.standard_deviation);
+//! assert!(log.visited.iter().all(|&a| distance(best) <= distance(a)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod acquisition;
-mod answers;
-mod ask;
-mod belief;
+mod action;
+mod comparisons;
 mod error;
 mod feedback;
-mod grid;
+mod gaussian_process;
+mod grid_sample;
 mod hyperparameters;
 mod inference;
 mod kernel;
+mod learner;
 mod likelihood;
 mod linalg;
-mod math;
-mod model;
+mod observations;
 mod posterior;
 mod propose;
 mod random;
+mod search_space;
 mod settings;
-mod space;
-mod state;
+mod special_functions;
+mod update_chain;
+mod whole_grid;
 
-pub use answers::{Agreement, BestProbability, Marginal, Slice};
-pub use ask::{Question, QuestionReason, comparisons_to_ask, comparisons_to_ask_among, what_to_ask};
+pub use action::ActionIndex;
+pub use comparisons::{
+    ComparisonReason, ProposedComparison, comparisons_to_ask, comparisons_to_ask_among, what_to_ask,
+};
 pub use error::LearnerError;
 pub use feedback::{Feedback, FeedbackLog};
-pub use posterior::{Learner, Posterior, Prediction, posterior};
+pub use learner::{Learner, posterior};
+pub use likelihood::Link;
+pub use posterior::agreement::Agreement;
+pub use posterior::best_action::BestProbability;
+pub use posterior::marginals::{Marginal, Slice};
+pub use posterior::{Posterior, Prediction};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch};
-pub use settings::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
-pub use space::{ActionIndex, Dimension, SearchSpace};
-pub use state::LearnerState;
+pub use search_space::{Dimension, SearchSpace};
+pub use settings::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Method, Partner, Start};

@@ -1,16 +1,29 @@
-//! One likelihood for every kind of answer.
+//! The interval likelihood: one likelihood for every kind of feedback.
 //!
-//! An answer says that a linear functional `d` of the utility, seen through noise of scale `c`, lies in an interval:
+//! Feedback says that a linear functional `d` of the utility, observed with noise of scale `c`, lies in an interval:
 //!
-//! `P(answer | d) = g((high - d) / c) - g((low - d) / c)`,   `g` logistic or normal distribution function.
+//! `P(feedback | d) = g((high - d) / c) - g((low - d) / c)`,   `g` the logistic or normal distribution function.
 //!
-//! A preference is `d = f_winner - f_loser` above 0, a suggestion the same with its own noise, a tie `|d| < width`, a
-//! label `d = f_action` between its category's thresholds.
+//! - preference: `d = f_winner - f_loser > 0`
+//! - suggestion: the same, with its own noise
+//! - tie: `|f_a - f_b| < width`
+//! - label: `d = f_action` between the thresholds of its category (ordinal regression, Chu and Ghahramani 2005)
 
-use crate::math;
-use crate::settings::Link;
+use serde::{Deserialize, Serialize};
 
-/// Bounds of the interval and the noise.
+use crate::special_functions;
+
+/// Distribution function of the noise: maps a difference of utilities, divided by the noise scale, to a probability.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Link {
+    /// `1 / (1 + exp(-z))`.
+    Logistic,
+    /// The standard normal distribution function.
+    Probit,
+}
+
+/// An interval of the functional and the scale of the noise, all in units of utility.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Interval {
     pub(crate) low: f64,
@@ -18,12 +31,12 @@ pub(crate) struct Interval {
     pub(crate) noise: f64,
 }
 
-/// Logarithm of the likelihood with its slope and curvature in `d`.
+/// Logarithm of the likelihood with its derivatives in `d`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LogLikelihood {
     pub(crate) value: f64,
     pub(crate) slope: f64,
-    /// Minus the second derivative: never negative, both links are log-concave.
+    /// Minus the second derivative. Both links are log-concave, so it is never negative.
     pub(crate) curvature: f64,
 }
 
@@ -36,17 +49,17 @@ impl Interval {
         })
     }
 
-    /// Probability of the answer. Digits are lost where it is far below 1e-16: fit for averages, not for logarithms.
+    /// Likelihood, with absolute precision. Use [`Self::log_likelihood`] for logarithms: below 1e-16 digits are lost.
     pub(crate) fn probability(&self, link: Link, d: f64) -> f64 {
         let below = |bound: f64| match link {
             _ if bound.is_infinite() => f64::from(u8::from(bound > 0.0)),
             Link::Logistic => sigmoids((bound - d) / self.noise).0,
-            Link::Probit => math::normal_cdf((bound - d) / self.noise),
+            Link::Probit => special_functions::normal_cdf((bound - d) / self.noise),
         };
         (below(self.high) - below(self.low)).max(0.0)
     }
 
-    /// Slope and curvature alone; the value is not a number where it would cost more.
+    /// Slope and curvature only. For the logistic link the value is NaN, because it costs more.
     pub(crate) fn derivatives(&self, link: Link, d: f64) -> LogLikelihood {
         let (low, high) = ((self.low - d) / self.noise, (self.high - d) / self.noise);
         self.scaled(match link {
@@ -66,22 +79,22 @@ impl Interval {
 
 /// `sigma(z)` and `sigma(-z)` from one exponential.
 fn sigmoids(z: f64) -> (f64, f64) {
-    let e = math::exp(-z.abs());
+    let e = special_functions::exp(-z.abs());
     let (large, small) = (1.0 / (1.0 + e), e / (1.0 + e));
     if z >= 0.0 { (large, small) } else { (small, large) }
 }
 
-/// `sigma(u) - sigma(l) = sigma(u) sigma(-l) (1 - exp(l - u))`: every factor keeps its digits, and only the first two
-/// depend on `d`.
+/// `sigma(u) - sigma(l) = sigma(u) sigma(-l) (1 - exp(l - u))` avoids cancellation; only the first two factors depend
+/// on `d`.
 fn logistic(low: f64, high: f64) -> LogLikelihood {
     let derivatives = logistic_derivatives(low, high);
     let gap = high - low;
-    let narrow = if gap.is_finite() { math::ln(-libm::expm1(-gap)) } else { 0.0 };
-    let tail = |z: f64| if z == f64::INFINITY { 0.0 } else { math::ln_sigmoid(z) };
+    let narrow = if gap.is_finite() { special_functions::ln(-libm::expm1(-gap)) } else { 0.0 };
+    let tail = |z: f64| if z == f64::INFINITY { 0.0 } else { special_functions::ln_sigmoid(z) };
     LogLikelihood { value: tail(high) + tail(-low) + narrow, ..derivatives }
 }
 
-/// [`logistic`] without its value.
+/// [`logistic`] without the value.
 fn logistic_derivatives(low: f64, high: f64) -> LogLikelihood {
     let (below_high, beyond_high) = sigmoids(high);
     let (beyond_low, above_low) = sigmoids(low);
@@ -101,13 +114,13 @@ fn probit(low: f64, high: f64) -> LogLikelihood {
         return probit_above(-high, -1.0);
     }
     if low > 0.0 || (low + high > 0.0 && low > -high) {
-        // Work in the left tail, where the distribution function is small and exact.
+        // In the left tail the distribution function keeps its relative precision.
         let mirrored = probit(-high, -low);
         return LogLikelihood { slope: -mirrored.slope, ..mirrored };
     }
     let gap = high - low;
     if gap < 1e-3 {
-        // The density is log-linear across a narrow interval: a uniform variable tilted by exp(-m s).
+        // Across a narrow interval the density is log-linear: a uniform density tilted by exp(-middle s).
         let middle = 0.5 * (low + high);
         let tilt = middle * gap;
         let shift = if tilt.abs() < 1e-2 { -tilt / 12.0 } else { 0.5 / libm::tanh(-0.5 * tilt) + 1.0 / tilt };
@@ -122,17 +135,17 @@ fn probit(low: f64, high: f64) -> LogLikelihood {
         let ln_mean = if half < 1e-2 {
             half * half / 6.0
         } else {
-            half + math::ln_1p(-math::exp(-2.0 * half)) - math::ln(2.0 * half)
+            half + special_functions::ln_1p(-special_functions::exp(-2.0 * half)) - special_functions::ln(2.0 * half)
         };
         return LogLikelihood {
-            value: -0.5 * middle * middle - 0.918_938_533_204_672_8 + math::ln(gap) + ln_mean,
+            value: -0.5 * middle * middle - 0.918_938_533_204_672_8 + special_functions::ln(gap) + ln_mean,
             slope: middle + gap * shift,
             curvature: (1.0 - gap * gap * spread).clamp(0.0, 1.0),
         };
     }
-    let (ln_high, ln_low) = (math::ln_normal_cdf(high), math::ln_normal_cdf(low));
-    let value = ln_high + math::ln_1p(-math::exp(ln_low - ln_high));
-    let density = |z: f64| math::exp(-0.5 * z * z - 0.918_938_533_204_672_8 - value);
+    let (ln_high, ln_low) = (special_functions::ln_normal_cdf(high), special_functions::ln_normal_cdf(low));
+    let value = ln_high + special_functions::ln_1p(-special_functions::exp(ln_low - ln_high));
+    let density = |z: f64| special_functions::exp(-0.5 * z * z - 0.918_938_533_204_672_8 - value);
     let (at_high, at_low) = (density(high), density(low));
     let slope = (at_low - at_high).clamp(low, high);
     let variance = 1.0 + low * at_low - high * at_high - slope * slope;
@@ -141,8 +154,8 @@ fn probit(low: f64, high: f64) -> LogLikelihood {
 
 /// The interval `(low, inf)` for `sign = 1`; mirrored for `sign = -1`.
 fn probit_above(low: f64, sign: f64) -> LogLikelihood {
-    let ratio = math::inverse_mills(-low);
-    let value = if low == f64::NEG_INFINITY { 0.0 } else { math::ln_normal_cdf(-low) };
+    let ratio = special_functions::inverse_mills(-low);
+    let value = if low == f64::NEG_INFINITY { 0.0 } else { special_functions::ln_normal_cdf(-low) };
     let curvature = if low == f64::NEG_INFINITY { 0.0 } else { (ratio * (ratio - low)).clamp(0.0, 1.0) };
     LogLikelihood { value, slope: if low == f64::NEG_INFINITY { 0.0 } else { sign * ratio }, curvature }
 }
@@ -152,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slopes_and_curvatures_are_derivatives() {
+    fn slope_and_curvature_match_finite_differences() {
         let intervals = [
             (0.0, f64::INFINITY, 0.02),
             (f64::NEG_INFINITY, 0.3, 0.1),
@@ -187,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn categories_are_exhaustive() {
+    fn category_probabilities_sum_to_one() {
         let bounds = [f64::NEG_INFINITY, -0.5, -0.1, 0.3, 0.7, f64::INFINITY];
         for link in [Link::Logistic, Link::Probit] {
             for d in [-2.0, -0.3, 0.0, 0.31, 5.0] {
@@ -206,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tails_stay_finite() {
+    fn log_likelihood_is_finite_in_the_tails() {
         for link in [Link::Logistic, Link::Probit] {
             for d in [-1e8, -1e3, 1e3, 1e8] {
                 for (low, high) in [(0.0, f64::INFINITY), (f64::NEG_INFINITY, 0.0), (-1.0, 1.0), (0.0, 1e-4)] {

@@ -1,8 +1,9 @@
-//! Random numbers that stay the same for ever: the generator is part of the record of a study.
+//! Random numbers of the learner: xoshiro256++ (Blackman and Vigna 2021), seeded through splitmix64 as its authors
+//! advise.
 //!
-//! xoshiro256++ (Blackman and Vigna) seeded through splitmix64, as its authors advise.
+//! The generator is written here because a study must give the same numbers with every version of a library.
 
-/// A seeded stream of random numbers.
+/// A stream of random numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct Random {
     state: [u64; 4],
@@ -18,13 +19,14 @@ fn splitmix64(state: &mut u64) -> u64 {
 }
 
 impl Random {
-    /// The stream of a seed and a counter: every purpose that draws has its own counter.
+    /// The stream of a seed and a stream number. Different numbers give independent streams.
     pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut mixed = seed;
         let mut state = splitmix64(&mut mixed) ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03);
         Self { state: std::array::from_fn(|_| splitmix64(&mut state)), spare_normal: None }
     }
 
+    /// Uniform over all 64-bit numbers.
     pub(crate) fn next(&mut self) -> u64 {
         let s = &mut self.state;
         let result = s[0].wrapping_add(s[3]).rotate_left(23).wrapping_add(s[0]);
@@ -43,9 +45,9 @@ impl Random {
         (self.next() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
     }
 
-    /// Uniform in `0..count`; 0 for an empty range.
+    /// Uniform in `0..count`, and 0 if `count` is 0.
     pub(crate) fn below(&mut self, count: u64) -> u64 {
-        // The high half of a 128-bit product; its bias is below 2^-11 even for 2^53 values.
+        // The high half of a 128-bit product. Its relative bias is below 2^-11 for up to 2^53 values.
         u64::try_from((u128::from(self.next()) * u128::from(count)) >> 64).unwrap_or(0)
     }
 
@@ -71,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moments_of_the_draws() {
+    fn samples_have_the_moments_of_their_distributions() {
         let mut random = Random::new(7, 0);
         let n = 200_000;
         let (mut mean, mut square, mut uniform) = (0.0, 0.0, 0.0);
@@ -86,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_differ_and_repeat() {
+    fn streams_are_reproducible_and_distinct() {
         assert_eq!(Random::new(1, 2).next(), Random::new(1, 2).next());
         assert_ne!(Random::new(1, 2).next(), Random::new(1, 3).next());
         assert_ne!(Random::new(1, 2).next(), Random::new(2, 2).next());

@@ -1,68 +1,57 @@
-//! How to learn: the method and the numbers of its model, named as in the literature.
+//! Settings of the learner, named as in the literature.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
-use crate::likelihood::Interval;
+use crate::likelihood::{Interval, Link};
 
-mod written;
+mod deserialize;
 
-use written::WrittenSettings;
-
-/// [`LearnerSettings::line_trials`] for lines throughout: more trials than any study has, and exact in every JSON reader.
+/// Value of [`LearnerSettings::line_trials`] that keeps EUBO on lines in every trial. Every JSON reader represents it
+/// exactly.
 pub const EVERY_TRIAL: usize = u32::MAX as usize;
 
 /// How the next action is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// LineCoSpar: a Thompson draw on a random line through the best action.
+    /// LineCoSpar (Tucker et al. 2020): a Thompson sample on a random line through the best action.
     #[serde(rename = "linecospar")]
     LineCoSpar,
-    /// The action with the greatest expected utility of the better of itself and the best action so far, over the
-    /// whole grid.
+    /// Expected utility of the best option (Lin et al. 2022): the action that maximises the expected utility of the
+    /// better of itself and the best action so far.
     Eubo,
-    /// The highest of one joint draw of the utility of all actions.
+    /// Thompson sampling: the maximiser of one joint sample of the utility over the whole grid.
     Thompson,
-    /// The action whose answers would tell most about the utility.
+    /// Information gain (ROIAL, Li et al. 2021): the action whose feedback has the largest mutual information with the
+    /// utility.
     InformationGain,
-    /// A uniformly random action that was not visited.
+    /// A uniformly random action that has not been visited.
     Random,
 }
 
-/// How the posterior is approximated.
+/// Method of approximate inference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Inference {
-    /// A normal distribution at the posterior's mode.
+    /// Laplace's approximation: a normal distribution at the mode of the posterior.
     Laplace,
-    /// Expectation propagation. Needs the probit link.
+    /// Expectation propagation (Minka 2001). Requires the probit link.
     ExpectationPropagation,
 }
 
-/// The function that turns a difference of utilities, divided by its noise, into a probability.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Link {
-    /// `1 / (1 + exp(-z))`.
-    Logistic,
-    /// The normal distribution function.
-    Probit,
-}
-
-/// Where labels enter.
+/// The function that labels are about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Labels {
-    /// Labels are about the utility itself, as in the literature.
+    /// Labels are about the utility, as in the literature.
     InUtility,
-    /// Whether a label is the lowest category is about a second function of the action; the grades above it, where
-    /// there are several, are about the utility. A comparison that the labels alone decide (one action in the lowest
-    /// category, the other not) says nothing more about the utility.
+    /// Category 0 is about a second Gaussian process, feasibility. Higher categories, if there are several, are about
+    /// the utility. A comparison of a feasible with an infeasible action does not inform the utility.
     Separate,
 }
 
-/// What is tried first.
+/// The first action of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
@@ -76,85 +65,86 @@ pub enum Start {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Partner {
-    /// As published: the others of the same batch, and of those before it the last ones tried, as many as the buffer
-    /// holds: what a person on the device remembers.
+    /// The other actions of its batch, and the last `buffer` actions before the batch, as published: a subject
+    /// remembers only those.
     Previous,
-    /// The best one so far.
+    /// The best action so far.
     Incumbent,
-    /// Every one: free where the answer is computed.
+    /// Every earlier action. Suitable if a computed figure of merit answers.
     Every,
 }
 
-/// Everything that decides how a log is read and what is proposed next.
+/// Settings of model, inference, proposals and comparisons.
 ///
-/// The default is LineCoSpar with the numbers of POLAR (Tucker, Li and others), the toolbox of LineCoSpar's authors,
-/// except that it never repeats an action and compares each with the best so far.
+/// The default is LineCoSpar with the parameters of POLAR (Tucker, Li et al.), the toolbox of its authors, except that
+/// it does not repeat actions and compares each with the best so far.
 ///
-/// In a document every field is optional: one that names a method has [`LearnerSettings::of`] that method in what it
-/// leaves out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(from = "WrittenSettings")]
+/// Deserialisation accepts any subset of the fields. The others take the values that [`LearnerSettings::of`] gives for
+/// the method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LearnerSettings {
-    /// How the next action is chosen.
+    /// Method that chooses the next action.
     pub method: Method,
-    /// How the posterior is approximated.
+    /// Method of approximate inference.
     pub inference: Inference,
-    /// Shape of the answer noise.
+    /// Distribution of the noise.
     pub link: Link,
-    /// Prior variance of the utility.
+    /// Prior variance of the utility, 1e-6 to 1e6.
     pub signal_variance: f64,
-    /// Variance added on the diagonal of the prior covariance of visited actions (the literature's "GP noise").
+    /// Variance added to the diagonal of the prior covariance ("GP noise" in the literature), at most
+    /// `signal_variance`.
     pub nugget: f64,
-    /// Multiplies every dimension's lengthscale.
+    /// Factor on the lengthscale of every dimension, 0.01 to 100.
     pub lengthscale_factor: f64,
-    /// Share of the prior variance given to functions of one quantity each.
+    /// Share of the prior variance in functions of one dimension, 0 to 1.
     pub additive_share: f64,
-    /// Share of the prior variance given to functions of two quantities each. What is left of 1 goes to the
-    /// literature's product kernel.
+    /// Share of the prior variance in functions of two dimensions, 0 to 1. The rest is the product kernel of the
+    /// literature.
     pub pairwise_share: f64,
-    /// Lengthscale of the additive and pairwise parts, as a share of each dimension's range.
+    /// Lengthscale of the additive and pairwise parts, as a multiple of the range of each dimension, 0.01 to 1000.
     pub broad_lengthscale: f64,
-    /// Where labels enter.
+    /// The function that labels are about.
     pub labels: Labels,
-    /// Multiplies every lengthscale of the function that separate labels are about.
+    /// Factor on every lengthscale of feasibility, 0.01 to 100.
     pub feasibility_lengthscale_factor: f64,
-    /// Share of functions of one quantity in the function that separate labels are about.
+    /// Share of the prior variance of feasibility in functions of one dimension, 0 to 1.
     pub feasibility_additive_share: f64,
-    /// What is tried first.
+    /// The first action of a study.
     pub start: Start,
-    /// Scale of the noise of a preference, in units of utility.
+    /// Noise scale of preferences, in units of utility. All noise scales lie between 1e-3 and 1e3 prior standard
+    /// deviations.
     pub preference_noise: f64,
-    /// Scale of the noise of a label.
+    /// Noise scale of labels, in units of utility.
     pub ordinal_noise: f64,
-    /// Boundaries between the categories of labels, strictly increasing: one less than there are categories. The
-    /// default single 0 gives two categories, 0 not converged and 1 converged.
+    /// Thresholds between the categories of labels, in units of utility, strictly increasing; one less than the number
+    /// of categories. The default, a single 0, gives two categories: 0 not converged, 1 converged.
     pub ordinal_thresholds: Vec<f64>,
-    /// Scale of the noise of a suggestion.
+    /// Noise scale of suggestions, in units of utility.
     pub coactive_noise: f64,
-    /// Scale of the noise of a tie.
+    /// Noise scale of ties, in units of utility.
     pub tie_noise: f64,
-    /// Utilities closer than this are felt as equal.
+    /// Utilities that differ by less than this feel equal.
     pub tie_width: f64,
-    /// Learn lengthscales and preference noise from the evidence each time this many more actions were tried.
-    /// None: they stay as set.
+    /// Number of trials after which lengthscales and preference noise are learned again from the evidence. `None` keeps
+    /// them as set.
     pub learn_every: Option<usize>,
-    /// Region of avoidance: actions whose mean plus this many standard deviations does not reach the lowest
-    /// threshold are not proposed while others are left (ROIAL uses -0.45). Mean and deviation are those of the
-    /// function that labels are about. It binds every method but `random`. None: nothing is avoided.
+    /// Region of avoidance (ROIAL, Li et al. 2021): an action is not proposed if its mean plus this many standard
+    /// deviations is below the lowest threshold, unless no other action is left. ROIAL uses -0.45. Mean and deviation
+    /// are those of the function that labels are about. All methods but `random` respect it. `None` disables it.
     pub avoidance: Option<f64>,
-    /// Number `n` of actions proposed at a time: one batch.
+    /// Number `n` of actions in a batch, 1 to 1024.
     pub samples_per_iteration: usize,
-    /// Whether LineCoSpar may propose an action again, as published: rather one that is not among the buffered ones,
-    /// but where everything was tried it repeats instead of ending. The other methods never repeat.
+    /// Whether LineCoSpar may propose a visited action again, as published. It prefers actions outside the buffer. The
+    /// other methods never repeat.
     pub repeats: bool,
-    /// Number of random lines through the best action on which EUBO looks; 0 looks at the whole grid.
+    /// Number of random lines through the best action that EUBO searches. 0 means the whole grid.
     pub lines: usize,
-    /// Number of trials after which EUBO leaves the lines and looks at the whole grid.
+    /// Number of trials after which EUBO searches the whole grid instead of lines.
     pub line_trials: usize,
     /// Which earlier actions a new one is compared with.
     pub partner: Partner,
-    /// Number `b` of actions tried before a batch with which each of the batch is compared where the partner is
-    /// `previous`. The other partners do not use it.
+    /// Number `b` of actions before a batch with which each action of the batch is compared, at most 10,000. Only the
+    /// partner `previous` uses it.
     pub buffer: usize,
 }
 
@@ -165,7 +155,7 @@ impl Default for LearnerSettings {
 }
 
 impl LearnerSettings {
-    /// The recommended settings of a method; docs/benchmarks/learner.md has the measurements behind them.
+    /// The recommended settings of a method. `docs/benchmarks/learner.md` has the measurements behind them.
     pub fn of(method: Method) -> Self {
         match method {
             Method::Eubo => Self {
@@ -179,14 +169,14 @@ impl LearnerSettings {
         }
     }
 
-    /// EUBO for answers that may be wrong: it assumes much noise and a smooth utility, so that it leans on many answers
-    /// rather than on the last one, and never leaves the neighbourhood of the best.
+    /// EUBO for noisy feedback. Large noise and long lengthscales average over many comparisons, and the search stays
+    /// on lines through the best action.
     pub fn for_uncertain_answers() -> Self {
         Self { preference_noise: 0.8, lengthscale_factor: 2.0, line_trials: EVERY_TRIAL, ..Self::of(Method::Eubo) }
     }
 
-    /// The settings of a method as the literature has them: LineCoSpar may repeat actions and compares with the last
-    /// ones tried, EUBO looks at the whole grid with labels in the utility.
+    /// The published settings of a method. LineCoSpar may repeat actions and compares each with the previous ones. EUBO
+    /// searches the whole grid, with labels in the utility.
     pub fn published(method: Method) -> Self {
         let polar = Self {
             method,
@@ -229,21 +219,21 @@ impl LearnerSettings {
         }
     }
 
-    /// The utilities of a category of labels.
+    /// The interval of utilities of a category.
     pub(crate) fn label_interval(&self, category: usize) -> Interval {
         let bounds = &self.ordinal_thresholds;
         let low = category.checked_sub(1).and_then(|below| bounds.get(below)).copied().unwrap_or(f64::NEG_INFINITY);
         Interval { low, high: bounds.get(category).copied().unwrap_or(f64::INFINITY), noise: self.ordinal_noise }
     }
 
-    /// Where labels are separate, what a category says of feasibility: below the lowest threshold or above it.
+    /// With separate labels, the interval of feasibility of a category: below or above the lowest threshold.
     pub(crate) fn feasibility_interval(&self, category: usize) -> Interval {
         let lowest = self.label_interval(0);
         if category == 0 { lowest } else { Interval { low: lowest.high, high: f64::INFINITY, ..lowest } }
     }
 
-    /// Where labels are separate, what a category says of the utility: of several grades above the lowest category,
-    /// which one. None where it says nothing.
+    /// With separate labels, the interval of utilities of a category above 0. `None` if the category does not inform
+    /// the utility.
     pub(crate) fn grade_interval(&self, category: usize) -> Option<Interval> {
         let interval = self.label_interval(category);
         match category {
@@ -254,18 +244,18 @@ impl LearnerSettings {
         }
     }
 
-    /// Number of categories of labels.
+    /// Number of categories of labels: one more than the number of thresholds.
     pub fn categories(&self) -> usize {
         self.ordinal_thresholds.len() + 1
     }
 
-    /// Checks every number.
+    /// Checks every setting.
     ///
     /// # Errors
-    /// At the first setting outside its range.
+    /// [`LearnerError::InvalidSetting`] for the first setting that is out of range.
     pub fn validate(&self) -> Result<()> {
         let refuse = |setting, reason: String| Err(LearnerError::InvalidSetting { setting, reason });
-        let outside = |value: f64, low: f64, high: f64| format!("{value} is not between {low} and {high}");
+        let outside = |value: f64, low: f64, high: f64| format!("{value} is outside the range from {low} to {high}");
         for (setting, value, low, high) in [
             ("signal_variance", self.signal_variance, 1e-6, 1e6),
             ("nugget", self.nugget, 1e-10 * self.signal_variance, self.signal_variance),
@@ -280,7 +270,7 @@ impl LearnerSettings {
                 return refuse(setting, outside(value, low, high));
             }
         }
-        // Beyond these ratios an answer says everything or nothing, and double precision cannot tell.
+        // Beyond these ratios the likelihood is 0, 1 or constant in double precision.
         let deviation = self.signal_variance.sqrt();
         let (low, high) = (1e-3 * deviation, 1e3 * deviation);
         for (setting, value) in [
@@ -291,45 +281,55 @@ impl LearnerSettings {
             ("tie_width", self.tie_width),
         ] {
             if !(value >= low && value <= high) {
-                let reason = outside(value, low, high) + ", 1e-3 and 1e3 times the root of signal_variance";
+                let reason =
+                    outside(value, low, high) + ", which is 1e-3 to 1e3 times the square root of signal_variance";
                 return refuse(setting, reason);
             }
         }
         if self.learn_every == Some(0) {
-            return refuse("learn_every", "must be at least 1".into());
+            return refuse(
+                "learn_every",
+                "0 is not allowed; give at least 1, or null to keep the hyperparameters".into(),
+            );
         }
         if let Some(avoidance) = self.avoidance
             && (avoidance.is_nan() || avoidance.abs() > 1e3)
         {
-            return refuse("avoidance", format!("{avoidance} is not between -1000 and 1000"));
+            return refuse("avoidance", outside(avoidance, -1e3, 1e3));
         }
         if self.additive_share + self.pairwise_share > 1.0 {
-            return refuse("pairwise_share", "additive and pairwise shares together exceed 1".into());
+            return refuse(
+                "pairwise_share",
+                format!("{} plus additive_share {} is more than 1", self.pairwise_share, self.additive_share),
+            );
         }
         if self.inference == Inference::ExpectationPropagation && self.link != Link::Probit {
-            return refuse("link", "expectation propagation needs the probit link".into());
+            return refuse("link", "expectation propagation requires the probit link".into());
         }
         let farthest = 10.0 * deviation;
         if let Some(&threshold) = self.ordinal_thresholds.iter().find(|t| t.is_nan() || t.abs() > farthest) {
-            let reason = outside(threshold, -farthest, farthest) + ", ten times the root of signal_variance";
+            let reason = outside(threshold, -farthest, farthest) + ", ten times the square root of signal_variance";
             return refuse("ordinal_thresholds", reason);
         }
         let narrowest = 1e-3 * deviation;
         if let Some([below, above]) = self.ordinal_thresholds.array_windows().find(|[a, b]| b - a < narrowest) {
-            let reason = format!("{above} after {below} does not increase by {narrowest} or more");
+            let reason = format!("{above} must exceed the threshold before it, {below}, by at least {narrowest}");
             return refuse("ordinal_thresholds", reason);
         }
         if self.ordinal_thresholds.len() > 100 {
-            return refuse("ordinal_thresholds", "at most 100 thresholds are accepted".into());
+            return refuse(
+                "ordinal_thresholds",
+                format!("{} thresholds given, at most 100 are allowed", self.ordinal_thresholds.len()),
+            );
         }
         if !(1..=1024).contains(&self.samples_per_iteration) {
             return refuse(
                 "samples_per_iteration",
-                format!("{} is not between 1 and 1024", self.samples_per_iteration),
+                format!("{} is outside the range from 1 to 1024", self.samples_per_iteration),
             );
         }
         if self.buffer > 10_000 {
-            return refuse("buffer", format!("{} is more than 10000", self.buffer));
+            return refuse("buffer", format!("{} is outside the range from 0 to 10000", self.buffer));
         }
         Ok(())
     }

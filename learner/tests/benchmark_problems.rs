@@ -1,4 +1,4 @@
-//! The benchmark problems are the published ones: check values of their definition.
+//! The benchmark problems match check values of their definition.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs, unreachable_pub, dead_code)]
 
@@ -9,7 +9,7 @@ use gait_learner::ActionIndex;
 use problems::{Problem, hartmann_maximum};
 
 #[test]
-fn table1_has_its_check_values() {
+fn table1_matches_its_check_values() {
     let expected = [
         (2656, [0, 1, 1, 0, 1, 1, 0, 1], 4377.498987, 20),
         (8071, [1, 1, 0, 1, 1, 2, 2, 1], 4127.228589, 6),
@@ -30,7 +30,7 @@ fn table1_has_its_check_values() {
 }
 
 #[test]
-fn hartmann_grids_have_their_maxima() {
+fn hartmann_grids_match_their_maxima() {
     let (raw, at) = hartmann_maximum(3);
     assert!((raw - 3.8610).abs() < 5e-5 && at.iter().zip([0.1, 0.55, 0.85]).all(|(a, b)| (a - b).abs() < 1e-9));
     let (raw, at) = hartmann_maximum(6);

@@ -1,5 +1,5 @@
-//! Every setting and every space inside the ranges that are accepted gives a finite belief and a proposal; what is
-//! outside is refused by name. Nothing ends in a numerical error.
+//! All settings and search spaces within the valid ranges give a finite posterior and a proposal, without numerical
+//! errors.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
@@ -10,7 +10,7 @@ use gait_learner::{
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// A number whose logarithm is uniform, the ends among the likeliest.
+/// A log-uniform number; the ends of the range have positive probability.
 fn decades(low: f64, high: f64) -> impl Strategy<Value = f64> {
     let (from, to) = (low.log10(), high.log10());
     prop_oneof![
@@ -43,7 +43,7 @@ fn any_space() -> impl Strategy<Value = SearchSpace> {
     })
 }
 
-/// Settings with every number anywhere in its range.
+/// Settings with every number somewhere in its range.
 fn any_settings() -> impl Strategy<Value = LearnerSettings> {
     let methods =
         select(vec![Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random]);
@@ -96,7 +96,7 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
     })
 }
 
-/// An answer about any two of the actions and any category.
+/// The draws from which [`feedback`] makes a piece of feedback.
 fn any_feedback() -> impl Strategy<Value = (u8, u64, u64, usize)> {
     (0_u8..5, any::<u64>(), any::<u64>(), 0_usize..4)
 }
@@ -117,33 +117,33 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn nothing_that_is_accepted_ends_in_a_numerical_error(
+    fn valid_input_never_ends_in_a_numerical_error(
         space in any_space(),
         settings in any_settings(),
         answers in prop::collection::vec(any_feedback(), 0..40),
-        tried in prop::collection::vec(any::<u64>(), 0..12),
+        visited in prop::collection::vec(any::<u64>(), 0..12),
     ) {
         settings.validate().unwrap();
         let log = FeedbackLog {
-            visited: tried.into_iter().map(|action| ActionIndex(action % space.len())).collect(),
+            visited: visited.into_iter().map(|action| ActionIndex(action % space.len())).collect(),
             feedback: answers.into_iter().filter_map(|draw| feedback(&space, &settings, draw)).collect(),
         };
-        let belief = match posterior(&space, &log, &settings) {
-            Ok(belief) => belief,
+        let posterior = match posterior(&space, &log, &settings) {
+            Ok(posterior) => posterior,
             Err(error) => panic!("{error} {settings:?}"),
         };
         for action in (0..space.len()).step_by(7).map(ActionIndex) {
-            let prediction = belief.predict(action).unwrap();
+            let prediction = posterior.predict(action).unwrap();
             prop_assert!(prediction.mean.is_finite() && prediction.standard_deviation.is_finite());
-            let categories = belief.category_probabilities(action).unwrap();
+            let categories = posterior.category_probabilities(action).unwrap();
             prop_assert!(categories.iter().all(|p| (0.0..=1.0).contains(p)), "{:?}", categories);
         }
         for result in [
             propose(&space, &log, &[], &settings, 1).map(drop),
             propose_batch(&space, &log, &[], &settings, 1).map(drop),
             what_to_ask(&space, &log, &settings).map(drop),
-            belief.best_of_visited(5, 1).map(drop),
-            belief.best_of_grid(2, 1).map(drop),
+            posterior.best_of_visited(5, 1).map(drop),
+            posterior.best_of_grid(2, 1).map(drop),
         ] {
             match result {
                 Ok(()) | Err(LearnerError::Exhausted { .. }) => {}

@@ -1,4 +1,4 @@
-//! The summary of the benchmark's rows: medians, intervals and paired tests against known values.
+//! The statistics of the regret benchmark match known values.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs, unreachable_pub, dead_code)]
 
@@ -17,7 +17,7 @@ fn by_seed(values: &[f64]) -> BTreeMap<u64, f64> {
 }
 
 #[test]
-fn paired_tests_have_their_known_values() {
+fn paired_tests_match_known_values() {
     // Differences -8 .. -3 and 1, 2: ranks 1 and 2 are positive.
     let first = [-8.0, -7.0, -6.0, -5.0, -4.0, -3.0, 1.0, 2.0, 0.0];
     let result = paired(&by_seed(&first), &by_seed(&[0.0; 9]));
@@ -28,14 +28,14 @@ fn paired_tests_have_their_known_values() {
     assert!((result.wilcoxon - 0.035_692).abs() < 1e-4, "{result:?}");
     let same = paired(&by_seed(&first), &by_seed(&first));
     assert_eq!((same.lower, same.higher, same.sign, same.wilcoxon), (0, 0, 1.0, 1.0));
-    // Ties share their ranks: two of 1.5 against two of 3.5.
+    // Ties share their ranks: two of 1.5 and two of 3.5.
     let tied = paired(&by_seed(&[1.0, 1.0, -2.0, -2.0]), &by_seed(&[0.0; 4]));
     let z = 2.0 / (4.0_f64 * 5.0 * 9.0 / 24.0 - 12.0 / 48.0).sqrt();
     assert!((tied.wilcoxon - libm::erfc(z / 2.0_f64.sqrt())).abs() < 1e-12, "{tied:?}");
 }
 
 #[test]
-fn medians_and_their_intervals() {
+fn median_interval_matches_the_binomial_distribution() {
     let sorted: Vec<f64> = (0..101).map(f64::from).collect();
     assert_eq!([0.25, 0.5, 0.75].map(|share| quantile(&sorted, share)), [25.0, 50.0, 75.0]);
     assert_eq!(quantile(&[1.0, 2.0], 0.5), 1.5);
@@ -47,7 +47,7 @@ fn medians_and_their_intervals() {
 }
 
 #[test]
-fn rows_are_read_and_reported_and_nonsense_is_refused() {
+fn rows_are_summarised_and_malformed_rows_rejected() {
     let rows = |offset: f64| {
         let mut text = String::from("method,seed,k,regret\n");
         for seed in 200..210 {

@@ -1,10 +1,10 @@
-//! The study that the benches measure.
+//! The study that both benchmarks measure.
 
 use std::hint::black_box;
 
 use gait_learner::{ActionIndex, Dimension, Feedback, FeedbackLog, Posterior, SearchSpace};
 
-/// Table I's grid of 11,664 actions.
+/// The grid of Table I: 11,664 actions.
 pub fn space() -> SearchSpace {
     let dimensions = [2, 3, 3, 3, 4, 6, 3, 3]
         .iter()
@@ -18,7 +18,7 @@ pub fn space() -> SearchSpace {
     SearchSpace::new(dimensions).expect("valid")
 }
 
-/// A study in which the actions tried approach an optimum, as they do, each compared with the best so far.
+/// The log of a study whose actions approach an optimum, each compared with the best so far.
 pub fn study(space: &SearchSpace, comparisons: usize) -> FeedbackLog {
     let mut state = 12345_u64;
     let mut random = move || {
@@ -59,7 +59,7 @@ pub fn study(space: &SearchSpace, comparisons: usize) -> FeedbackLog {
     log
 }
 
-/// The log before the last action.
+/// The log without its last action.
 pub fn earlier(log: &FeedbackLog) -> FeedbackLog {
     FeedbackLog {
         visited: log.visited[..log.visited.len() - 1].to_vec(),
@@ -67,9 +67,8 @@ pub fn earlier(log: &FeedbackLog) -> FeedbackLog {
     }
 }
 
-/// What a page about a study shows: every dimension's marginal, a slice, the actions tried by their probability of
-/// being the best from 1,000 joint draws, how likely each is to converge and to be preferred to the best, and how far
-/// the model agrees with the answers.
+/// The computations of a study page: marginals, a slice, the best action from 1,000 joint samples, the probabilities of
+/// convergence and preference of each visited action, and the agreement with the feedback.
 pub fn page(belief: &Posterior) {
     let best = belief.best().expect("tried");
     for dimension in 0..belief.space().dimensions().len() {

@@ -1,4 +1,4 @@
-//! Simple regret of a method over seeded benchmark problems.
+//! Simple regret of a method on seeded benchmark problems.
 //!
 //! ```text
 //! cargo run --release -p gait-learner --example regret -- --problem table1|hart3|hart6 --seeds A..B --method NAME
@@ -6,15 +6,16 @@
 //! cargo run --release -p gait-learner --example regret -- --summarise FILE.csv...
 //! ```
 //!
-//! NAME is `random` (the winner stays), a method (`linecospar`, `eubo`, `thompson`, `information_gain`) with its
-//! recommended settings, a method with `_published` settings, or `eubo_uncertain` (EUBO for answers that may be wrong).
-//! Writes `method,seed,k,regret`, `k` comparisons having been answered (`k + 1` actions tried), and prints the quartiles.
-//! `--noise S` answers with logistic noise of scale `S` on the utility. `--batch N` proposes `N` actions before the first
-//! of them is answered. `--set` changes settings of the method. Regret is 1 minus the utility of the recommended action.
-//! `--seeds A..B` does not include `B`.
+//! NAME is `random` (random actions, the winner is recommended), a method (`linecospar`, `eubo`, `thompson`,
+//! `information_gain`) with recommended settings, a method with the suffix `_published`, or `eubo_uncertain` (EUBO for
+//! noisy feedback).
 //!
-//! `--summarise` reads such files: medians with bootstrap intervals and quartiles, and, of every further file against
-//! the first, how many seeds were better and worse with the p-values of the paired sign test and of Wilcoxon's.
+//! Writes rows `method,seed,k,regret`: regret after `k` comparisons, that is `k + 1` visited actions. Prints quartiles.
+//! Regret is 1 minus the utility of the recommended action. `--noise S` adds logistic noise of scale `S` to the
+//! utility. `--batch N` proposes `N` actions at a time. `--set` changes settings. `--seeds A..B` excludes `B`.
+//!
+//! `--summarise` reads such files. It prints medians with bootstrap intervals and quartiles. It compares each further
+//! file with the first one, by seed: wins, losses, and p-values of the sign test and of Wilcoxon's signed-rank test.
 
 #![allow(clippy::expect_used, unreachable_pub, missing_docs)]
 
@@ -43,11 +44,11 @@ struct Options {
     out: Option<String>,
 }
 
-/// A finite number that is not below the least one that makes sense.
+/// Parses a finite number of at least `least`.
 fn number(name: &str, value: &str, least: f64) -> Result<f64, String> {
     match value.parse::<f64>() {
         Ok(number) if number.is_finite() && number >= least => Ok(number),
-        _ => Err(format!("{name} needs a number of at least {least}, not {value}")),
+        _ => Err(format!("{name}: {value} is not a number of at least {least}")),
     }
 }
 
@@ -72,7 +73,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
                 let (from, to) = value.split_once("..").ok_or("--seeds needs A..B")?;
                 options.seeds = from.parse()?..to.parse()?;
                 if options.seeds.is_empty() {
-                    return Err(format!("--seeds {value} holds no seed: B is the first one left out").into());
+                    return Err(format!("--seeds {value} is empty: A..B excludes B").into());
                 }
             }
             "--method" => options.method = value,
@@ -88,7 +89,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
     Ok(options)
 }
 
-/// The settings of a method with the changes asked for.
+/// The settings of the method with the changes of `--set`.
 fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
     let mut document = if options.method == "eubo_uncertain" {
         serde_json::to_value(LearnerSettings::for_uncertain_answers())?
@@ -101,7 +102,7 @@ fn settings(options: &Options) -> Result<LearnerSettings, Box<dyn Error>> {
     Ok(serde_json::from_value(document)?)
 }
 
-/// Prints the summary of files.
+/// Prints the summary of the files.
 fn summarise(files: &[String]) -> Result<(), Box<dyn Error>> {
     let curves = files
         .iter()

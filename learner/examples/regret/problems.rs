@@ -1,21 +1,21 @@
 //! Benchmark problems: finite grids with a known utility.
 //!
-//! `table1(seed)` is a synthetic stand-in for tuning the constraint bounds of Table I of Li et al. 2022 (11,664
-//! actions, 35 % of which do not converge); its only randomness is splitmix64, so that any language can rebuild it.
-//! `hart3` and `hart6` are the Hartmann functions on the grids of POLAR's examples.
+//! `table1(seed)` is a synthetic model of tuning the constraint bounds of Table I of Li et al. 2022: 11,664 actions, of
+//! which 35 % do not converge. It uses splitmix64 only, so that other languages can reproduce it. `hart3` and `hart6`
+//! are the Hartmann functions on the grids of POLAR's examples.
 
 use gait_learner::{ActionIndex, Dimension, SearchSpace};
 
 /// A grid with the utility of every action in `[0, 1]`.
 pub struct Problem {
     pub space: SearchSpace,
-    /// Utility; 0 where the action does not converge.
+    /// Utility of each action; 0 if it does not converge.
     pub utility: Vec<f64>,
     pub converged: Vec<bool>,
 }
 
 impl Problem {
-    /// The problem of a name; `lengthscale` replaces its usual one (in the unit of the values).
+    /// The problem with this name. `lengthscale`, in the unit of the values, replaces the default.
     pub fn named(name: &str, seed: u64, lengthscale: Option<f64>) -> Option<Self> {
         match name {
             "table1" => Some(table1(seed, lengthscale.unwrap_or(1.0))),
@@ -31,7 +31,7 @@ impl Problem {
     }
 }
 
-/// The generator of the problems' definition.
+/// splitmix64, the random generator of the definition.
 pub struct SplitMix64(pub u64);
 
 impl SplitMix64 {
@@ -173,7 +173,7 @@ fn hartmann<const D: usize>(n: usize, a: &[[f64; D]; 4], p: &[[f64; D]; 4], leng
     Problem { space, utility, converged }
 }
 
-/// For the tests of the definition: the grid maximum of the raw Hartmann function in 3 or 6 dimensions, with where it is.
+/// The maximum of the raw Hartmann function in 3 or 6 dimensions over the grid, and its position.
 #[allow(dead_code)]
 pub fn hartmann_maximum(dimensions: usize) -> (f64, Vec<f64>) {
     let problem = if dimensions == 3 { hartmann(21, &A3, &P3, 0.1) } else { hartmann(6, &A6, &P6, 0.1) };

@@ -1,10 +1,10 @@
-//! A person who answers, and the regret of what is recommended to them.
+//! Simulated studies: a person with a known utility, and the regret of the recommended action.
 
 use gait_learner::{ActionIndex, Feedback, FeedbackLog, Learner, LearnerError, LearnerSettings};
 
 use crate::problems::{Problem, SplitMix64};
 
-/// Somebody who knows the utility and answers with noise.
+/// A simulated person who answers comparisons by a known utility with noise.
 pub struct Person<'a> {
     problem: &'a Problem,
     /// Scale of the logistic noise on the utility; 0 answers exactly.
@@ -18,7 +18,7 @@ impl<'a> Person<'a> {
         Self { problem, noise, seed, random: SplitMix64(seed ^ 0x005E_ED0F_A17E) }
     }
 
-    /// Which of two is better; nothing when neither converges or they are equal.
+    /// The answer to a comparison. `None` if neither action converges or their utilities are equal.
     fn compare(&mut self, a: ActionIndex, b: ActionIndex) -> Option<Feedback> {
         let ((ua, ca), (ub, cb)) = (self.problem.of(a), self.problem.of(b));
         let first = match (ca, cb) {
@@ -34,7 +34,7 @@ impl<'a> Person<'a> {
     }
 }
 
-/// Regret after 0, 1, ... comparisons, `batch` actions being proposed before the first of them is answered.
+/// Regret after 0, 1, ... comparisons, with `batch` actions proposed at a time.
 pub fn run(
     mut person: Person<'_>,
     settings: &LearnerSettings,
@@ -60,7 +60,7 @@ pub fn run(
             log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
             log.visited.push(action);
             let best = learner.posterior(&problem.space, &log, settings)?.best();
-            // Something was tried, so there is a best.
+            // An action has been visited, so there is a best one.
             regrets.push(best.map_or(1.0, |best| 1.0 - problem.of(best).0));
         }
     }
@@ -68,7 +68,7 @@ pub fn run(
     Ok(regrets)
 }
 
-/// Random search: the winner stays.
+/// Random search: each action is compared with the best so far.
 pub fn champion(mut person: Person<'_>, comparisons: usize) -> Vec<f64> {
     let problem = person.problem;
     let mut random = SplitMix64(person.seed.wrapping_mul(31).wrapping_add(7));

@@ -1,15 +1,15 @@
-//! Medians with their uncertainty, and paired comparisons of methods, from the rows that a run writes.
+//! Medians with confidence intervals, and paired comparisons of methods, from the rows of runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::problems::SplitMix64;
 
-/// The regret of each seed after each number of comparisons.
+/// Regret of each seed after each number of comparisons.
 #[derive(Debug, Default, PartialEq)]
 pub struct Curves(pub BTreeMap<u64, BTreeMap<usize, f64>>);
 
 impl Curves {
-    /// Reads `method,seed,k,regret` with its header; the line and reason of the first row that is something else.
+    /// Reads rows `method,seed,k,regret` with their header. The error names the first invalid line and the reason.
     pub fn read(text: &str) -> Result<Self, String> {
         let mut curves = Self::default();
         let mut lines = text.lines().enumerate();
@@ -32,18 +32,18 @@ impl Curves {
         Ok(curves)
     }
 
-    /// Regret of every seed that has got so far, with the seed.
+    /// Regret after `k` comparisons, by seed.
     pub fn at(&self, k: usize) -> BTreeMap<u64, f64> {
         self.0.iter().filter_map(|(&seed, curve)| curve.get(&k).map(|&regret| (seed, regret))).collect()
     }
 
-    /// Of the usual numbers of comparisons, the ones that occur.
+    /// The reported numbers of comparisons that the rows have.
     pub fn milestones(&self) -> BTreeSet<usize> {
         [10, 20, 30, 50, 75, 100].into_iter().filter(|&k| !self.at(k).is_empty()).collect()
     }
 }
 
-/// A quantile by linear interpolation; 0 of nothing.
+/// A quantile by linear interpolation; 0 for an empty slice.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
     let at = share * last as f64;
@@ -52,10 +52,10 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[i] + at.fract() * (sorted[(i + 1).min(last)] - sorted[i])
 }
 
-/// Resamples of a bootstrap.
+/// Number of bootstrap resamples.
 const RESAMPLES: usize = 4000;
 
-/// Interval that holds the median with 95 %, by the percentiles of resampled medians; the same every time.
+/// 95 % confidence interval of the median, by the percentile bootstrap with a fixed seed.
 pub fn median_interval(values: &[f64]) -> [f64; 2] {
     let mut random = SplitMix64(20220314);
     let mut medians: Vec<f64> = (0..RESAMPLES)
@@ -69,18 +69,18 @@ pub fn median_interval(values: &[f64]) -> [f64; 2] {
     [quantile(&medians, 0.025), quantile(&medians, 0.975)]
 }
 
-/// A paired comparison: seeds on which the first is lower, on which it is higher, and two-sided p-values.
+/// A paired comparison: numbers of seeds with a lower and a higher first value, and two-sided p-values.
 #[derive(Debug, PartialEq)]
 pub struct Paired {
     pub lower: usize,
     pub higher: usize,
     /// Exact sign test.
     pub sign: f64,
-    /// Wilcoxon's signed ranks, normal approximation with ties; equal pairs are left out.
+    /// Wilcoxon's signed-rank test: normal approximation with ties, without equal pairs.
     pub wilcoxon: f64,
 }
 
-/// Compares what two methods reached on the seeds that both have.
+/// Compares two methods on their common seeds.
 pub fn paired(first: &BTreeMap<u64, f64>, second: &BTreeMap<u64, f64>) -> Paired {
     let differences: Vec<f64> = first
         .iter()
@@ -92,10 +92,10 @@ pub fn paired(first: &BTreeMap<u64, f64>, second: &BTreeMap<u64, f64>) -> Paired
     Paired { lower, higher, sign: sign_test(lower, higher), wilcoxon: signed_ranks(&differences) }
 }
 
-/// Probability that fair coins fall at least as unevenly.
+/// Two-sided p-value of the exact sign test.
 fn sign_test(lower: usize, higher: usize) -> f64 {
     let n = lower + higher;
-    // ln of n choose k, added up from k = 0.
+    // Logarithm of the binomial coefficient, updated from k = 0.
     let mut ln_choose = 0.0;
     let mut tail = 0.0;
     for k in 0..=lower.min(higher) {
@@ -127,7 +127,7 @@ fn signed_ranks(differences: &[f64]) -> f64 {
     libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// The tables of some files, the first of which the others are compared with.
+/// The summary of some files; the first one is the reference of the comparisons.
 pub fn report(files: &[(String, Curves)]) -> String {
     use std::fmt::Write;
     let mut text = String::new();

@@ -1,40 +1,41 @@
-//! The region of avoidance of ROIAL: actions that are too likely to be labelled with the lowest category.
+//! The region of avoidance of ROIAL (Li et al. 2021): actions that are too likely to get the lowest label.
 //!
-//! An action is avoided while its mean, plus a number of standard deviations (negative: minus), does not reach the
-//! lowest threshold of the labels. The mean is that of the function that labels are about: the utility, or
-//! feasibility where labels are separate.
+//! An action is inside the region if `mean + deviations sd` is not above the lowest threshold of the labels. Mean and
+//! standard deviation are those of the function that labels are about: the utility, or feasibility with separate
+//! labels.
 
-use crate::belief::Belief;
+use crate::action::ActionIndex;
+use crate::gaussian_process::GaussianProcess;
 use crate::posterior::Posterior;
-use crate::space::{ActionIndex, SearchSpace};
+use crate::search_space::SearchSpace;
 
-/// What an action must reach to be proposed.
+/// The test for the region of avoidance.
 pub(crate) struct Avoidance<'a> {
     space: &'a SearchSpace,
-    belief: &'a Belief,
+    process: &'a GaussianProcess,
     deviations: f64,
     threshold: f64,
 }
 
 impl<'a> Avoidance<'a> {
-    /// None when the settings avoid nothing.
-    pub(crate) fn of(belief: &'a Posterior) -> Option<Self> {
-        let settings = belief.settings();
+    /// `None` if the settings have no region of avoidance.
+    pub(crate) fn of(posterior: &'a Posterior) -> Option<Self> {
+        let settings = posterior.settings();
         Some(Self {
-            space: belief.space(),
-            belief: belief.feasibility.as_ref().unwrap_or(&belief.utility),
+            space: posterior.space(),
+            process: posterior.feasibility.as_ref().unwrap_or(&posterior.utility),
             deviations: settings.avoidance?,
             threshold: *settings.ordinal_thresholds.first()?,
         })
     }
 
-    /// Whether an action lies outside the region.
+    /// Whether an action is outside the region.
     pub(crate) fn allows(&self, action: ActionIndex) -> bool {
-        let view = self.belief.view(action, self.space.levels(action));
-        view.mean + self.deviations * self.belief.variance(&view).sqrt() > self.threshold
+        let view = self.process.view(action, self.space.levels(action));
+        view.mean + self.deviations * self.process.variance(&view).sqrt() > self.threshold
     }
 
-    /// Whether an action with this mean certainly lies inside.
+    /// A cheap sufficient test that an action with this mean is inside the region.
     pub(crate) fn rules_out(&self, mean: f64) -> bool {
         self.deviations <= 0.0 && mean <= self.threshold
     }

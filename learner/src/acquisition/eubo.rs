@@ -1,25 +1,32 @@
-//! Expected utility of the best option, against the incumbent, over the whole grid.
+//! Expected utility of the best option (EUBO, Lin et al. 2022): the better of an action and the incumbent.
 //!
-//! `E max(f(x), f(b)) - E f(b) = d Phi(d/s) + s phi(d/s)`, `d` and `s` the mean and standard deviation of
-//! `f(x) - f(b)`. The variance of an action costs `O(n^2)`, everything else `O(n)`: an upper bound of the variance
-//! ranks the actions, and the exact value is computed in that order until no bound exceeds the best value found. The
-//! result is the exact maximiser.
+//! `E max(f(x), f(b)) - E f(b) = d Phi(d/s) + s phi(d/s)`, with `d` and `s` the mean and standard deviation of
+//! `f(x) - f(b)`, `b` the incumbent. The variance of an action costs `O(n^2)`, everything else `O(n)`. Therefore the
+//! search ranks the actions by an upper bound and computes exact values in that order, until no bound exceeds the best
+//! value. The result is the exact maximiser over the grid.
 
 use std::collections::HashSet;
 
 use crate::acquisition::avoidance::Avoidance;
-use crate::belief::Belief;
-use crate::grid::Grid;
+use crate::acquisition::candidates::{highest, near_best_or_random};
+use crate::acquisition::line;
+use crate::action::ActionIndex;
+use crate::gaussian_process::GaussianProcess;
 use crate::linalg::BLOCK;
-use crate::math;
 use crate::posterior::Posterior;
-use crate::space::{ActionIndex, SearchSpace};
+use crate::random::Random;
+use crate::search_space::SearchSpace;
+use crate::special_functions;
+use crate::whole_grid::WholeGrid;
+
+/// Number of candidates if the grid is too large to evaluate.
+const CANDIDATES: usize = 2000;
 
 /// `E max(X, 0)` for `X` normal with the given mean and variance.
-pub(crate) fn expected_gain(mean: f64, variance: f64) -> f64 {
+fn expected_gain(mean: f64, variance: f64) -> f64 {
     let sd = variance.max(1e-18).sqrt();
     let z = mean / sd;
-    mean * math::normal_cdf(z) + sd * math::normal_density(z)
+    mean * special_functions::normal_cdf(z) + sd * special_functions::normal_density(z)
 }
 
 /// Upper bounds of [`expected_gain`] by linear interpolation of the convex `h(z) = z Phi(z) + phi(z)`.
@@ -34,13 +41,13 @@ impl GainBound {
     fn new() -> Self {
         let h = |i: u32| {
             let z = f64::from(i) / Self::STEPS - Self::REACH;
-            z * math::normal_cdf(z) + math::normal_density(z)
+            z * special_functions::normal_cdf(z) + special_functions::normal_density(z)
         };
         Self { table: (0..=512).map(h).collect() }
     }
 
     fn of(&self, mean: f64, variance: f64) -> f64 {
-        // A little more than the variance covers its rounding.
+        // The increment covers the rounding error of the variance.
         let sd = (variance.max(0.0) + 1e-9).sqrt();
         let at = (mean / sd + Self::REACH) * Self::STEPS;
         if at >= 511.0 {
@@ -54,14 +61,14 @@ impl GainBound {
     }
 }
 
-/// Upper bounds of the normal distribution function left of 0, where it is convex, by linear interpolation.
+/// Upper bounds of the standard normal distribution function by linear interpolation left of 0, where it is convex.
 struct ProbabilityBound {
     table: Vec<f64>,
 }
 
 impl ProbabilityBound {
     fn new() -> Self {
-        let at = |i: u32| math::normal_cdf(f64::from(i) / GainBound::STEPS - GainBound::REACH);
+        let at = |i: u32| special_functions::normal_cdf(f64::from(i) / GainBound::STEPS - GainBound::REACH);
         Self { table: (0..=256).map(at).collect() }
     }
 
@@ -73,14 +80,14 @@ impl ProbabilityBound {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 0..255")]
         let i = at as usize;
         let weight = at - i as f64;
-        // A little more covers the rounding of the interpolation.
+        // The factor covers the rounding error of the interpolation.
         (self.table[i] + weight * (self.table[i + 1] - self.table[i])) * (1.0 + 1e-12)
     }
 }
 
-/// The utility of every action beside the incumbent's.
+/// Moments of the difference between every action and the incumbent.
 struct Duel<'a> {
-    grid: Grid<'a>,
+    grid: WholeGrid<'a>,
     incumbent_mean: f64,
     incumbent_variance: f64,
     means: Vec<f64>,
@@ -88,24 +95,24 @@ struct Duel<'a> {
     covariances: Vec<f64>,
     /// Prior covariances with the incumbent.
     prior: Vec<f64>,
-    /// Prior variance that answers removed from the incumbent.
+    /// Reduction of the incumbent's variance by its observations.
     spent: f64,
-    /// What knowing the utility of each pending action would take from every standard deviation: squares add up.
+    /// For each pending action, a vector over the grid whose squares its observation would subtract from the variances.
     pending: Vec<Vec<f64>>,
 }
 
 impl<'a> Duel<'a> {
-    fn new(space: &SearchSpace, belief: &'a Belief, best: ActionIndex, pending: &[ActionIndex]) -> Self {
-        let grid = Grid::new(space, belief);
-        let view = belief.view(best, space.levels(best));
-        let incumbent_variance = belief.variance(&view);
+    fn new(space: &SearchSpace, process: &'a GaussianProcess, best: ActionIndex, pending: &[ActionIndex]) -> Self {
+        let grid = WholeGrid::new(space, process);
+        let view = process.view(best, space.levels(best));
+        let incumbent_variance = process.variance(&view);
         let prior = grid.prior_with(space, best);
-        let means = grid.form(&belief.approximation().weights);
-        let mut covariances = grid.form(&belief.covariance_weights(&view));
+        let means = grid.form(&process.approximation().weights);
+        let mut covariances = grid.form(&process.covariance_weights(&view));
         for (covariance, prior) in covariances.iter_mut().zip(&prior) {
             *covariance += prior;
         }
-        let spent = (belief.kernel.variance + belief.kernel.nugget - incumbent_variance).max(1e-12);
+        let spent = (process.kernel.variance + process.kernel.nugget - incumbent_variance).max(1e-12);
         let mut duel = Self {
             grid,
             incumbent_mean: view.mean,
@@ -117,21 +124,27 @@ impl<'a> Duel<'a> {
             pending: Vec::new(),
         };
         for &action in pending {
-            duel.suppose_known(space, belief, action, best);
+            duel.suppose_known(space, process, action, best);
         }
         duel
     }
 
-    /// Conditions variances and covariances on the utility of a pending action.
-    fn suppose_known(&mut self, space: &SearchSpace, belief: &Belief, action: ActionIndex, best: ActionIndex) {
+    /// Conditions variances and covariances on the utility of a pending action. Means stay as they are.
+    fn suppose_known(
+        &mut self,
+        space: &SearchSpace,
+        process: &GaussianProcess,
+        action: ActionIndex,
+        best: ActionIndex,
+    ) {
         let (Ok(at), Ok(incumbent)) = (usize::try_from(action.0), usize::try_from(best.0)) else { return };
-        let view = belief.view(action, space.levels(action));
-        let weights = belief.covariance_weights(&view);
+        let view = process.view(action, space.levels(action));
+        let weights = process.covariance_weights(&view);
         let mut column = self.grid.form(&weights);
         for (value, prior) in column.iter_mut().zip(self.grid.prior_with(space, action)) {
             *value += prior;
         }
-        let mut variance = belief.variance(&view) + belief.kernel.nugget;
+        let mut variance = process.variance(&view) + process.kernel.nugget;
         for earlier in &self.pending {
             let own = earlier[at];
             variance -= own * own;
@@ -139,7 +152,7 @@ impl<'a> Duel<'a> {
                 *value -= own * r;
             }
         }
-        let sd = variance.max(belief.kernel.nugget).sqrt();
+        let sd = variance.max(process.kernel.nugget).sqrt();
         for value in &mut column {
             *value /= sd;
         }
@@ -151,21 +164,22 @@ impl<'a> Duel<'a> {
         self.pending.push(column);
     }
 
-    fn supposed(&self, x: usize) -> f64 {
+    /// Reduction of an action's variance by the pending actions.
+    fn pending_reduction(&self, x: usize) -> f64 {
         self.pending.iter().map(|r| r[x] * r[x]).sum()
     }
 
-    /// Mean of the difference to the incumbent.
+    /// Mean of the difference.
     fn lead(&self, x: usize) -> f64 {
         self.means[x] - self.incumbent_mean
     }
 
     /// Variance of the difference, given the action's own variance.
     fn variance(&self, x: usize, own: f64) -> f64 {
-        (own - self.supposed(x) + self.incumbent_variance - 2.0 * self.covariances[x]).max(0.0)
+        (own - self.pending_reduction(x) + self.incumbent_variance - 2.0 * self.covariances[x]).max(0.0)
     }
 
-    /// At least the action's own variance: Cauchy-Schwarz gives what the answers about the incumbent removed.
+    /// Upper bound of the action's own variance. The Cauchy-Schwarz inequality bounds the reduction from below.
     fn variance_bound(&self, x: usize, total: f64) -> f64 {
         if !self.pending.is_empty() {
             return total;
@@ -174,9 +188,9 @@ impl<'a> Duel<'a> {
     }
 }
 
-/// The probability of every action to be feasible.
+/// Probability that an action is feasible.
 struct Chance<'a> {
-    grid: Grid<'a>,
+    grid: WholeGrid<'a>,
     means: Vec<f64>,
     threshold: f64,
     prior_sd: f64,
@@ -184,10 +198,10 @@ struct Chance<'a> {
 }
 
 impl<'a> Chance<'a> {
-    fn new(space: &SearchSpace, belief: &'a Belief, threshold: f64) -> Self {
-        let grid = Grid::new(space, belief);
-        let means = grid.form(&belief.approximation().weights);
-        Self { grid, means, threshold, prior_sd: belief.kernel.variance.sqrt(), bounds: ProbabilityBound::new() }
+    fn new(space: &SearchSpace, process: &'a GaussianProcess, threshold: f64) -> Self {
+        let grid = WholeGrid::new(space, process);
+        let means = grid.form(&process.approximation().weights);
+        Self { grid, means, threshold, prior_sd: process.kernel.variance.sqrt(), bounds: ProbabilityBound::new() }
     }
 
     fn bound(&self, x: usize) -> f64 {
@@ -196,44 +210,48 @@ impl<'a> Chance<'a> {
 
     fn of(&self, actions: &[usize]) -> Vec<f64> {
         let variances = self.grid.variances(actions);
-        let chance = |(&x, v): (&usize, f64)| math::normal_cdf((self.means[x] - self.threshold) / v.max(1e-12).sqrt());
+        let chance = |(&x, v): (&usize, f64)| {
+            special_functions::normal_cdf((self.means[x] - self.threshold) / v.max(1e-12).sqrt())
+        };
         actions.iter().zip(variances).map(chance).collect()
     }
 }
 
-/// The action outside `taken` with the highest expected utility of the better of it and `best`, times its
-/// probability of being feasible where that is a function of its own. `among` restricts the search; the utilities of
-/// `pending` actions are supposed to become known. Actions in the region of avoidance only where nothing else is left.
+/// The action outside `taken` that maximises EUBO against `best`, times the probability that it is feasible if labels
+/// are separate.
+///
+/// `among` restricts the search. The utilities of `pending` actions count as known. The region of avoidance is searched
+/// only if nothing else is left.
 pub(crate) fn against(
-    belief: &Posterior,
+    posterior: &Posterior,
     best: ActionIndex,
     taken: &HashSet<ActionIndex>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
-    let avoidance = Avoidance::of(belief);
-    let found = maximiser(belief, best, taken, pending, among, avoidance.as_ref());
+    let avoidance = Avoidance::of(posterior);
+    let found = maximiser(posterior, best, taken, pending, among, avoidance.as_ref());
     if found.is_none() && avoidance.is_some() {
-        return maximiser(belief, best, taken, pending, among, None);
+        return maximiser(posterior, best, taken, pending, among, None);
     }
     found
 }
 
 fn maximiser(
-    belief: &Posterior,
+    posterior: &Posterior,
     best: ActionIndex,
     taken: &HashSet<ActionIndex>,
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
     avoidance: Option<&Avoidance<'_>>,
 ) -> Option<ActionIndex> {
-    let space = belief.space();
-    let duel = Duel::new(space, &belief.utility, best, pending);
-    let threshold = belief.settings().ordinal_thresholds.first().copied().unwrap_or(f64::NEG_INFINITY);
-    let chance = belief.feasibility.as_ref().map(|belief| Chance::new(space, belief, threshold));
-    // Nothing feasible was found yet: whatever is feasible is better.
-    let hopeless = chance.is_some() && belief.infeasible.contains(&best);
-    let total = belief.utility.kernel.variance;
+    let space = posterior.space();
+    let duel = Duel::new(space, &posterior.utility, best, pending);
+    let threshold = posterior.settings().ordinal_thresholds.first().copied().unwrap_or(f64::NEG_INFINITY);
+    let chance = posterior.feasibility.as_ref().map(|process| Chance::new(space, process, threshold));
+    // An infeasible incumbent: any feasible action is better, so only the probability counts.
+    let hopeless = chance.is_some() && posterior.infeasible.contains(&best);
+    let total = posterior.utility.kernel.variance;
     let bounds = GainBound::new();
     let bound = |x: usize| {
         let variance = duel.variance(x, duel.variance_bound(x, total));
@@ -281,7 +299,7 @@ fn maximiser(
         }
         top.map_or(f64::NEG_INFINITY, |(value, _)| value)
     };
-    // The first block alone usually rules out most of the rest, which then need not be sorted.
+    // The first block usually rules out most of the rest, which saves sorting it.
     let first = BLOCK.min(ranked.len());
     if first < ranked.len() {
         ranked.select_nth_unstable_by(first, order);
@@ -299,17 +317,65 @@ fn maximiser(
     top.map(|(_, x)| ActionIndex(x as u64))
 }
 
+/// The maximiser over some random lines through the best action, or over the whole grid if they have no candidate.
+pub(crate) fn on_lines(
+    posterior: &Posterior,
+    best: ActionIndex,
+    pending: &[ActionIndex],
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> Option<ActionIndex> {
+    let lines = posterior.settings().lines;
+    if lines > 0 && posterior.visited().len() < posterior.settings().line_trials {
+        let candidates: Vec<ActionIndex> =
+            (0..lines).flat_map(|_| line::through(posterior.space(), best, random)).collect();
+        if let Some(action) = against(posterior, best, taken, pending, Some(&candidates)) {
+            return Some(action);
+        }
+    }
+    against(posterior, best, taken, pending, None)
+}
+
+/// The maximiser over candidates, for a grid that is too large to evaluate.
+pub(crate) fn over_candidates(
+    posterior: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> ActionIndex {
+    let space = posterior.space();
+    let candidates = near_best_or_random(posterior, best, taken, CANDIDATES, random);
+    let avoidance = Avoidance::of(posterior);
+    let incumbent = posterior.utility.view(best, space.levels(best));
+    let values: Vec<f64> = candidates
+        .iter()
+        .map(|&action| {
+            let (mean, variance) =
+                posterior.utility.difference(&posterior.utility.view(action, space.levels(action)), &incumbent);
+            if avoidance.as_ref().is_some_and(|avoidance| !avoidance.allows(action)) {
+                // Less than any expected gain.
+                return -1.0;
+            }
+            let chance = match &posterior.feasibility {
+                Some(_) => posterior.probability_of_converging(action).unwrap_or(1.0),
+                None => 1.0,
+            };
+            expected_gain(mean, variance) * chance
+        })
+        .collect();
+    highest(&candidates, &values)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::posterior::posterior;
-    use crate::random::Random;
+    use crate::learner::posterior;
+    use crate::search_space::Dimension;
     use crate::settings::{Labels, LearnerSettings, Method};
-    use crate::space::Dimension;
 
     #[test]
-    fn the_pruned_search_finds_the_maximiser() {
+    fn pruned_search_finds_the_exact_maximiser() {
         let dimensions = [3, 4, 3, 5]
             .iter()
             .enumerate()
@@ -336,24 +402,24 @@ mod tests {
                 log.feedback.push(Feedback::Label { action, category: usize::from(random.uniform() < 0.7) });
                 log.visited.push(action);
             }
-            let belief = posterior(&space, &log, &settings).unwrap();
-            let best = belief.best().unwrap();
+            let posterior = posterior(&space, &log, &settings).unwrap();
+            let best = posterior.best().unwrap();
             let taken: HashSet<ActionIndex> = log.visited.iter().copied().collect();
-            let incumbent = belief.utility.view(best, space.levels(best));
+            let incumbent = posterior.utility.view(best, space.levels(best));
             let mut top = (0.0, ActionIndex(0));
             for action in (0..space.len()).map(ActionIndex).filter(|a| !taken.contains(a)) {
                 let (mean, variance) =
-                    belief.utility.difference(&belief.utility.view(action, space.levels(action)), &incumbent);
-                let chance = belief.feasibility.as_ref().map_or(1.0, |feasibility| {
+                    posterior.utility.difference(&posterior.utility.view(action, space.levels(action)), &incumbent);
+                let chance = posterior.feasibility.as_ref().map_or(1.0, |feasibility| {
                     let view = feasibility.view(action, space.levels(action));
-                    math::normal_cdf(view.mean / feasibility.variance(&view).sqrt())
+                    special_functions::normal_cdf(view.mean / feasibility.variance(&view).sqrt())
                 });
                 let gain = expected_gain(mean, variance) * chance;
                 if gain > top.0 {
                     top = (gain, action);
                 }
             }
-            assert_eq!(against(&belief, best, &taken, &[], None), Some(top.1));
+            assert_eq!(against(&posterior, best, &taken, &[], None), Some(top.1));
         }
     }
 }

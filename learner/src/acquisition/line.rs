@@ -1,13 +1,14 @@
-//! LineCoSpar's candidates: the actions on a random line through the best one.
+//! The actions on a random line through the best action (LineCoSpar, Tucker et al. 2020).
 //!
-//! The line aims at a uniformly random action, is measured in grid steps (in raw units the dimensions with large
-//! numbers would be the only ones to move), runs in both directions until it leaves the box, is rounded to the grid
-//! and holds each action once.
+//! The line points to a uniformly random action and extends in both directions to the boundary of the grid. Lengths are
+//! in grid steps, because in raw units only the dimensions with large numbers would move. Points are rounded to the
+//! grid.
 
+use crate::action::ActionIndex;
 use crate::random::Random;
-use crate::space::{ActionIndex, SearchSpace};
+use crate::search_space::SearchSpace;
 
-/// Actions of the line other than its origin, nearest first, forward before backward.
+/// The distinct actions of a random line, without its origin: forward from the nearest, then backward from the nearest.
 pub(crate) fn through(space: &SearchSpace, origin: ActionIndex, random: &mut Random) -> Vec<ActionIndex> {
     let shape = space.shape();
     let start = space.levels(origin);
@@ -50,15 +51,15 @@ pub(crate) fn through(space: &SearchSpace, origin: ActionIndex, random: &mut Ran
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::Dimension;
+    use crate::search_space::Dimension;
 
     #[test]
-    fn lines_stay_in_the_grid_and_move_every_dimension() {
+    fn lines_move_every_dimension_and_have_distinct_actions() {
         let dimensions = [2, 3, 3, 3, 4, 6, 3, 3]
             .iter()
             .enumerate()
             .map(|(d, &n)| {
-                // units as different as those of Table I
+                // Units that differ as in Table I of the paper.
                 let step = 10_f64.powi(1 - i32::try_from(d).unwrap());
                 let values = (0..n).map(|i| f64::from(i) * step).collect();
                 Dimension { name: format!("a{}", d + 1), values, lengthscale: step }
@@ -80,7 +81,7 @@ mod tests {
                 moved[d] += u32::from(line.iter().any(|&a| space.levels(a)[d] != start[d]));
             }
         }
-        // Published code in raw units freezes half of the dimensions (0.001 to 0.013 of lines move them).
+        // In raw units, at most 26 of the 2,000 lines move the dimensions with small numbers.
         assert!(moved.iter().all(|&m| m > 800), "{moved:?}");
         assert!((2.5..4.0).contains(&(count as f64 / 2000.0)), "{count}");
     }

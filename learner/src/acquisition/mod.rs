@@ -1,7 +1,11 @@
-//! Ways to choose the next action.
+//! Acquisition rules: the ways to choose the next action.
 
 pub(crate) mod avoidance;
+mod candidates;
 pub(crate) mod eubo;
-pub(crate) mod information;
+pub(crate) mod information_gain;
 pub(crate) mod line;
+pub(crate) mod line_cospar;
 pub(crate) mod thompson;
+
+pub(crate) use candidates::random_untaken;

@@ -1,30 +1,34 @@
-//! Both approximations against long elliptical slice sampling of the exact posterior (Murray, Adams and MacKay 2010).
+//! Comparison of both approximations with elliptical slice sampling of the exact posterior (Murray, Adams and MacKay
+//! 2010).
 //!
 //! `cargo test --release -p gait-learner sampling -- --nocapture` prints the table of docs/benchmarks/learner.md.
 
 use super::{Approximate, ExpectationPropagation, Laplace};
-use crate::belief::{Answer, Chain, Process};
+use crate::action::ActionIndex;
 use crate::kernel::Kernel;
-use crate::likelihood::Interval;
-use crate::model::Model;
+use crate::likelihood::{Interval, Link};
+use crate::observations::Observation;
+use crate::observations::ObservedPoints;
 use crate::random::Random;
-use crate::settings::{LearnerSettings, Link};
-use crate::space::{ActionIndex, Dimension, SearchSpace};
+use crate::search_space::{Dimension, SearchSpace};
+use crate::settings::LearnerSettings;
+use crate::update_chain::{ProcessModel, UpdateChain};
 
-/// Means and standard deviations of the points under the exact posterior.
-fn sampled(model: &Model, draws: usize) -> (Vec<f64>, Vec<f64>) {
-    let n = model.points.len();
+/// Sampled means and standard deviations of the points under the exact posterior.
+fn sampled(observed: &ObservedPoints, draws: usize) -> (Vec<f64>, Vec<f64>) {
+    let n = observed.points.len();
     let mut random = Random::new(2024, 0);
-    let likelihood =
-        |f: &[f64]| -> f64 { model.sites.iter().map(|s| s.interval.log_likelihood(Link::Probit, s.of(f)).value).sum() };
+    let likelihood = |f: &[f64]| -> f64 {
+        observed.sites.iter().map(|s| s.interval.log_likelihood(Link::Probit, s.of(f)).value).sum()
+    };
     let mut f = vec![0.0; n];
     let mut current = likelihood(&f);
     let (mut first, mut second) = (vec![0.0; n], vec![0.0; n]);
     let warm_up = draws / 5;
     for step in 0..warm_up + draws {
         let noise: Vec<f64> = (0..n).map(|_| random.normal()).collect();
-        let v = model.prior.multiply(&noise);
-        let height = current + crate::math::ln(random.uniform().max(1e-300));
+        let v = observed.prior.multiply(&noise);
+        let height = current + crate::special_functions::ln(random.uniform().max(1e-300));
         let mut angle = random.uniform() * std::f64::consts::TAU;
         let (mut low, mut high) = (angle - std::f64::consts::TAU, angle);
         loop {
@@ -52,53 +56,57 @@ fn sampled(model: &Model, draws: usize) -> (Vec<f64>, Vec<f64>) {
     (first, sd)
 }
 
-fn answers(noise: f64, ties: bool, seed: u64, space: &SearchSpace) -> Vec<Answer> {
+fn observations(noise: f64, ties: bool, seed: u64, space: &SearchSpace) -> Vec<Observation> {
     let mut random = Random::new(seed, 1);
-    let mut answers = Vec::new();
+    let mut observations = Vec::new();
     let mut last: Option<ActionIndex> = None;
     let utility = |a: ActionIndex| space.levels(a).iter().map(|&l| -(l as f64 - 1.2).powi(2)).sum::<f64>() + 1.5;
-    while answers.len() < 24 {
+    while observations.len() < 24 {
         let action = ActionIndex(random.below(space.len()));
         let (low, high) = if utility(action) > 0.0 { (0.0, f64::INFINITY) } else { (f64::NEG_INFINITY, 0.0) };
-        answers.push(Answer { plus: action, minus: None, interval: Interval { low, high, noise: 0.1 } });
+        observations.push(Observation { plus: action, minus: None, interval: Interval { low, high, noise: 0.1 } });
         if let Some(last) = last.filter(|&last| last != action) {
             let (winner, loser) = if utility(action) >= utility(last) { (action, last) } else { (last, action) };
             let high = if ties && random.uniform() < 0.3 { 0.1 } else { f64::INFINITY };
             let low = if high.is_finite() { -0.1 } else { 0.0 };
-            answers.push(Answer { plus: winner, minus: Some(loser), interval: Interval { low, high, noise } });
+            observations.push(Observation {
+                plus: winner,
+                minus: Some(loser),
+                interval: Interval { low, high, noise },
+            });
         }
         last = Some(action);
     }
-    answers
+    observations
 }
 
 #[test]
-fn both_approximations_against_long_sampling() {
+fn approximations_agree_with_long_sampling() {
     let dimensions =
         (0..3).map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0], lengthscale: 1.0 }).collect();
     let space = SearchSpace::new(dimensions).unwrap();
-    let kernel = Kernel::new(&space, &crate::posterior::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 3]));
+    let kernel = Kernel::new(&space, &crate::learner::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 3]));
     println!("data                        error of mean (EP, Laplace)   sd (sampled, EP, Laplace)");
-    // The bounds for EP are those of its own error; Laplace's are wide because its error is (docs/benchmarks/learner.md).
+    // Laplace's approximation gets wider bounds, because its error is larger (docs/benchmarks/learner.md).
     for (name, noise, ties, bounds) in [
         ("preferences, noise 0.02", 0.02, false, [0.04, 0.5]),
         ("preferences, noise 0.3", 0.3, false, [0.04, 0.4]),
         ("with ties, noise 0.1", 0.1, true, [0.04, 0.45]),
     ] {
-        let answers = answers(noise, ties, 5, &space);
+        let observations = observations(noise, ties, 5, &space);
         let run = |method: &dyn Approximate| {
-            let process = Process { space: &space, kernel: &kernel, link: Link::Probit, method };
-            Chain::default().advance(&process, &answers).unwrap()
+            let model = ProcessModel { space: &space, kernel: &kernel, link: Link::Probit, method };
+            UpdateChain::default().advance(&model, &observations).unwrap()
         };
-        let states = [run(&ExpectationPropagation::default()), run(&Laplace)];
-        let (mean, sd) = sampled(&states[0].model, 40_000);
+        let fits = [run(&ExpectationPropagation::default()), run(&Laplace)];
+        let (mean, sd) = sampled(&fits[0].observed, 40_000);
         let n = mean.len() as f64;
-        let errors = states
+        let errors = fits
             .each_ref()
-            .map(|state| state.approximation.mean.iter().zip(&mean).map(|(a, b)| (a - b).abs()).sum::<f64>() / n);
-        let spreads = states
+            .map(|fit| fit.approximation.mean.iter().zip(&mean).map(|(a, b)| (a - b).abs()).sum::<f64>() / n);
+        let spreads = fits
             .each_ref()
-            .map(|state| (0..mean.len()).map(|i| state.approximation.covariance.at(i, i).sqrt()).sum::<f64>() / n);
+            .map(|fit| (0..mean.len()).map(|i| fit.approximation.covariance.at(i, i).sqrt()).sum::<f64>() / n);
         let exact = sd.iter().sum::<f64>() / n;
         println!(
             "{name:<27} {:.3}, {:.3}                  {exact:.3}, {:.3}, {:.3}",

@@ -1,22 +1,22 @@
-//! Expectation propagation (Minka 2001) for probit answers about one utility or the difference of two.
+//! Expectation propagation (Minka 2001) for probit observations of one utility or the difference of two.
 //!
-//! Each answer's factor is replaced in turn by the normal one that gives the right mean and variance of its functional
-//! when every other answer keeps its normal factor.
+//! Each update chooses the normal factor that matches mean and variance of the site's functional under the exact
+//! likelihood of the site times its cavity.
 
-use super::sites::{Cavity, Match, Working, shifts};
-use super::{Approximate, Approximation, Factor, whitened_precision};
+use super::approximation::{Approximate, Approximation, Factor, REFRESH, whitened_precision};
+use super::site_updates::{Cavity, FactorRule, WorkingApproximation, shifts};
 use crate::error::Result;
+use crate::likelihood::Link;
 use crate::likelihood::LogLikelihood;
 use crate::linalg::dot;
-use crate::math;
-use crate::model::{Model, Site};
-use crate::settings::Link;
+use crate::observations::{ObservedPoints, Site};
+use crate::special_functions;
 
-/// Matching of means and variances, answer by answer.
+/// Expectation propagation with sequential updates.
 pub(crate) struct ExpectationPropagation {
-    /// Change of a factor, in posterior standard deviations and relative variances, that is left undone.
+    /// Largest neglected change: of the mean in posterior standard deviations, of the variance as a share.
     pub(crate) tolerance: f64,
-    /// Passes over the answers before stopping.
+    /// Largest number of sweeps over the sites.
     pub(crate) sweeps: usize,
 }
 
@@ -26,19 +26,19 @@ impl Default for ExpectationPropagation {
     }
 }
 
-/// Logarithm, slope and curvature of an answer's probability under its cavity, in the cavity's mean.
+/// Logarithm of a site's likelihood integrated over its cavity, with derivatives in the mean of the cavity.
 fn mass(site: &Site, cavity: Cavity) -> LogLikelihood {
     let mut interval = site.interval;
     interval.noise = (1.0 / cavity.precision + interval.noise * interval.noise).sqrt();
     interval.log_likelihood(Link::Probit, cavity.mean)
 }
 
-impl Match for ExpectationPropagation {
+impl FactorRule for ExpectationPropagation {
     fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor> {
         let variance = 1.0 / cavity.precision;
         let at = mass(site, cavity);
         let mean = cavity.mean + variance * at.slope;
-        // 1 / tilted variance - 1 / cavity variance, with tilted = cavity (1 - cavity curvature).
+        // precision = 1 / tilted - 1 / variance, where tilted = variance (1 - variance curvature).
         let shrink = (variance * at.curvature).min(1.0 - 1e-12);
         let precision = at.curvature / (1.0 - shrink);
         let shift = mean * (cavity.precision + precision) - cavity.mean * cavity.precision;
@@ -47,33 +47,38 @@ impl Match for ExpectationPropagation {
 }
 
 impl Approximate for ExpectationPropagation {
-    fn advance(&self, model: &Model, _link: Link, previous: Option<&Approximation>) -> Result<Approximation> {
-        let (prior, sites) = (&model.prior, &model.sites);
-        let mut working = Working::extend(model, previous);
+    fn advance(
+        &self,
+        observed: &ObservedPoints,
+        _link: Link,
+        previous: Option<&Approximation>,
+    ) -> Result<Approximation> {
+        let (prior, sites) = (&observed.prior, &observed.sites);
+        let mut working = WorkingApproximation::extend(observed, previous);
         let old = previous.map_or(0, |p| p.mean.len());
         working.sweep(sites, previous.map_or(0, |p| p.factors.len()), self, self.tolerance, self.sweeps);
-        if prior.order() / super::REFRESH != old / super::REFRESH || !working.is_sound() {
+        if prior.order() / REFRESH != old / REFRESH || !working.is_sound() {
             working.refresh(prior, sites)?;
             working.sweep(sites, sites.len(), self, self.tolerance, self.sweeps);
         }
         Ok(working.finish(prior))
     }
 
-    fn evidence(&self, model: &Model, _link: Link, approximation: &Approximation) -> Result<f64> {
-        let working = Working::of(approximation);
+    fn log_evidence(&self, observed: &ObservedPoints, _link: Link, approximation: &Approximation) -> Result<f64> {
+        let working = WorkingApproximation::of(approximation);
         let mut total = 0.0;
-        for (site, &factor) in model.sites.iter().zip(&working.factors) {
+        for (site, &factor) in observed.sites.iter().zip(&working.factors) {
             if let Some(cavity) = working.cavity(site, factor) {
-                // The answer's share: its mass under the cavity, less what its normal factor would give.
+                // The mass of the likelihood under the cavity over the mass of the normal factor.
                 let q = cavity.mean * cavity.precision + factor.shift;
-                total += mass(site, cavity).value + 0.5 * math::ln_1p(factor.precision / cavity.precision)
+                total += mass(site, cavity).value + 0.5 * special_functions::ln_1p(factor.precision / cavity.precision)
                     - 0.5
                         * (q * q / (cavity.precision + factor.precision)
                             - cavity.mean * cavity.mean * cavity.precision);
             }
         }
-        let precision = whitened_precision(&model.prior, &model.sites, &working.factors)?;
-        let h = shifts(model.points.len(), &model.sites, &working.factors);
+        let precision = whitened_precision(&observed.prior, &observed.sites, &working.factors)?;
+        let h = shifts(observed.points.len(), &observed.sites, &working.factors);
         Ok(total - 0.5 * precision.ln_determinant() + 0.5 * dot(&h, &working.mean))
     }
 }
@@ -81,14 +86,14 @@ impl Approximate for ExpectationPropagation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::action::ActionIndex;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::posterior::posterior;
+    use crate::learner::posterior;
+    use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::{LearnerSettings, Method};
-    use crate::space::{ActionIndex, Dimension, SearchSpace};
 
-    /// Two actions, a preference and a label: moments by brute-force summation over a fine net.
     #[test]
-    fn moments_of_two_answers_match_quadrature() {
+    fn moments_and_evidence_match_quadrature() {
         let space =
             SearchSpace::new(vec![Dimension { name: "x".into(), values: vec![0.0, 1.0], lengthscale: 1.0 }]).unwrap();
         let settings =
@@ -109,8 +114,8 @@ mod tests {
             for j in -300..300 {
                 let (x, y) = (f64::from(i) / 50.0, f64::from(j) / 50.0);
                 let prior = (-0.5 * (n * x * x - 2.0 * r * x * y + n * y * y) / det).exp();
-                let p = crate::math::normal_cdf((x - y) / 0.3);
-                let w = prior * p * p * crate::math::normal_cdf(y / 0.4);
+                let p = crate::special_functions::normal_cdf((x - y) / 0.3);
+                let w = prior * p * p * crate::special_functions::normal_cdf(y / 0.4);
                 mass += w;
                 for (k, f) in [x, y].into_iter().enumerate() {
                     first[k] += w * f;
@@ -120,10 +125,10 @@ mod tests {
         }
         let belief = posterior(&space, &log, &settings).unwrap();
         let evidence = ExpectationPropagation::default()
-            .evidence(belief.utility.model(), Link::Probit, belief.utility.approximation())
+            .log_evidence(belief.utility.observed(), Link::Probit, belief.utility.approximation())
             .unwrap();
         let exact = (mass / 2500.0 / (std::f64::consts::TAU * det.sqrt())).ln();
-        // The approximation itself is off by 0.026 here: two equal answers are not independent given their factors.
+        // The error of expectation propagation itself: equal preferences are not independent given their factors.
         assert!((evidence - exact).abs() < 0.05, "{evidence} {exact}");
         for (k, action) in [a, b].into_iter().enumerate() {
             let (mean, sd) = (first[k] / mass, (second[k] / mass - (first[k] / mass).powi(2)).sqrt());

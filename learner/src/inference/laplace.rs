@@ -1,39 +1,41 @@
-//! Laplace's approximation: a normal distribution at the posterior's mode.
+//! Laplace's approximation: a normal distribution at the mode of the posterior.
 //!
-//! From a cold start, Newton's method in whitened coordinates `f = L v`, `K = L L'`: the objective
-//! `1/2 v'v - sum log P` has Hessian `B = I + L' W L`, whose eigenvalues are at least 1 whatever the answers; `K` is
-//! never inverted. From the previous answer's mode, where few factors change, each answer's factor is moved to the
-//! mode of its own functional given all other answers, in turn; the fixed point is the mode of all. Whenever that is
-//! not reached soon, Newton's method takes over.
+//! Newton's method works in whitened coordinates `f = L v`, `K = L L'`. The Hessian of the objective `1/2 v'v - sum log
+//! P` is `B = I + L' W L`, whose eigenvalues are at least 1, and `K` is never inverted (Rasmussen and Williams 2006,
+//! algorithm 3.1).
+//!
+//! From a previous approximation few factors change, so sweeps of site updates are faster. Each update moves a factor
+//! to the mode of the site's functional given its cavity; the fixed point is the mode of the posterior. If the sweeps
+//! do not converge, Newton's method continues.
 
-use super::sites::{Cavity, Match, Working, covariance};
-use super::{Approximate, Approximation, Factor, whitened_precision};
+use super::approximation::{Approximate, Approximation, Factor, REFRESH, whitened_precision};
+use super::site_updates::{Cavity, FactorRule, WorkingApproximation, covariance};
 use crate::error::{LearnerError, Result};
+use crate::likelihood::Link;
 use crate::linalg::dot;
-use crate::model::{Model, Site};
-use crate::settings::Link;
+use crate::observations::{ObservedPoints, Site};
 
-/// The mode of the posterior and its curvature there.
+/// Laplace's approximation.
 pub(crate) struct Laplace;
 
-/// Newton steps before giving up; 5 to 8 are usual from a cold start.
+/// Largest number of Newton steps.
 const MAX_STEPS: usize = 200;
-/// Squared Newton decrement (the squared distance to the mode in posterior standard deviations) that is accepted.
+/// Squared Newton decrement at convergence: the squared distance to the mode in posterior standard deviations.
 const DECREMENT: f64 = 1e-10;
-/// The same as a share of the objective, whose rounding hides smaller steps.
+/// The same as a share of the objective, because its rounding error hides smaller steps.
 const RELATIVE_DECREMENT: f64 = 1e-13;
-/// Change of a factor, in posterior standard deviations and relative variances, that is left undone.
+/// Largest neglected change of a site: of the mean in posterior standard deviations, of the variance as a share.
 const TOLERANCE: f64 = 1e-3;
-/// Passes over the answers before Newton's method takes over.
+/// Largest number of sweeps over the sites before Newton's method takes over.
 const SWEEPS: usize = 20;
 
-/// The mode and curvature along one answer's functional.
+/// Chooses the factor from mode and curvature of the site's likelihood times its cavity.
 struct ModeAlong(Link);
 
-impl Match for ModeAlong {
+impl FactorRule for ModeAlong {
     fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor> {
         let at = |d: f64| site.interval.derivatives(self.0, d);
-        // The slope of the log likelihood falls with d, so the mode lies between the cavity's mean and one full step.
+        // The slope of the log-likelihood decreases in d, so the mode lies between the cavity mean and this point.
         let reach = cavity.mean + at(cavity.mean).slope / cavity.precision;
         let (mut low, mut high) = (cavity.mean.min(reach), cavity.mean.max(reach));
         let mut d = 0.5 * (low + high);
@@ -67,23 +69,30 @@ impl Match for ModeAlong {
 }
 
 impl Approximate for Laplace {
-    fn advance(&self, model: &Model, link: Link, previous: Option<&Approximation>) -> Result<Approximation> {
-        let (prior, sites) = (&model.prior, &model.sites);
+    fn advance(
+        &self,
+        observed: &ObservedPoints,
+        link: Link,
+        previous: Option<&Approximation>,
+    ) -> Result<Approximation> {
+        let (prior, sites) = (&observed.prior, &observed.sites);
         if let Some(previous) = previous
-            && prior.order() / super::REFRESH == previous.mean.len() / super::REFRESH
+            && prior.order() / REFRESH == previous.mean.len() / REFRESH
         {
-            let mut working = Working::extend(model, Some(previous));
+            let mut working = WorkingApproximation::extend(observed, Some(previous));
             if working.sweep(sites, previous.factors.len(), &ModeAlong(link), TOLERANCE, SWEEPS) && working.is_sound() {
                 return Ok(working.finish(prior));
             }
         }
-        newton(model, link, previous)
+        newton(observed, link, previous)
     }
 
-    fn evidence(&self, model: &Model, link: Link, approximation: &Approximation) -> Result<f64> {
+    fn log_evidence(&self, observed: &ObservedPoints, link: Link, approximation: &Approximation) -> Result<f64> {
         let v = &approximation.whitened;
-        let precision = whitened_precision(&model.prior, &model.sites, &approximation.factors)?;
-        Ok(log_likelihood(&model.sites, link, &approximation.mean) - 0.5 * dot(v, v) - 0.5 * precision.ln_determinant())
+        let precision = whitened_precision(&observed.prior, &observed.sites, &approximation.factors)?;
+        Ok(log_likelihood(&observed.sites, link, &approximation.mean)
+            - 0.5 * dot(v, v)
+            - 0.5 * precision.ln_determinant())
     }
 }
 
@@ -91,9 +100,9 @@ fn log_likelihood(sites: &[Site], link: Link, f: &[f64]) -> f64 {
     sites.iter().map(|s| s.interval.log_likelihood(link, s.of(f)).value).sum()
 }
 
-/// Newton's method in whitened coordinates. A point that is new starts at `v = 0`, its expectation given the others.
-fn newton(model: &Model, link: Link, previous: Option<&Approximation>) -> Result<Approximation> {
-    let (prior, sites) = (&model.prior, &model.sites);
+/// Newton's method with a backtracking line search. A new point starts at `v = 0`, its conditional prior mean.
+fn newton(observed: &ObservedPoints, link: Link, previous: Option<&Approximation>) -> Result<Approximation> {
+    let (prior, sites) = (&observed.prior, &observed.sites);
     let n = prior.order();
     let mut v = previous.map_or_else(Vec::new, |p| p.whitened.clone());
     v.resize(n, 0.0);
@@ -133,7 +142,7 @@ fn newton(model: &Model, link: Link, previous: Option<&Approximation>) -> Result
             length *= 0.5;
         }
         let Some(next) = moved else {
-            // At the mode, or no representable decrease is left.
+            // Converged, or the objective cannot decrease in double precision.
             let mut weights = v.clone();
             prior.solve_upper(&mut weights);
             return Ok(Approximation {
@@ -146,50 +155,55 @@ fn newton(model: &Model, link: Link, previous: Option<&Approximation>) -> Result
         };
         (v, f, value) = next;
     }
-    Err(LearnerError::Numerical(format!("the posterior's mode was not found in {MAX_STEPS} Newton steps")))
+    Err(LearnerError::Numerical(format!("Laplace's approximation did not converge in {MAX_STEPS} Newton steps")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::belief::{Answer, Chain, Process};
+    use crate::action::ActionIndex;
     use crate::kernel::Kernel;
     use crate::likelihood::Interval;
+    use crate::observations::Observation;
     use crate::random::Random;
+    use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::LearnerSettings;
-    use crate::space::{ActionIndex, Dimension, SearchSpace};
+    use crate::update_chain::{ProcessModel, UpdateChain};
 
     #[test]
-    fn the_chain_ends_at_the_mode_that_newton_finds() {
+    fn update_chain_ends_at_the_mode_of_newtons_method() {
         let dimensions = (0..4)
             .map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0, 3.0], lengthscale: 1.0 })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();
-        let kernel =
-            Kernel::new(&space, &crate::posterior::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 4]));
+        let kernel = Kernel::new(&space, &crate::learner::kernel_shape(&space, &LearnerSettings::default(), &[1.0; 4]));
         for (link, noise, seed) in [(Link::Logistic, 0.02, 1), (Link::Probit, 0.02, 2), (Link::Logistic, 0.5, 3)] {
             let mut random = Random::new(seed, 0);
-            let mut answers = Vec::new();
+            let mut observations = Vec::new();
             let mut last = ActionIndex(0);
             for _ in 0..80 {
                 let action = ActionIndex(random.below(space.len()));
                 let above = random.uniform() < 0.6;
                 let (low, high) = if above { (0.0, f64::INFINITY) } else { (f64::NEG_INFINITY, 0.0) };
-                answers.push(Answer { plus: action, minus: None, interval: Interval { low, high, noise: 0.1 } });
+                observations.push(Observation {
+                    plus: action,
+                    minus: None,
+                    interval: Interval { low, high, noise: 0.1 },
+                });
                 if action != last {
                     let interval = Interval { low: 0.0, high: f64::INFINITY, noise };
-                    answers.push(Answer { plus: action, minus: Some(last), interval });
+                    observations.push(Observation { plus: action, minus: Some(last), interval });
                 }
                 last = action;
             }
-            let process = Process { space: &space, kernel: &kernel, link, method: &Laplace };
-            let state = Chain::default().advance(&process, &answers).unwrap();
-            let exact = newton(&state.model, link, None).unwrap();
+            let model = ProcessModel { space: &space, kernel: &kernel, link, method: &Laplace };
+            let fit = UpdateChain::default().advance(&model, &observations).unwrap();
+            let exact = newton(&fit.observed, link, None).unwrap();
             let mut largest = [0.0_f64; 2];
             for i in 0..exact.mean.len() {
-                largest[0] = largest[0].max((exact.mean[i] - state.approximation.mean[i]).abs());
+                largest[0] = largest[0].max((exact.mean[i] - fit.approximation.mean[i]).abs());
                 for j in 0..exact.mean.len() {
-                    let difference = exact.covariance.at(i, j) - state.approximation.covariance.at(i, j);
+                    let difference = exact.covariance.at(i, j) - fit.approximation.covariance.at(i, j);
                     largest[1] = largest[1].max(difference.abs());
                 }
             }

@@ -1,7 +1,7 @@
-//! The inner loops, compiled for the vector units found at run time.
+//! Inner loops, compiled for several vector instruction sets and dispatched at run time.
 //!
-//! Sums run in [`LANES`] interleaved partial sums and every product is fused into its addition, whatever the width of
-//! the vectors: equal inputs give equal bits on any machine.
+//! Sums consist of [`LANES`] interleaved partial sums, and products use fused multiply-add, for every vector width.
+//! Equal inputs therefore give equal bits on every machine.
 
 #![allow(clippy::inline_always, reason = "a kernel must be inlined into the function compiled for the vector unit")]
 
@@ -10,12 +10,12 @@ use pulp::{Arch, Simd, WithSimd};
 /// Number of interleaved partial sums of an inner product, and of right-hand sides of a block.
 pub(super) const LANES: usize = 16;
 
-/// Rows and columns of the pieces in which products of matrices are computed: as many sums as registers hold.
+/// Rows and columns of the tiles of a matrix product, chosen so that their sums fit in registers.
 const TILE_ROWS: usize = 4;
 const TILE: usize = 8;
 
-/// Defines a function whose body is compiled once for every vector unit. Bodies use plain loops: a closure would be
-/// compiled apart, for the least of them.
+/// Defines a function whose body is compiled once for each instruction set. Bodies must use plain loops, because
+/// closures are compiled for the baseline instruction set only.
 macro_rules! kernels {
     ($($(#[$doc:meta])* $visibility:vis fn $name:ident<'a>($($argument:ident: $type:ty),*) $(-> $result:ty)? $body:block)*) => {
         $($(#[$doc])*
@@ -74,7 +74,7 @@ fn add_scaled_inline(y: &mut [f64], a: f64, x: &[f64]) {
 /// `T_rk = sum_w A_wr B_wk`.
 #[inline(always)]
 fn tile_product(a: &[[f64; TILE_ROWS]], b: &[[f64; TILE]]) -> [[f64; TILE]; TILE_ROWS] {
-    // Four named sums: as an array of arrays they would not be kept in registers.
+    // Four variables instead of an array of arrays, which the compiler does not keep in registers.
     let (mut t0, mut t1, mut t2, mut t3) = ([0.0_f64; TILE], [0.0_f64; TILE], [0.0_f64; TILE], [0.0_f64; TILE]);
     for (x, y) in a.iter().zip(b) {
         for k in 0..TILE {
@@ -93,7 +93,7 @@ fn tile_product(a: &[[f64; TILE_ROWS]], b: &[[f64; TILE]]) -> [[f64; TILE]; TILE
     [t0, t1, t2, t3]
 }
 
-/// Adds a row of a tile to what is left of a row of a matrix.
+/// Adds a row of a tile to the rest of a row of a matrix; either may be longer.
 #[inline(always)]
 fn add_tile_row(rest: &mut [f64], row: &[f64; TILE]) {
     if let Some(whole) = rest.first_chunk_mut::<TILE>() {
@@ -118,7 +118,7 @@ kernels! {
         add_scaled_inline(y, a, x);
     }
 
-    /// `y = A x`, `A` given by rows of the length of `x`.
+    /// `y = A x`, `A` stored by rows.
     pub(crate) fn multiply<'a>(rows: &'a [f64], x: &'a [f64], y: &'a mut [f64]) {
         let n = x.len();
         for i in 0..y.len() {
@@ -126,7 +126,7 @@ kernels! {
         }
     }
 
-    /// `C_yz += sum_w L_wy weight_w R_wz`, all by rows, `C` with the given number of columns.
+    /// `C_yz += sum_w L_wy weight_w R_wz`, all stored by rows; `C` has `columns` columns.
     pub(crate) fn add_scaled_products<'a>(
         left: &'a [f64], right: &'a [f64], weights: &'a [f64], c: &'a mut [f64], columns: usize
     ) {
@@ -135,7 +135,7 @@ kernels! {
             return;
         }
         let rows = c.len() / columns;
-        // Both sides in panels that lie in memory as they are read.
+        // Copy both sides into panels, so that the product reads memory contiguously.
         let groups = rows.div_ceil(TILE_ROWS);
         let mut scaled = vec![[0.0_f64; TILE_ROWS]; groups * depth];
         for w in 0..depth {
@@ -159,7 +159,7 @@ kernels! {
         }
     }
 
-    /// `A += sum_k a_k x_k x_k'`, tile by tile, so that the matrix is read and written once.
+    /// `A += sum_k a_k x_k x_k'`, tile by tile, so that the matrix passes through memory once.
     pub(super) fn add_rank_ones<'a>(matrix: &'a mut [f64], changes: &'a [(f64, Vec<f64>)], n: usize) {
         let depth = changes.len();
         if depth == 0 {
@@ -191,7 +191,7 @@ kernels! {
         }
     }
 
-    /// `y = L x`, `L` packed by rows.
+    /// `y = L x`, `L` packed by rows (in the following functions too).
     pub(super) fn lower_multiply<'a>(packed: &'a [f64], x: &'a [f64], y: &'a mut [f64]) {
         let mut start = 0;
         for i in 0..x.len() {
@@ -271,7 +271,7 @@ kernels! {
         }
     }
 
-    /// Inner products, vector by vector, of two blocks.
+    /// Inner product of each pair of vectors of two blocks.
     pub(crate) fn block_dots<'a>(a: &'a [[f64; LANES]], b: &'a [[f64; LANES]]) -> [f64; LANES] {
         let mut sums = [0.0_f64; LANES];
         for i in 0..a.len().min(b.len()) {
@@ -297,7 +297,7 @@ kernels! {
         }
     }
 
-    /// Appends to a packed factor the row of a matrix given by its first entries; the squared pivot.
+    /// Turns a row of a matrix into the next row of its packed Cholesky factor. Returns the squared pivot.
     pub(super) fn append_row<'a>(packed: &'a [f64], row: &'a mut [f64]) -> f64 {
         let n = row.len() - 1;
         let mut start = 0;
@@ -309,7 +309,7 @@ kernels! {
         row[n] - dot_inline(&row[..n], &row[..n])
     }
 
-    /// `B += L' P` on and below the diagonal: `B_ij += sum_k L_ki P_kj`, `j <= i <= k`, `P` and `B` by rows.
+    /// Lower triangle of `B += L' P`: `B_ij += sum_k L_ki P_kj`, `j <= i <= k`; `P` and `B` stored by rows.
     pub(super) fn add_lower_product<'a>(packed: &'a [f64], p: &'a [f64], b: &'a mut [f64], n: usize) {
         let mut start = 0;
         for k in 0..n {
@@ -322,7 +322,7 @@ kernels! {
         }
     }
 
-    /// `A = R R'` for a matrix given by rows.
+    /// `A = R R'`, both stored by rows.
     pub(super) fn outer_product<'a>(r: &'a [f64], a: &'a mut [f64], n: usize) {
         for i in 0..n {
             for j in 0..=i {

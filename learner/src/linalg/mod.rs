@@ -1,6 +1,6 @@
-//! Small dense linear algebra whose every operation has one fixed order.
+//! Small dense linear algebra with a fixed order of operations.
 //!
-//! Factors are built row by row, so that appending a point gives the same bits as starting again with it.
+//! Cholesky factors are built row by row, so that appending a row gives the same bits as a new factorisation.
 
 mod kernels;
 
@@ -64,7 +64,7 @@ impl Square {
         Self { n, data }
     }
 
-    /// The matrix with a number added on its diagonal.
+    /// The matrix plus a multiple of the identity.
     pub(crate) fn ridged(&self, ridge: f64) -> Self {
         let mut ridged = self.clone();
         for i in 0..self.n {
@@ -100,7 +100,7 @@ impl Square {
     }
 }
 
-/// A lower triangular factor `L` with `A = L L'`, rows packed one after the other.
+/// The Cholesky factor `L` of `A = L L'`, its rows packed one after the other.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cholesky {
     n: usize,
@@ -108,7 +108,10 @@ pub(crate) struct Cholesky {
 }
 
 impl Cholesky {
-    /// Factors a symmetric positive definite matrix, of which the lower triangle is read.
+    /// Factors a symmetric positive definite matrix. Reads its lower triangle only.
+    ///
+    /// # Errors
+    /// If a pivot is not positive.
     pub(crate) fn new(matrix: &Square) -> Result<Self> {
         let mut factor = Self::default();
         factor.packed.reserve(matrix.order() * (matrix.order() + 1) / 2);
@@ -118,14 +121,17 @@ impl Cholesky {
         Ok(factor)
     }
 
-    /// A copy with room for one more row.
+    /// A copy with capacity for one more row.
     pub(crate) fn roomy(&self) -> Self {
         let mut packed = Vec::with_capacity(self.packed.len() + self.n + 1);
         packed.extend_from_slice(&self.packed);
         Self { n: self.n, packed }
     }
 
-    /// Appends a row of the matrix: its covariances with the earlier ones, then its variance.
+    /// Appends a row of the matrix up to its diagonal.
+    ///
+    /// # Errors
+    /// If the pivot is not positive; the factor stays as it was.
     pub(crate) fn append(&mut self, row: &[f64]) -> Result<()> {
         let n = self.n;
         let start = self.packed.len();
@@ -134,7 +140,9 @@ impl Cholesky {
         let pivot = kernels::append_row(done, new);
         if !(pivot > 0.0 && pivot.is_finite()) {
             self.packed.truncate(start);
-            return Err(LearnerError::Numerical(format!("pivot {n} of a covariance is {pivot:e}")));
+            return Err(LearnerError::Numerical(format!(
+                "a covariance matrix is not positive definite: pivot {n} is {pivot:e}"
+            )));
         }
         new[n] = pivot.sqrt();
         self.n += 1;
@@ -152,7 +160,7 @@ impl Cholesky {
 
     /// `ln det A`.
     pub(crate) fn ln_determinant(&self) -> f64 {
-        (0..self.n).map(|i| 2.0 * crate::math::ln(self.row(i)[i])).sum()
+        (0..self.n).map(|i| 2.0 * crate::special_functions::ln(self.row(i)[i])).sum()
     }
 
     /// `L x`.
@@ -195,7 +203,7 @@ impl Cholesky {
         kernels::backward_block(&self.packed, x);
     }
 
-    /// `I + L' P`, on and below the diagonal.
+    /// Lower triangle of `I + L' P`.
     pub(crate) fn identity_plus_transposed_product(&self, p: &Square) -> Square {
         let mut result = Square::zeros(self.n);
         kernels::add_lower_product(&self.packed, &p.data, &mut result.data, self.n);
@@ -215,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_factor_reproduces_its_matrix() {
+    fn cholesky_factor_reproduces_its_matrix() {
         let n = 43;
         let matrix = matrix(n);
         let factor = Cholesky::new(&matrix).unwrap();
@@ -235,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn appending_gives_the_bits_of_starting_again() {
+    fn appending_rows_gives_the_bits_of_a_new_factorisation() {
         let whole = Cholesky::new(&matrix(50)).unwrap();
         let mut grown = Cholesky::new(&Square::from_fn(20, |i, j| matrix(50).at(i, j))).unwrap();
         for i in 20..50 {

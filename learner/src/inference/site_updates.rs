@@ -1,50 +1,51 @@
-//! A normal distribution of the points improved answer by answer.
+//! Site-by-site updates of an approximation by rank-one changes of its covariance.
 //!
-//! The covariance of the points is kept whole. Replacing the normal factor of one answer changes it by a matrix of
-//! rank one: `O(n^2)` for a replacement, `O(1)` for finding that none is needed. What the new factor is, given the
-//! distribution of the answer's functional under all other answers (its cavity), is the method's affair.
+//! A new factor of one site changes the `n x n` covariance by a matrix of rank one. An update costs `O(n^2)`; detecting
+//! that a site needs none costs `O(1)`. The method chooses the new factor from the cavity of the site: the distribution
+//! of its functional under all other factors.
 
-use super::{Approximation, Factor, whitened_precision};
+use super::approximation::{Approximation, Factor, whitened_precision};
 use crate::error::Result;
 use crate::linalg::{Cholesky, Square, add_scaled, dot};
-use crate::model::{Model, Site};
+use crate::observations::{ObservedPoints, Site};
 
-/// Distribution of an answer's functional when the answer is left out.
+/// Normal distribution of a site's functional without the factor of the site.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cavity {
     pub(super) mean: f64,
     pub(super) precision: f64,
 }
 
-/// Chooses factors.
-pub(super) trait Match {
-    /// The factor of an answer, given its cavity.
+/// Rule by which a method chooses factors.
+pub(super) trait FactorRule {
+    /// The factor of a site, given its cavity. `None` keeps the present factor.
     fn factor(&self, site: &Site, cavity: Cavity) -> Option<Factor>;
 
-    /// Whether the present factor surely need not be replaced, at the present mean of the functional.
+    /// A cheap sufficient test that the present factor needs no update, at the present moments of the functional.
     fn settled(&self, _site: &Site, _present: Factor, _mean: f64, _variance: f64) -> bool {
         false
     }
 }
 
-/// Cavities with less than this share of the marginal's precision are left alone.
+/// Smallest precision of a usable cavity, as a share of the precision of the marginal.
 const MIN_CAVITY: f64 = 1e-10;
 
-/// Changes of the covariance that are applied in one pass over it.
+/// Number of rank-one changes that one pass over the covariance applies.
 const DELAYED: usize = 16;
 
-/// The normal distribution being improved.
-pub(super) struct Working {
-    /// The covariance, less the changes not applied yet.
+/// An approximation during updates.
+pub(super) struct WorkingApproximation {
+    /// The covariance without the delayed changes.
     covariance: Square,
-    /// Changes `a x x'` not applied yet: while they are few, adding them to what is read costs less.
+    /// Delayed changes `a x x'`, which every read of the covariance adds. Applying several at once saves memory
+    /// traffic.
     delayed: Vec<(f64, Vec<f64>)>,
     pub(super) mean: Vec<f64>,
     pub(super) factors: Vec<Factor>,
 }
 
-impl Working {
-    /// The distribution of an approximation.
+impl WorkingApproximation {
+    /// Continues from an approximation of the same points and sites.
     pub(super) fn of(approximation: &Approximation) -> Self {
         Self {
             covariance: approximation.covariance.clone(),
@@ -54,6 +55,7 @@ impl Working {
         }
     }
 
+    /// Posterior variance of a site's functional.
     fn variance(&self, site: &Site) -> f64 {
         let c = &self.covariance;
         let at = c.at(site.plus, site.plus);
@@ -64,7 +66,7 @@ impl Working {
         })
     }
 
-    /// Covariances of a site's functional with the points.
+    /// Posterior covariances of a site's functional with the points.
     fn column(&self, site: &Site) -> Vec<f64> {
         let mut column = self.covariance.row(site.plus).to_vec();
         if let Some(minus) = site.minus {
@@ -81,9 +83,9 @@ impl Working {
         self.delayed.clear();
     }
 
-    /// The previous distribution with the new points added, each given the others; new answers have no factor yet.
-    pub(super) fn extend(model: &Model, previous: Option<&Approximation>) -> Self {
-        let n = model.prior.order();
+    /// Extends the previous approximation. New points get their conditional prior, new sites the factor 1.
+    pub(super) fn extend(observed: &ObservedPoints, previous: Option<&Approximation>) -> Self {
+        let n = observed.prior.order();
         let mut working = match previous {
             Some(Approximation { mean, factors, covariance, .. }) => Self {
                 covariance: covariance.grown(n - mean.len()),
@@ -95,12 +97,12 @@ impl Working {
         };
         let old = working.mean.len();
         working.mean.resize(n, 0.0);
-        working.factors.resize(model.sites.len(), Factor::default());
+        working.factors.resize(observed.sites.len(), Factor::default());
         for i in old..n {
-            // Row i of the prior factor holds the whitened covariances with the earlier points and what remains.
-            let row = model.prior.row(i);
+            // Row i of L holds the whitened covariances with the earlier points and the conditional standard deviation.
+            let row = observed.prior.row(i);
             let mut gain = row[..i].to_vec();
-            model.prior.solve_upper(&mut gain);
+            observed.prior.solve_upper(&mut gain);
             let with_others: Vec<f64> = (0..i).map(|j| dot(&working.covariance.row(j)[..i], &gain)).collect();
             working.mean[i] = dot(&working.mean[..i], &gain);
             for (j, &c) in with_others.iter().enumerate() {
@@ -113,6 +115,7 @@ impl Working {
         working
     }
 
+    /// The cavity of a site with this factor. `None` if it is improper.
     pub(super) fn cavity(&self, site: &Site, factor: Factor) -> Option<Cavity> {
         let variance = self.variance(site);
         if variance.is_nan() || variance < 1e-14 {
@@ -123,14 +126,15 @@ impl Working {
             .then(|| Cavity { mean: (site.of(&self.mean) / variance - factor.shift) / precision, precision })
     }
 
-    /// Replaces one factor if the change is worth it: in posterior standard deviations and relative variance.
-    fn replace(&mut self, index: usize, site: &Site, method: &dyn Match, tolerance: f64) -> bool {
+    /// Updates one factor if the mean moves by more than `tolerance` standard deviations or the variance by more than
+    /// that share. Returns whether it did.
+    fn replace(&mut self, index: usize, site: &Site, rule: &dyn FactorRule, tolerance: f64) -> bool {
         let old = self.factors[index];
         let (mean, spread) = (site.of(&self.mean), self.variance(site));
-        if tolerance > 0.0 && method.settled(site, old, mean, spread) {
+        if tolerance > 0.0 && rule.settled(site, old, mean, spread) {
             return false;
         }
-        let Some(new) = self.cavity(site, old).and_then(|cavity| method.factor(site, cavity)) else { return false };
+        let Some(new) = self.cavity(site, old).and_then(|cavity| rule.factor(site, cavity)) else { return false };
         let (more_precision, more_shift) = (new.precision - old.precision, new.shift - old.shift);
         let gain = 1.0 / (more_precision * spread + 1.0);
         let move_by = (more_shift - more_precision * mean) * gain;
@@ -147,23 +151,24 @@ impl Working {
         true
     }
 
-    /// Replaces factors, the new answers' first, until none is worth it; whether that was reached.
+    /// Updates the new sites, then sweeps over all sites until none needs an update. Returns whether that happened
+    /// within `sweeps` sweeps.
     pub(super) fn sweep(
         &mut self,
         sites: &[Site],
         first_new: usize,
-        method: &dyn Match,
+        rule: &dyn FactorRule,
         tolerance: f64,
         sweeps: usize,
     ) -> bool {
         for (index, site) in sites.iter().enumerate().skip(first_new) {
-            self.replace(index, site, method, 0.0);
+            self.replace(index, site, rule, 0.0);
         }
         let mut settled = false;
         for _ in 0..sweeps {
             settled = true;
             for (index, site) in sites.iter().enumerate() {
-                settled &= !self.replace(index, site, method, tolerance);
+                settled &= !self.replace(index, site, rule, tolerance);
             }
             if settled {
                 break;
@@ -173,7 +178,7 @@ impl Working {
         settled
     }
 
-    /// Computes covariance and mean from the factors.
+    /// Recomputes covariance and mean from the factors.
     pub(super) fn refresh(&mut self, prior: &Cholesky, sites: &[Site]) -> Result<()> {
         let precision = whitened_precision(prior, sites, &self.factors)?;
         self.covariance = covariance(prior, &precision);
@@ -182,11 +187,13 @@ impl Working {
         Ok(())
     }
 
+    /// Whether means are finite and variances non-negative.
     pub(super) fn is_sound(&self) -> bool {
         let n = self.mean.len();
         self.mean.iter().all(|m| m.is_finite()) && (0..n).all(|i| self.covariance.at(i, i) >= 0.0)
     }
 
+    /// The approximation after the updates.
     pub(super) fn finish(self, prior: &Cholesky) -> Approximation {
         let mut whitened = self.mean.clone();
         prior.solve_lower(&mut whitened);
@@ -196,7 +203,7 @@ impl Working {
     }
 }
 
-/// `L B^-1 L'`.
+/// Posterior covariance `L B^-1 L'`; `precision` is the Cholesky factor of `B`.
 pub(super) fn covariance(prior: &Cholesky, precision: &Cholesky) -> Square {
     let n = prior.order();
     let mut columns = Square::zeros(n);
@@ -208,7 +215,7 @@ pub(super) fn covariance(prior: &Cholesky, precision: &Cholesky) -> Square {
     columns.outer_product()
 }
 
-/// `sum_s shift_s a_s`.
+/// `sum_s shift_s a_s`, `a_s` the coefficients of site `s`.
 pub(super) fn shifts(n: usize, sites: &[Site], factors: &[Factor]) -> Vec<f64> {
     let mut h = vec![0.0; n];
     for (site, factor) in sites.iter().zip(factors) {

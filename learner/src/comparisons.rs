@@ -1,57 +1,58 @@
-//! What to ask about an action: comparisons are chosen, not only actions.
+//! Comparisons: which pairs of visited actions to ask about.
 
 use serde::{Deserialize, Serialize};
 
+use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::feedback::{Feedback, FeedbackLog};
-use crate::posterior::Learner;
+use crate::learner::Learner;
+use crate::search_space::SearchSpace;
 use crate::settings::{LearnerSettings, Partner};
-use crate::space::{ActionIndex, SearchSpace};
 
-/// Why a comparison is asked.
+/// The reason for a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum QuestionReason {
-    /// The other action is one of the last tried, or of the same batch.
+pub enum ComparisonReason {
+    /// The other action was visited recently, or belongs to the same batch.
     Previous,
-    /// The other action is the best so far.
+    /// The other action is the best action so far.
     Incumbent,
-    /// The pair was asked before: the two answers tell how consistent answers are.
+    /// The pair was compared before. Two answers show how consistent answers are.
     Consistency,
 }
 
-/// "Which of these two is better?"
+/// The question "Which of these two actions is better?".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Question {
-    /// The action asked about.
+pub struct ProposedComparison {
+    /// The action in question.
     pub action: ActionIndex,
-    /// What it is compared with.
+    /// The action that it is compared with.
     pub against: ActionIndex,
-    /// Why.
-    pub reason: QuestionReason,
+    /// The reason for the comparison.
+    pub reason: ComparisonReason,
 }
 
-/// The earlier actions with which a newly tried one should be compared, the latest first.
+/// The comparisons of a new action with earlier ones, according to `settings.partner`, latest first.
 ///
-/// As the settings' partner says: the best one, every one, or, as published, those of the same batch and the last
-/// `buffer` ones before that batch. Batches are counted in the log: each `samples_per_iteration` trials are one. Asked
-/// after each of them, this compares every pair in a batch and each of its actions with the buffered ones.
+/// The partners are the best action, every action, or, as published, the other actions of the batch and the last
+/// `buffer` actions before it. Each `samples_per_iteration` trials of the log are a batch. Over a batch, these
+/// comparisons cover every pair in it, and every pair of a batch and a buffered action.
 ///
 /// # Errors
-/// When a setting is out of range or the log does not fit the space.
+/// If a setting is out of range, or the log or `action` does not fit the space.
 pub fn comparisons_to_ask(
     space: &SearchSpace,
     log: &FeedbackLog,
     action: ActionIndex,
     settings: &LearnerSettings,
-) -> Result<Vec<Question>> {
+) -> Result<Vec<ProposedComparison>> {
     Learner::default().comparisons_to_ask(space, log, action, settings)
 }
 
-/// As [`comparisons_to_ask`] where some actions cannot be compared, because there is nothing to show of them.
+/// [`comparisons_to_ask`] if only some actions are comparable, for example those with a gait to show.
 ///
-/// They count in their batches; in the buffer, and as the best one, stand the others.
+/// The other actions still count as members of their batches. Buffer and best action consist of comparable ones.
 ///
 /// # Errors
 /// As [`comparisons_to_ask`].
@@ -61,19 +62,39 @@ pub fn comparisons_to_ask_among(
     action: ActionIndex,
     settings: &LearnerSettings,
     comparable: impl Fn(ActionIndex) -> bool,
-) -> Result<Vec<Question>> {
+) -> Result<Vec<ProposedComparison>> {
     let of = Partners::of(settings, &comparable);
-    Learner::default().questions(space, log, action, settings, &of)
+    Learner::default().comparisons(space, log, action, settings, &of)
 }
 
-/// Earlier actions to compare with.
+/// Number of answered comparisons per repeated one.
+const ANSWERS_PER_REPEAT: usize = 8;
+
+/// The next comparison to ask about visited actions, if any is worth asking.
+///
+/// An action whose last label is the lowest category is not comparable, because it did not converge. Unanswered
+/// comparisons of the last comparable action come first: with its partners of [`comparisons_to_ask`], with the action
+/// before it, and with the best action. After these, one comparison per eight answers is a repetition: the oldest pair
+/// that was answered once. Repetitions measure the consistency of the answers.
+///
+/// # Errors
+/// If a setting is out of range or the log does not fit the space.
+pub fn what_to_ask(
+    space: &SearchSpace,
+    log: &FeedbackLog,
+    settings: &LearnerSettings,
+) -> Result<Option<ProposedComparison>> {
+    Learner::default().what_to_ask(space, log, settings)
+}
+
+/// The rule for the partners of an action.
 struct Partners<'a> {
     which: Partner,
-    /// Of the previous ones, how many before the batch.
+    /// Number of previous actions before the batch.
     buffer: usize,
-    /// How many trials are one batch.
+    /// Number of trials of a batch.
     batch: usize,
-    /// Whether an action can be compared at all.
+    /// Whether an action can be compared.
     comparable: &'a dyn Fn(ActionIndex) -> bool,
 }
 
@@ -84,7 +105,7 @@ impl<'a> Partners<'a> {
 }
 
 impl Learner {
-    /// As [`comparisons_to_ask`].
+    /// [`comparisons_to_ask`] with the cache.
     ///
     /// # Errors
     /// As [`comparisons_to_ask`].
@@ -94,76 +115,58 @@ impl Learner {
         log: &FeedbackLog,
         action: ActionIndex,
         settings: &LearnerSettings,
-    ) -> Result<Vec<Question>> {
-        self.questions(space, log, action, settings, &Partners::of(settings, &|_| true))
+    ) -> Result<Vec<ProposedComparison>> {
+        self.comparisons(space, log, action, settings, &Partners::of(settings, &|_| true))
     }
 
-    /// The comparisons with a kind of partners, whatever the settings say of these: no belief depends on that.
-    fn questions(
+    /// The comparisons by any rule. The posterior does not depend on the rule, so the cache stays valid.
+    fn comparisons(
         &mut self,
         space: &SearchSpace,
         log: &FeedbackLog,
         action: ActionIndex,
         settings: &LearnerSettings,
         of: &Partners<'_>,
-    ) -> Result<Vec<Question>> {
+    ) -> Result<Vec<ProposedComparison>> {
         space.check(action)?;
         settings.validate()?;
         log.validate(space, settings.categories())?;
         let tried = log.visited.len();
         let end = match log.visited.iter().rposition(|&a| a == action) {
-            // Repeated trials: an earlier one is not the one asked about.
+            // With repeats, only the newest trial can be the one in question.
             Some(position) if !settings.repeats || position + 1 == tried => position,
             _ => tried,
         };
         let earlier = &log.visited[..end];
-        let mut questions: Vec<Question> = Vec::new();
+        let mut comparisons: Vec<ProposedComparison> = Vec::new();
         let mut add = |against, reason| {
             if against != action
                 && (of.comparable)(against)
-                && !questions.iter().any(|q: &Question| q.against == against)
+                && !comparisons.iter().any(|c: &ProposedComparison| c.against == against)
             {
-                questions.push(Question { action, against, reason });
+                comparisons.push(ProposedComparison { action, against, reason });
             }
         };
         match of.which {
             Partner::Previous => {
                 let (before, batch) = earlier.split_at(end - end % of.batch.max(1));
                 let buffered = before.iter().rev().filter(|a| (of.comparable)(**a)).take(of.buffer);
-                batch.iter().rev().chain(buffered).for_each(|&a| add(a, QuestionReason::Previous));
+                batch.iter().rev().chain(buffered).for_each(|&a| add(a, ComparisonReason::Previous));
             }
-            Partner::Every => earlier.iter().rev().for_each(|&a| add(a, QuestionReason::Previous)),
+            Partner::Every => earlier.iter().rev().for_each(|&a| add(a, ComparisonReason::Previous)),
             Partner::Incumbent if earlier.is_empty() => {}
             Partner::Incumbent => {
                 let before = FeedbackLog { visited: earlier.to_vec(), feedback: log.feedback.clone() };
                 let best = self.posterior(space, &before, settings)?.best_of(of.comparable);
                 if let Some(best) = best {
-                    add(best, QuestionReason::Incumbent);
+                    add(best, ComparisonReason::Incumbent);
                 }
             }
         }
-        Ok(questions)
+        Ok(comparisons)
     }
-}
 
-/// Answered comparisons for each one that is asked again.
-const ANSWERS_PER_REPEAT: usize = 8;
-
-/// The next comparison worth asking about the actions already tried, if any.
-///
-/// Nothing is asked about an action whose last label is the lowest category: nobody can compare what did not converge.
-/// Of the others, first the last action against its partners of [`comparisons_to_ask`], then against the action tried
-/// before it and the best one, where not answered yet. When all are, one pair in eight is asked again, the oldest that
-/// was asked only once: what people answer the second time says how far their answers can be trusted.
-///
-/// # Errors
-/// When a setting is out of range or the log does not fit the space.
-pub fn what_to_ask(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) -> Result<Option<Question>> {
-    Learner::default().what_to_ask(space, log, settings)
-}
-
-impl Learner {
-    /// As [`what_to_ask`].
+    /// [`what_to_ask`] with the cache.
     ///
     /// # Errors
     /// As [`what_to_ask`].
@@ -172,7 +175,7 @@ impl Learner {
         space: &SearchSpace,
         log: &FeedbackLog,
         settings: &LearnerSettings,
-    ) -> Result<Option<Question>> {
+    ) -> Result<Option<ProposedComparison>> {
         let failed = log.in_lowest_category(settings.categories());
         let comparable = |action: ActionIndex| !failed.contains(&action);
         let Some(&last) = log.visited.iter().rev().find(|a| comparable(**a)) else { return Ok(None) };
@@ -186,12 +189,12 @@ impl Learner {
                 Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
             })
             .collect();
-        let mut questions = self.questions(space, log, last, settings, &Partners::of(settings, &comparable))?;
+        let mut comparisons = self.comparisons(space, log, last, settings, &Partners::of(settings, &comparable))?;
         for which in [Partner::Previous, Partner::Incumbent] {
             let of = Partners { which, buffer: 1, batch: 1, comparable: &comparable };
-            questions.extend(self.questions(space, log, last, settings, &of)?);
+            comparisons.extend(self.comparisons(space, log, last, settings, &of)?);
         }
-        if let Some(open) = questions.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
+        if let Some(open) = comparisons.into_iter().find(|q| !answered.contains(&pair(q.action, q.against))) {
             return Ok(Some(open));
         }
         let times = |asked: &(ActionIndex, ActionIndex)| answered.iter().filter(|a| *a == asked).count();
@@ -200,18 +203,18 @@ impl Learner {
             return Ok(None);
         }
         let once = answered.iter().find(|asked| times(asked) == 1 && comparable(asked.0) && comparable(asked.1));
-        Ok(once.map(|&(action, against)| Question { action, against, reason: QuestionReason::Consistency }))
+        Ok(once.map(|&(action, against)| ProposedComparison { action, against, reason: ComparisonReason::Consistency }))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::search_space::Dimension;
     use crate::settings::Method;
-    use crate::space::Dimension;
 
     #[test]
-    fn questions_come_in_order_and_a_pair_is_repeated() {
+    fn comparisons_come_in_order_and_one_in_eight_is_a_repetition() {
         let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
         let space = SearchSpace::new(vec![dimension]).unwrap();
         let settings = LearnerSettings::default();
@@ -222,22 +225,22 @@ mod tests {
         for action in [9, 5, 12, 7, 20].map(ActionIndex) {
             log.visited.push(action);
             while let Some(question) = what_to_ask(&space, &log, &settings).unwrap() {
-                assert_eq!(learner.what_to_ask(&space, &log, &settings).unwrap(), Some(question), "the cache");
+                assert_eq!(learner.what_to_ask(&space, &log, &settings).unwrap(), Some(question), "with the cache");
                 reasons.push(question.reason);
-                assert!(reasons.len() < 30, "asks for ever");
+                assert!(reasons.len() < 30, "the comparisons do not end");
                 let (a, b) = (question.action, question.against);
                 let closer = a.0.abs_diff(8) < b.0.abs_diff(8);
                 let (winner, loser) = if closer { (a, b) } else { (b, a) };
                 log.feedback.push(Feedback::Preference { winner, loser });
             }
         }
-        assert_eq!(reasons[0], QuestionReason::Incumbent);
-        assert!(reasons.contains(&QuestionReason::Previous));
-        assert_eq!(reasons.iter().filter(|r| **r == QuestionReason::Consistency).count(), 1, "{reasons:?}");
+        assert_eq!(reasons[0], ComparisonReason::Incumbent);
+        assert!(reasons.contains(&ComparisonReason::Previous));
+        assert_eq!(reasons.iter().filter(|r| **r == ComparisonReason::Consistency).count(), 1, "{reasons:?}");
     }
 
     #[test]
-    fn nothing_is_asked_about_an_action_that_did_not_converge() {
+    fn actions_that_did_not_converge_are_never_compared() {
         let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
         let space = SearchSpace::new(vec![dimension]).unwrap();
         let fails = |action: ActionIndex| action.0.is_multiple_of(3);
@@ -253,13 +256,13 @@ mod tests {
                         assert!(!fails(question.action) && !fails(question.against), "{question:?}");
                         log.feedback.push(Feedback::Preference { winner: question.action, loser: question.against });
                         asked += 1;
-                        assert!(asked < 100, "asks for ever");
+                        assert!(asked < 100, "the comparisons do not end");
                     }
                 }
                 assert!(asked >= 6, "{asked}");
             }
         }
-        // A label that was corrected counts, not the one before it.
+        // The last label of an action counts.
         let [a, b] = [1, 2].map(ActionIndex);
         let labels = [0, 1].map(|category| Feedback::Label { action: a, category });
         let log = FeedbackLog { visited: vec![a, b], feedback: labels.to_vec() };
@@ -271,13 +274,13 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_compared_counts_in_its_batch() {
+    fn incomparable_actions_count_as_members_of_their_batch() {
         let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
         let space = SearchSpace::new(vec![dimension]).unwrap();
         let (partner, repeats) = (Partner::Previous, false);
         let settings =
             LearnerSettings { samples_per_iteration: 3, buffer: 2, partner, repeats, ..LearnerSettings::default() };
-        // Batches 0 1 2, 3 4 5, 6 7: of the first two, 1, 4 and 5 cannot be compared.
+        // Batches 0 1 2, 3 4 5 and 6 7, of which 1, 4 and 5 are not comparable.
         let log = FeedbackLog { visited: (0..8).map(ActionIndex).collect(), feedback: Vec::new() };
         let comparable = |action: ActionIndex| ![1, 4, 5].contains(&action.0);
         let against = |action: u64| -> Vec<u64> {
@@ -291,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn batches_are_compared_as_published() {
+    fn published_partners_compare_batches_and_buffer() {
         let dimension = Dimension { name: "x".into(), values: (0..30).map(f64::from).collect(), lengthscale: 2.0 };
         let space = SearchSpace::new(vec![dimension]).unwrap();
         let tried: Vec<ActionIndex> = (0..9).map(|i| ActionIndex(29 - 3 * i)).collect();
@@ -301,11 +304,11 @@ mod tests {
             let mut asked = Vec::new();
             for (end, &action) in tried.iter().enumerate() {
                 let log = FeedbackLog { visited: tried[..end].to_vec(), feedback: Vec::new() };
-                let questions = comparisons_to_ask(&space, &log, action, &settings).unwrap();
-                // The same when the trial is already in the log.
+                let comparisons = comparisons_to_ask(&space, &log, action, &settings).unwrap();
+                // The log may already have the trial.
                 let after = FeedbackLog { visited: tried[..=end].to_vec(), feedback: Vec::new() };
-                assert_eq!(comparisons_to_ask(&space, &after, action, &settings).unwrap(), questions);
-                asked.extend(questions.iter().map(|q| (q.against, q.action)));
+                assert_eq!(comparisons_to_ask(&space, &after, action, &settings).unwrap(), comparisons);
+                asked.extend(comparisons.iter().map(|q| (q.against, q.action)));
             }
             let mut expected = Vec::new();
             for (start, batch) in (0..).step_by(n).zip(tried.chunks(n)) {

@@ -1,6 +1,6 @@
-//! Scalar functions that must not lose digits in the tails.
+//! Scalar functions with full relative precision in the tails.
 //!
-//! `libm` rather than the platform's library: the same bits on every machine.
+//! `libm` instead of the platform's library gives the same bits on every machine.
 
 /// `1 / sqrt(2 pi)`.
 const INV_SQRT_2PI: f64 = 0.398_942_280_401_432_7;
@@ -19,19 +19,19 @@ pub(crate) fn ln_1p(x: f64) -> f64 {
     libm::log1p(x)
 }
 
-/// Density of the standard normal.
+/// Standard normal density `phi(z)`.
 pub(crate) fn normal_density(z: f64) -> f64 {
     INV_SQRT_2PI * exp(-0.5 * z * z)
 }
 
-/// Distribution function of the standard normal.
+/// Standard normal distribution function `Phi(z)`.
 pub(crate) fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// Mills ratio `(1 - Phi(z)) / phi(z)` for `z >= 5`, by its continued fraction `1/(z+1/(z+2/(z+3/(z+...))))`.
 fn mills_ratio(z: f64) -> f64 {
-    // 40 terms reach full precision at z = 5; more are needed only nearer to 0.
+    // 40 terms give full precision for z >= 5.
     let mut tail = z;
     for k in (1..=40_i32).rev() {
         tail = z + f64::from(k) / tail;
@@ -39,7 +39,7 @@ fn mills_ratio(z: f64) -> f64 {
     1.0 / tail
 }
 
-/// Logarithm of the distribution function of the standard normal.
+/// `ln Phi(z)`.
 pub(crate) fn ln_normal_cdf(z: f64) -> f64 {
     if z < -5.0 { -0.5 * z * z - HALF_LN_2PI + ln(mills_ratio(-z)) } else { ln(normal_cdf(z)) }
 }
@@ -59,8 +59,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tails_join_and_match_known_values() {
-        // Reference: log of the normal distribution function, 15 digits.
+    fn values_match_the_reference_and_branches_join() {
+        // Reference values of ln Phi, 15 digits.
         for (z, expected) in [
             (-40.0, -804.608_442_013_753_9),
             (-10.0, -53.231_285_150_512_46),

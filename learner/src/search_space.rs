@@ -1,41 +1,40 @@
-//! The grid of actions: an ordered list of dimensions, each with a few levels.
-
-use std::fmt;
+//! The search space: the grid of all combinations of the levels of its dimensions.
 
 use serde::{Deserialize, Serialize};
 
+use crate::action::ActionIndex;
 use crate::error::{LearnerError, Result};
 
-/// Largest number of actions of a search space: indices stay exact as JSON numbers.
+/// Largest number of actions: up to it, a JSON number represents every index exactly.
 const MAX_ACTIONS: u64 = 1 << 53;
-/// Largest number of actions that are looked at one by one.
+/// Largest number of actions for methods that evaluate the whole grid.
 const MAX_ENUMERATED: usize = 1 << 20;
 /// Largest number of levels of one dimension.
 const MAX_LEVELS: usize = 1_000;
 /// Largest number of dimensions.
 const MAX_DIMENSIONS: usize = 256;
-/// Largest size of a level: squares of distances stay finite.
+/// Largest magnitude of a level: up to it, squared distances stay finite.
 const MAX_LEVEL: f64 = 1e15;
-/// Smallest distance of two levels.
+/// Smallest distance between two levels.
 const MIN_STEP: f64 = 1e-15;
-/// Shortest lengthscale in units of the smallest step: below it no action tells anything of another.
+/// Shortest lengthscale, as a multiple of the smallest step: below it, levels are uncorrelated.
 const SHORTEST_LENGTHSCALE: f64 = 1e-2;
-/// Longest lengthscale in units of the range: above it all levels are the same to double precision.
+/// Longest lengthscale, as a multiple of the range: above it, correlations are 1 in double precision.
 const LONGEST_LENGTHSCALE: f64 = 1e4;
 
-/// One tuned quantity and the values it may take.
+/// One tuned quantity and its levels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Dimension {
-    /// What people call it.
+    /// Name, unique in the search space.
     pub name: String,
-    /// The levels, strictly increasing.
+    /// Levels, strictly increasing; 1 to 1,000 of them.
     pub values: Vec<f64>,
-    /// Distance, in the unit of `values`, over which the utility is expected to stay similar.
+    /// Lengthscale of the Gaussian process, in the unit of `values`: the distance over which utilities stay similar.
     pub lengthscale: f64,
 }
 
-/// For people: the last digits of a product of decimal fractions are noise.
+/// Rounds to three digits, because the last digits of a product of decimal fractions are noise.
 fn to_three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
@@ -44,21 +43,21 @@ impl Dimension {
     fn validate(&self) -> Result<()> {
         let refuse = |reason: String| Err(LearnerError::InvalidDimension { dimension: self.name.clone(), reason });
         if self.values.is_empty() {
-            return refuse("it has no value to try".into());
+            return refuse("at least one level is needed".into());
         }
         if self.values.len() > MAX_LEVELS {
-            return refuse(format!("it has {} levels, at most {MAX_LEVELS} are accepted", self.values.len()));
+            return refuse(format!("{} levels given, at most {MAX_LEVELS} are allowed", self.values.len()));
         }
         if let Some(value) = self.values.iter().find(|v| v.is_nan() || v.abs() > MAX_LEVEL) {
-            return refuse(format!("level {value} is not between {:e} and {MAX_LEVEL:e}", -MAX_LEVEL));
+            return refuse(format!("level {value} is outside the range from {:e} to {MAX_LEVEL:e}", -MAX_LEVEL));
         }
         if let Some([low, high]) = self.values.array_windows().find(|[low, high]| low >= high) {
-            return refuse(format!("values must increase, but {low} is followed by {high}"));
+            return refuse(format!("levels must increase, but {high} follows {low}"));
         }
         let steps = self.values.array_windows().map(|[low, high]| high - low);
         let nearest = steps.reduce(f64::min).unwrap_or(1.0);
         if nearest < MIN_STEP {
-            return refuse(format!("levels {nearest:e} apart are nearer than {MIN_STEP:e}"));
+            return refuse(format!("two levels are {nearest:e} apart; the smallest distance allowed is {MIN_STEP:e}"));
         }
         let (shortest, longest) = match self.values.len() {
             1 => (MIN_STEP, MAX_LEVEL),
@@ -75,13 +74,13 @@ impl Dimension {
         Ok(())
     }
 
-    /// Distance between the first and the last level; the lengthscale where there is only one level.
+    /// Distance between the first and the last level; the lengthscale if there is only one level.
     pub(crate) fn range(&self) -> f64 {
         let range = self.values.last().unwrap_or(&0.0) - self.values.first().unwrap_or(&0.0);
         if range > 0.0 { range } else { self.lengthscale }
     }
 
-    /// Mean distance between neighbouring levels; the lengthscale itself where there is only one level.
+    /// Mean distance between neighbouring levels; the lengthscale if there is only one level.
     pub(crate) fn mean_step(&self) -> f64 {
         match (self.values.first(), self.values.last()) {
             (Some(first), Some(last)) if self.values.len() > 1 => (last - first) / (self.values.len() - 1) as f64,
@@ -90,18 +89,7 @@ impl Dimension {
     }
 }
 
-/// Number of an action in its space, row-major, the last dimension running fastest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct ActionIndex(pub u64);
-
-impl fmt::Display for ActionIndex {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-/// A validated grid of actions.
+/// A validated search space. Its actions are numbered by [`ActionIndex`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "SpaceDocument", into = "SpaceDocument")]
 pub struct SearchSpace {
@@ -109,7 +97,7 @@ pub struct SearchSpace {
     len: u64,
 }
 
-/// What is written: the dimensions alone, the rest follows.
+/// Serialised form: the dimensions, from which the rest follows.
 #[derive(Serialize, Deserialize)]
 struct SpaceDocument {
     dimensions: Vec<Dimension>,
@@ -133,8 +121,8 @@ impl SearchSpace {
     /// The grid of all combinations of the dimensions' levels.
     ///
     /// # Errors
-    /// When there is no dimension, a dimension has no level, unordered levels, levels or a lengthscale out of range, two
-    /// dimensions have one name, or the grid is too large to be counted.
+    /// If there is no dimension or more than 256, if levels do not increase, if a level or a lengthscale is out of
+    /// range, if two dimensions share a name, or if the grid has more than 2^53 actions.
     pub fn new(dimensions: Vec<Dimension>) -> Result<Self> {
         if dimensions.is_empty() {
             return Err(LearnerError::NoDimension);
@@ -146,7 +134,7 @@ impl SearchSpace {
                 return Err(LearnerError::InvalidDimension {
                     dimension: dimension.name.clone(),
                     reason: if d >= MAX_DIMENSIONS {
-                        format!("at most {MAX_DIMENSIONS} dimensions are accepted")
+                        format!("it is dimension {}, at most {MAX_DIMENSIONS} are allowed", d + 1)
                     } else {
                         "another dimension has the same name".into()
                     },
@@ -171,7 +159,7 @@ impl SearchSpace {
         self.len
     }
 
-    /// Number of actions when all of them can be looked at.
+    /// Number of actions, if the grid is small enough to evaluate all of them.
     pub(crate) fn enumerable(&self) -> Result<usize> {
         usize::try_from(self.len)
             .ok()
@@ -184,20 +172,20 @@ impl SearchSpace {
         self.dimensions.iter().map(|d| d.values.len()).collect()
     }
 
-    /// Whether the action is in the grid.
+    /// Whether the action is in the search space.
     pub fn contains(&self, action: ActionIndex) -> bool {
         action.0 < self.len
     }
 
-    /// The action itself when it is in the grid.
+    /// Returns the action if it is in the search space.
     ///
     /// # Errors
-    /// When it is not.
+    /// [`LearnerError::UnknownAction`] if it is not.
     pub fn check(&self, action: ActionIndex) -> Result<ActionIndex> {
         if self.contains(action) { Ok(action) } else { Err(LearnerError::UnknownAction { action, actions: self.len }) }
     }
 
-    /// The level of every dimension. An index outside the grid is taken modulo the number of actions.
+    /// Level index of each dimension, counted from 0. An index outside the space is taken modulo the number of actions.
     pub fn levels(&self, action: ActionIndex) -> Vec<usize> {
         let mut rest = action.0;
         let mut levels = vec![0; self.dimensions.len()];
@@ -209,15 +197,15 @@ impl SearchSpace {
         levels
     }
 
-    /// The value of every dimension. An index outside the grid is taken modulo the number of actions.
+    /// Value of each dimension, in its unit. An index outside the space is taken modulo the number of actions.
     pub fn values(&self, action: ActionIndex) -> Vec<f64> {
         self.levels(action).iter().zip(&self.dimensions).map(|(&level, d)| d.values[level]).collect()
     }
 
-    /// The action with the given level in every dimension.
+    /// The action with the given level index in each dimension, counted from 0.
     ///
     /// # Errors
-    /// When the number of levels is wrong or one of them does not exist.
+    /// If the number of levels differs from the number of dimensions, or a level does not exist.
     pub fn index_of_levels(&self, levels: &[usize]) -> Result<ActionIndex> {
         self.check_count(levels.len())?;
         let mut index = 0_u64;
@@ -231,10 +219,10 @@ impl SearchSpace {
         Ok(ActionIndex(index))
     }
 
-    /// The action with the given value in every dimension, to 1e-9 of the distance between levels.
+    /// The action with the given value in each dimension, to a tolerance of 1e-9 of the mean step.
     ///
     /// # Errors
-    /// When the number of values is wrong or one of them is not a level.
+    /// If the number of values differs from the number of dimensions, or a value is not a level.
     pub fn index_of_values(&self, values: &[f64]) -> Result<ActionIndex> {
         self.check_count(values.len())?;
         let mut levels = Vec::with_capacity(values.len());
@@ -267,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn last_dimension_runs_fastest() {
+    fn last_dimension_varies_fastest() {
         let space = SearchSpace::new(vec![dimension("a", &[0.0, 1.0]), dimension("b", &[5.0, 6.0, 8.0])]).unwrap();
         assert_eq!(space.len(), 6);
         assert_eq!(space.levels(ActionIndex(4)), [1, 1]);
@@ -284,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_spaces_are_refused() {
+    fn invalid_search_spaces_are_rejected() {
         for dimensions in [
             vec![],
             vec![dimension("a", &[])],
@@ -307,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn the_document_is_validated() {
+    fn deserialisation_validates_levels() {
         let space = SearchSpace::new(vec![dimension("a", &[0.0, 1.0])]).unwrap();
         let text = serde_json::to_string(&space).unwrap();
         assert_eq!(serde_json::from_str::<SearchSpace>(&text).unwrap(), space);

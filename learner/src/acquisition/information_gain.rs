@@ -1,49 +1,59 @@
-//! Information gain: the action whose answers tell most about the utility.
+//! Information gain (ROIAL, Li et al. 2021): the mutual information between the utility and the next feedback.
 //!
-//! The mutual information between the utility and the next answers, a preference of the action against its partner
-//! and its label: `H(answers) - E_f H(answers | f)`. The expectations are means over joint draws of the two
-//! utilities, the same standard normals for every action.
+//! The feedback is a preference between the action and its partner, and the label of the action. Its mutual information
+//! is `H(feedback) - E_f H(feedback | f)`. Expectations are means over joint samples of the two utilities, with the
+//! same standard normals for every action.
 //!
-//! Separate labels first say whether the action is in the lowest category, which tells of feasibility alone; only when
-//! it is not do the grade and the preference tell of the utility. The two functions are independent, so the information
-//! is a sum: that of the first answer, and that of the others times the chance that they are given.
+//! With separate labels, category 0 informs feasibility only. The grade and the preference inform the utility, and are
+//! given only for a feasible action. The two processes are independent, so the information is that of feasibility plus
+//! that of the others times the probability that the action is feasible.
 
+use std::collections::HashSet;
+
+use crate::acquisition::avoidance::Avoidance;
+use crate::acquisition::candidates::random_untaken;
+use crate::action::ActionIndex;
 use crate::likelihood::Interval;
-use crate::math;
+use crate::posterior::Posterior;
 use crate::random::Random;
-use crate::settings::{Labels, LearnerSettings};
+use crate::settings::{Labels, LearnerSettings, Partner};
+use crate::special_functions;
 
-/// Number of draws of the pair of utilities.
-const DRAWS: usize = 256;
+/// Number of random candidates, as in ROIAL.
+const CANDIDATES: usize = 500;
 
-/// Shared standard normals.
-pub(crate) struct InformationGain<'a> {
+/// Number of samples of the two utilities.
+const SAMPLES: usize = 256;
+
+/// Mutual information with common random numbers.
+struct InformationGain<'a> {
     settings: &'a LearnerSettings,
-    /// What a label may say of the utility.
+    /// Intervals of utilities that a label can name.
     grades: Vec<Interval>,
     normals: Vec<[f64; 2]>,
 }
 
-/// The utilities of an action and its partner.
-pub(crate) struct Pair {
-    pub(crate) mean: [f64; 2],
-    pub(crate) variance: [f64; 2],
-    pub(crate) covariance: f64,
-    /// Whether the two will be compared, if the action is not in the lowest category.
-    pub(crate) compared: bool,
+/// Joint moments of the utilities of an action and its partner.
+struct Pair {
+    mean: [f64; 2],
+    variance: [f64; 2],
+    covariance: f64,
+    /// Whether the two will be compared if the action is feasible.
+    compared: bool,
 }
 
+/// `-p ln p`.
 fn entropy(p: f64) -> f64 {
-    if p > 0.0 { -p * math::ln(p) } else { 0.0 }
+    if p > 0.0 { -p * special_functions::ln(p) } else { 0.0 }
 }
 
-/// Entropy of an answer of two values.
+/// Entropy of a binary variable, in nats.
 fn binary_entropy(p: f64) -> f64 {
     entropy(p) + entropy(1.0 - p)
 }
 
 impl<'a> InformationGain<'a> {
-    pub(crate) fn new(settings: &'a LearnerSettings, random: &mut Random) -> Self {
+    fn new(settings: &'a LearnerSettings, random: &mut Random) -> Self {
         let categories = 0..settings.categories();
         let mut grades: Vec<Interval> = match settings.labels {
             Labels::InUtility => categories.map(|category| settings.label_interval(category)).collect(),
@@ -52,25 +62,25 @@ impl<'a> InformationGain<'a> {
         if grades.is_empty() {
             grades.push(Interval { low: f64::NEG_INFINITY, high: f64::INFINITY, noise: settings.ordinal_noise });
         }
-        Self { settings, grades, normals: (0..DRAWS).map(|_| [random.normal(), random.normal()]).collect() }
+        Self { settings, grades, normals: (0..SAMPLES).map(|_| [random.normal(), random.normal()]).collect() }
     }
 
-    /// Information, in nats, of comparing and labelling an action. `feasibility` is the mean and variance of the function
-    /// that labels are about, where they are separate.
-    pub(crate) fn of(&self, utility: &Pair, feasibility: Option<(f64, f64)>) -> f64 {
+    /// Information of the label and the comparison of an action, in nats. With separate labels, `feasibility` is the
+    /// mean and variance of its feasibility.
+    fn of(&self, utility: &Pair, feasibility: Option<(f64, f64)>) -> f64 {
         let about_utility = self.about_utility(utility);
         let Some((mean, variance)) = feasibility else { return about_utility };
         let lowest = self.settings.feasibility_interval(0);
         let (mut fails, mut given_function) = (0.0, 0.0);
         for [z, _] in &self.normals {
             let p = lowest.probability(self.settings.link, mean + variance.max(0.0).sqrt() * z);
-            fails += p / DRAWS as f64;
-            given_function += binary_entropy(p) / DRAWS as f64;
+            fails += p / SAMPLES as f64;
+            given_function += binary_entropy(p) / SAMPLES as f64;
         }
         binary_entropy(fails) - given_function + (1.0 - fails) * about_utility
     }
 
-    /// Information of the preference and the grade.
+    /// Information of the preference and the grade, in nats.
     fn about_utility(&self, Pair { mean, variance, covariance, compared }: &Pair) -> f64 {
         let sd = variance[0].max(1e-18).sqrt();
         let slope = covariance / sd;
@@ -83,17 +93,58 @@ impl<'a> InformationGain<'a> {
             let f = mean[0] + sd * z;
             let partner = mean[1] + slope * z + rest * w;
             let preferred = if *compared { better.probability(settings.link, f - partner) } else { 1.0 };
-            // Given the utilities the two answers are independent: their uncertainties add up.
-            conditional += binary_entropy(preferred) / DRAWS as f64;
+            // Given the utilities, preference and label are independent, so their entropies add.
+            conditional += binary_entropy(preferred) / SAMPLES as f64;
             for (grade, marginal) in self.grades.iter().zip(&mut marginal) {
                 let label = grade.probability(settings.link, f);
-                conditional += entropy(label) / DRAWS as f64;
-                marginal[0] += preferred * label / DRAWS as f64;
-                marginal[1] += (1.0 - preferred) * label / DRAWS as f64;
+                conditional += entropy(label) / SAMPLES as f64;
+                marginal[0] += preferred * label / SAMPLES as f64;
+                marginal[1] += (1.0 - preferred) * label / SAMPLES as f64;
             }
         }
         marginal.into_iter().flatten().map(entropy).sum::<f64>() - conditional
     }
+}
+
+/// The most informative of some random actions outside `taken`, and outside the region of avoidance if possible.
+pub(crate) fn over_candidates(
+    posterior: &Posterior,
+    best: ActionIndex,
+    taken: &HashSet<ActionIndex>,
+    random: &mut Random,
+) -> ActionIndex {
+    let space = posterior.space();
+    let gain = InformationGain::new(posterior.settings(), random);
+    let avoidance = Avoidance::of(posterior);
+    let partner = match posterior.settings().partner {
+        Partner::Previous => posterior.visited().last().copied().unwrap_or(best),
+        Partner::Incumbent | Partner::Every => best,
+    };
+    let utility = &posterior.utility;
+    let other = utility.view(partner, space.levels(partner));
+    let other_variance = utility.variance(&other);
+    // A comparison with an infeasible partner does not inform the utility.
+    let compared = posterior.feasibility.is_none() || !posterior.infeasible.contains(&partner);
+    let mut top: Option<((bool, f64), ActionIndex)> = None;
+    for _ in 0..CANDIDATES {
+        let action = random_untaken(space, taken, random);
+        let view = utility.view(action, space.levels(action));
+        let pair = Pair {
+            mean: [view.mean, other.mean],
+            variance: [utility.variance(&view), other_variance],
+            covariance: utility.covariance(&view, &other),
+            compared,
+        };
+        let feasibility = posterior.feasibility.as_ref().map(|process| {
+            let view = process.view(action, space.levels(action));
+            (view.mean, process.variance(&view))
+        });
+        let rank = (avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(action)), gain.of(&pair, feasibility));
+        if top.is_none_or(|(highest, _)| rank > highest) {
+            top = Some((rank, action));
+        }
+    }
+    top.map_or(best, |(_, action)| action)
 }
 
 #[cfg(test)]
@@ -101,7 +152,7 @@ mod tests {
     use super::*;
     use crate::settings::Method;
 
-    /// Mutual information of all answers with both functions at once, from its definition and many draws.
+    /// Mutual information of all feedback with both processes, by its definition and plain Monte Carlo.
     fn by_definition(settings: &LearnerSettings, utility: &Pair, feasibility: (f64, f64)) -> f64 {
         let mut random = Random::new(5, 0);
         let better = Interval { low: 0.0, high: f64::INFINITY, noise: settings.preference_noise };
@@ -129,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn separate_labels_inform_of_feasibility_and_only_feasible_actions_of_the_utility() {
+    fn information_with_separate_labels_matches_its_definition() {
         let utility = |compared| Pair { mean: [0.3, 0.0], variance: [0.8, 0.5], covariance: 0.2, compared };
         for ordinal_thresholds in [vec![0.0], vec![-0.2, 0.3, 0.9]] {
             let settings = LearnerSettings {
@@ -146,7 +197,7 @@ mod tests {
                     assert!((got - exact).abs() < 0.06, "{got} {exact} {feasibility:?} {compared}");
                 }
             }
-            // What surely fails tells nothing, of whatever utility.
+            // An action that is certainly infeasible gives no information.
             assert!(gain.of(&utility(true), Some((-9.0, 0.1))) < 1e-6);
         }
     }

@@ -1,14 +1,25 @@
-//! Answers about points of the grid, as a Gaussian process sees them.
+//! Observations of the utility, and the points of the grid that they are about.
 
 use std::collections::HashMap;
 
+use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::likelihood::Interval;
 use crate::linalg::Cholesky;
-use crate::space::{ActionIndex, SearchSpace};
+use crate::search_space::SearchSpace;
 
-/// An answer about the utility of one point or the difference of two.
+/// An observation of the utility of one action, or of the difference of two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Observation {
+    /// Action with coefficient +1.
+    pub(crate) plus: ActionIndex,
+    /// Action with coefficient -1.
+    pub(crate) minus: Option<ActionIndex>,
+    pub(crate) interval: Interval,
+}
+
+/// An observation in terms of points: one factor ("site") of the likelihood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Site {
     /// Point with coefficient +1.
@@ -25,9 +36,9 @@ impl Site {
     }
 }
 
-/// Points in the order in which answers first speak of them, the factor of their prior covariance, and the answers.
+/// The points, in the order of their first observation, the Cholesky factor of their prior covariance, and the sites.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Model {
+pub(crate) struct ObservedPoints {
     pub(crate) points: Vec<ActionIndex>,
     pub(crate) levels: Vec<Vec<usize>>,
     pub(crate) prior: Cholesky,
@@ -35,8 +46,8 @@ pub(crate) struct Model {
     slots: HashMap<ActionIndex, usize>,
 }
 
-impl Model {
-    /// A copy with room for one more point.
+impl ObservedPoints {
+    /// A copy with capacity for one more point.
     pub(crate) fn roomy(&self) -> Self {
         Self {
             points: self.points.clone(),
@@ -50,6 +61,11 @@ impl Model {
     /// Position of an action among the points.
     pub(crate) fn slot(&self, action: ActionIndex) -> Option<usize> {
         self.slots.get(&action).copied()
+    }
+
+    /// Whether an observation is about an action that is not a point yet.
+    pub(crate) fn lacks(&self, observation: &Observation) -> bool {
+        self.slot(observation.plus).is_none() || observation.minus.is_some_and(|minus| self.slot(minus).is_none())
     }
 
     /// The point of an action, added if it is new.
@@ -68,18 +84,11 @@ impl Model {
         Ok(slot)
     }
 
-    /// Adds an answer about one action or the difference of two.
-    pub(crate) fn add(
-        &mut self,
-        space: &SearchSpace,
-        kernel: &Kernel,
-        plus: ActionIndex,
-        minus: Option<ActionIndex>,
-        interval: Interval,
-    ) -> Result<()> {
-        let plus = self.point(space, kernel, plus)?;
-        let minus = minus.map(|action| self.point(space, kernel, action)).transpose()?;
-        self.sites.push(Site { plus, minus, interval });
+    /// Adds an observation and its points.
+    pub(crate) fn add(&mut self, space: &SearchSpace, kernel: &Kernel, observation: &Observation) -> Result<()> {
+        let plus = self.point(space, kernel, observation.plus)?;
+        let minus = observation.minus.map(|action| self.point(space, kernel, action)).transpose()?;
+        self.sites.push(Site { plus, minus, interval: observation.interval });
         Ok(())
     }
 }

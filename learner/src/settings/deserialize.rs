@@ -1,31 +1,32 @@
-//! Settings as they are written: what is not given is what is recommended for the method that is.
+//! Deserialisation of settings: missing fields take the recommended values of the method.
 
 use serde::{Deserialize, Deserializer};
 
-use super::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Link, Method, Partner, Start};
+use super::{EVERY_TRIAL, Inference, Labels, LearnerSettings, Method, Partner, Start};
+use crate::likelihood::Link;
 
-/// Of a field that is given, its value: null is a value where the field has one.
+/// Wraps the value of a present field, so that `null` stays distinct from a missing field.
 fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
     T::deserialize(deserializer).map(Some)
 }
 
 macro_rules! settings {
     ($($field:ident: $type:ty,)*) => {
-        /// The settings given, each of them optional.
+        /// Settings of which any may be missing.
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
-        pub(crate) struct WrittenSettings {
+        struct PartialSettings {
             #[serde(default, deserialize_with = "given")]
             method: Option<Method>,
             $(#[serde(default, deserialize_with = "given")]
             $field: Option<$type>,)*
         }
 
-        impl From<WrittenSettings> for LearnerSettings {
-            fn from(given: WrittenSettings) -> Self {
+        impl From<PartialSettings> for LearnerSettings {
+            fn from(given: PartialSettings) -> Self {
                 let rest = given.method.map_or_else(Self::default, Self::of);
                 let settings = Self { method: rest.method, $($field: given.$field.unwrap_or(rest.$field),)* };
-                // Earlier versions wrote the largest number there is.
+                // A record may hold 2^64 - 1, which many JSON readers cannot represent.
                 Self { line_trials: settings.line_trials.min(EVERY_TRIAL), ..settings }
             }
         }
@@ -61,6 +62,12 @@ settings! {
     buffer: usize,
 }
 
+impl<'de> Deserialize<'de> for LearnerSettings {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        PartialSettings::deserialize(deserializer).map(Self::from)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -70,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_method_alone_means_what_is_recommended_for_it() {
+    fn method_alone_gives_its_recommended_settings() {
         for method in [Method::LineCoSpar, Method::Eubo, Method::Thompson, Method::InformationGain, Method::Random] {
             let name = serde_json::to_string(&method).unwrap();
             assert_eq!(read(&format!("{{\"method\":{name}}}")), LearnerSettings::of(method));
@@ -79,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_field_given_changes_that_field_alone() {
+    fn given_field_changes_that_field_only() {
         let eubo = LearnerSettings::of(Method::Eubo);
         assert_eq!(
             read(r#"{"preference_noise":0.05,"avoidance":-0.45,"method":"eubo"}"#),
@@ -96,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_as_it_was() {
+    fn settings_round_trip_through_json() {
         let changed = LearnerSettings {
             learn_every: Some(7),
             ordinal_thresholds: vec![-0.5, 0.3],
@@ -113,8 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_complete_document_means_what_it_says_whatever_is_recommended_now() {
-        // As studies have stored it.
+    fn complete_document_overrides_every_recommendation() {
         let stored = r#"{"method":"eubo","inference":"laplace","link":"logistic","signal_variance":1.0,"nugget":1e-5,
             "lengthscale_factor":1.0,"additive_share":0.0,"pairwise_share":0.0,"broad_lengthscale":1.0,
             "labels":"in_utility","feasibility_lengthscale_factor":1.0,"feasibility_additive_share":0.0,

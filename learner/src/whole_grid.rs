@@ -1,47 +1,50 @@
-//! Quantities of all actions at once.
+//! Means, covariances and variances of all `N` actions at once.
 //!
-//! The covariances of the whole grid with the points are never stored: the dimensions are cut in two halves, and each
-//! covariance is a product (or two) of a number of the left half and a number of the right half.
+//! The `N x n` covariances with the points are never stored. The dimensions are divided into a left and a right half; a
+//! covariance is a short sum of products of one number from each half (`Kernel::split`).
 
-use crate::belief::Belief;
+use crate::action::ActionIndex;
+use crate::gaussian_process::GaussianProcess;
 use crate::linalg::{BLOCK, Block, add_scaled, add_scaled_products};
-use crate::space::{ActionIndex, SearchSpace};
+use crate::search_space::SearchSpace;
 
-/// The grid seen from a belief's points.
-pub(crate) struct Grid<'a> {
-    belief: &'a Belief,
+/// A whole grid under a Gaussian process.
+pub(crate) struct WholeGrid<'a> {
+    process: &'a GaussianProcess,
     cut: usize,
     left: Half,
     right: Half,
 }
 
-/// Covariance terms of all combinations of levels of some of the dimensions with the points, point by point.
+/// Covariance terms of all combinations of levels of one half with the points, point by point.
 struct Half {
+    /// Number of combinations of levels.
     count: usize,
-    /// Product terms, then, where the kernel has them, the other ones that couple the halves.
+    /// Coupled terms of [`Kernel::split`](crate::kernel::Kernel::split): all first ones, then, if the kernel has them,
+    /// all second ones.
     coupled: Vec<f64>,
-    /// Terms of this half alone, where the kernel has them.
+    /// Separate terms, if the kernel has them.
     separate: Vec<f64>,
 }
 
 impl Half {
-    fn new(belief: &Belief, shape: &[usize], from: usize, to: usize, left: bool) -> Self {
-        let points = &belief.model().levels;
-        let pure = belief.kernel.is_product();
+    fn new(process: &GaussianProcess, shape: &[usize], from: usize, to: usize, left: bool) -> Self {
+        let points = &process.observed().levels;
+        let pure = process.kernel.is_product();
         let count: usize = shape[from..to].iter().product();
         let mut coupled = Vec::with_capacity(count * points.len() * if pure { 1 } else { 2 });
         let (mut others, mut separate) = (Vec::new(), Vec::new());
         if pure {
             let mut products = Vec::with_capacity(count);
             for point in points {
-                belief.kernel.products(from, &point[from..to], left, &mut products);
+                process.kernel.products(from, &point[from..to], left, &mut products);
                 coupled.extend_from_slice(&products);
             }
             return Self { count, coupled, separate };
         }
         for point in points {
-            for symmetric in belief.kernel.combinations(from, &point[from..to]) {
-                let (pair, alone) = belief.kernel.split(symmetric, left);
+            for symmetric in process.kernel.combinations(from, &point[from..to]) {
+                let (pair, alone) = process.kernel.split(symmetric, left);
                 coupled.push(pair[0]);
                 others.push(pair[1]);
                 separate.push(alone);
@@ -51,7 +54,7 @@ impl Half {
         Self { count, coupled, separate }
     }
 
-    /// Sums over the points of the separate terms, weighted.
+    /// Weighted sum of the separate terms over the points.
     fn separate_form(&self, weights: &[f64]) -> Vec<f64> {
         let mut form = vec![0.0; self.count];
         for (terms, &weight) in self.separate.chunks_exact(self.count.max(1)).zip(weights) {
@@ -61,19 +64,19 @@ impl Half {
     }
 }
 
-impl<'a> Grid<'a> {
-    pub(crate) fn new(space: &SearchSpace, belief: &'a Belief) -> Self {
+impl<'a> WholeGrid<'a> {
+    pub(crate) fn new(space: &SearchSpace, process: &'a GaussianProcess) -> Self {
         let shape = space.shape();
-        // The cut that makes the larger half smallest.
+        // The cut that minimises the larger half.
         let cut = (0..=shape.len())
             .min_by_key(|&cut| shape[..cut].iter().product::<usize>().max(shape[cut..].iter().product()))
             .unwrap_or(0);
-        let left = Half::new(belief, &shape, 0, cut, true);
-        let right = Half::new(belief, &shape, cut, shape.len(), false);
-        Self { belief, cut, left, right }
+        let left = Half::new(process, &shape, 0, cut, true);
+        let right = Half::new(process, &shape, cut, shape.len(), false);
+        Self { process, cut, left, right }
     }
 
-    /// `k(x, points) . weights` for every action.
+    /// `k(x, points) . weights` for every action `x`.
     pub(crate) fn form(&self, weights: &[f64]) -> Vec<f64> {
         let (rows, columns) = (self.left.count, self.right.count);
         let mut form = vec![0.0; rows * columns];
@@ -90,18 +93,18 @@ impl<'a> Grid<'a> {
         form
     }
 
-    /// Prior covariances of every action with one.
+    /// Prior covariance of every action with one action.
     pub(crate) fn prior_with(&self, space: &SearchSpace, action: ActionIndex) -> Vec<f64> {
         let target = space.levels(action);
-        let kernel = &self.belief.kernel;
+        let kernel = &self.process.kernel;
         let left = kernel.combinations(0, &target[..self.cut]);
         let right = kernel.combinations(self.cut, &target[self.cut..]);
         left.iter().flat_map(|&y| right.iter().map(move |&z| kernel.join(y, z))).collect()
     }
 
-    /// Covariances of a few actions with the points.
+    /// Prior covariances of up to [`BLOCK`] actions with the points.
     fn columns(&self, actions: &[usize]) -> Block {
-        let points = self.belief.model().points.len();
+        let points = self.process.observed().points.len();
         let (rows, columns) = (self.left.count, self.right.count);
         let mut block: Block = vec![[0.0; BLOCK]; points];
         for (i, lanes) in block.iter_mut().enumerate() {
@@ -121,16 +124,16 @@ impl<'a> Grid<'a> {
         block
     }
 
-    /// Posterior variances of a few actions that are not points.
+    /// Posterior variances, without nugget, of actions given by their indices.
     pub(crate) fn variances(&self, actions: &[usize]) -> Vec<f64> {
-        let model = self.belief.model();
-        let total = self.belief.kernel.variance;
+        let observed = self.process.observed();
+        let total = self.process.kernel.variance;
         let mut variances = Vec::with_capacity(actions.len());
         for chunk in actions.chunks(BLOCK) {
             let mut block = self.columns(chunk);
-            model.prior.solve_lower_block(&mut block);
+            observed.prior.solve_lower_block(&mut block);
             let explained = crate::linalg::block_dots(&block, &block);
-            let kept = self.belief.approximation().block_variances(&model.prior, block);
+            let kept = self.process.approximation().block_variances(&observed.prior, block);
             variances.extend((0..chunk.len()).map(|lane| (total - explained[lane] + kept[lane]).max(0.0)));
         }
         variances

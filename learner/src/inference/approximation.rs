@@ -1,0 +1,82 @@
+//! The normal approximation of a posterior, and the interface of the methods that compute it.
+//!
+//! An approximation replaces the likelihood of each site by a normal factor `exp(shift d - precision d^2 / 2)` of its
+//! functional `d`. The methods differ in how they choose `shift` and `precision`.
+
+use crate::error::Result;
+use crate::likelihood::Link;
+use crate::linalg::{Block, Cholesky, Square, add_scaled, block_dots};
+use crate::observations::{ObservedPoints, Site};
+
+/// Number of points after which a method computes its approximation from scratch, to limit the rounding error.
+pub(super) const REFRESH: usize = 64;
+
+/// The normal factor of one site, in natural parameters.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Factor {
+    pub(crate) precision: f64,
+    pub(crate) shift: f64,
+}
+
+/// The approximate posterior of the utilities at the `n` points, `K = L L'` their prior covariance.
+#[derive(Debug, Clone)]
+pub(crate) struct Approximation {
+    pub(crate) mean: Vec<f64>,
+    /// `K^-1 mean`, length `n`.
+    pub(crate) weights: Vec<f64>,
+    /// `L^-1 mean`, length `n`.
+    pub(crate) whitened: Vec<f64>,
+    /// One for each site.
+    pub(crate) factors: Vec<Factor>,
+    pub(crate) covariance: Square,
+}
+
+/// A method of approximate inference.
+pub(crate) trait Approximate {
+    /// The approximation for all sites. `previous` is the approximation for the first points and sites, to start from.
+    ///
+    /// The result depends on the arguments only.
+    fn advance(&self, observed: &ObservedPoints, link: Link, previous: Option<&Approximation>)
+    -> Result<Approximation>;
+
+    /// Logarithm of the approximate marginal likelihood of all sites.
+    fn log_evidence(&self, observed: &ObservedPoints, link: Link, approximation: &Approximation) -> Result<f64>;
+}
+
+impl Approximation {
+    /// From an action's whitened prior covariances `w = L^-1 k`: `left = L'^-1 w` and `right = S left`, `S` the
+    /// posterior covariance. The product of `left` and another action's `right` is the part of their covariance due to
+    /// the points.
+    pub(crate) fn project(&self, prior: &Cholesky, whitened: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut left = whitened.to_vec();
+        prior.solve_upper(&mut left);
+        let right = self.covariance.multiply(&left);
+        (left, right)
+    }
+
+    /// For a block of actions: the part of their posterior variance due to the points.
+    pub(crate) fn block_variances(&self, prior: &Cholesky, mut whitened: Block) -> [f64; crate::linalg::BLOCK] {
+        prior.solve_upper_block(&mut whitened);
+        block_dots(&whitened, &self.covariance.multiply_block(&whitened))
+    }
+}
+
+/// Cholesky factor of `B = I + L' W L`, `W = sum_s precision_s a_s a_s'`, `a_s` the coefficients of site `s`.
+pub(crate) fn whitened_precision(prior: &Cholesky, sites: &[Site], factors: &[Factor]) -> Result<Cholesky> {
+    let n = prior.order();
+    // W L: each site has at most two non-zero coefficients.
+    let mut product = Square::zeros(n);
+    for (site, factor) in sites.iter().zip(factors) {
+        let w = factor.precision;
+        if w == 0.0 {
+            continue;
+        }
+        add_scaled(product.row_mut(site.plus), w, prior.row(site.plus));
+        if let Some(minus) = site.minus {
+            add_scaled(product.row_mut(site.plus), -w, prior.row(minus));
+            add_scaled(product.row_mut(minus), -w, prior.row(site.plus));
+            add_scaled(product.row_mut(minus), w, prior.row(minus));
+        }
+    }
+    Cholesky::new(&prior.identity_plus_transposed_product(&product))
+}
