@@ -1,11 +1,10 @@
-//! What the regularisation of activation and fibre velocity does: objective, cost and alternation of the activations
-//! from node to node with and without each.
+//! Effect of the regularisation of activations and fibre velocities on objective, cost and alternations of the
+//! activations.
 //!
-//! `cargo run --release -p gait-optimizer --example activation_smoothness -- [--subject 1]`. Columns: the
-//! root-mean-square bend (second difference of neighbouring points), of the activations and of the fibre velocities
-//! (optimal lengths per second); the same over the ends of mesh intervals alone; alternations (three steps that change
-//! sign twice, each above 0.005) between neighbouring points and between neighbouring ends of intervals; the largest step
-//! between neighbouring points.
+//! `cargo run --release -p gait-optimizer --example activation_smoothness -- [--subject 1]`. The columns are the RMS
+//! bend (second difference at adjacent nodes) of activations and of fibre velocities (optimal fibre lengths per
+//! second); the same over the ends of mesh intervals; the alternations (three steps of alternating sign, each above
+//! 0.005) at nodes and at ends of intervals; and the largest step between adjacent nodes.
 
 use gait_optimizer::gait::MuscleTrajectory;
 use gait_optimizer::metrics::{activation_alternations, alternations};
@@ -17,7 +16,7 @@ fn muscles(gait: &Gait) -> impl Iterator<Item = &MuscleTrajectory> {
     gait.domains.iter().filter_map(|domain| domain.muscles.as_ref())
 }
 
-/// Values of one muscle in one domain, at every `stride`-th point.
+/// Values of a muscle in a domain at every `stride`-th node.
 fn lines(
     gait: &Gait,
     pick: fn(&MuscleTrajectory) -> &Vec<[f64; 10]>,

@@ -1,8 +1,8 @@
-//! Which local optima the cold guesses reach: objective, Gait RMSE and iterations of each.
+//! Local optima that initial guesses reach: objective, Gait RMSE and iterations.
 //!
-//! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--guesses 14] [--grid off]`:
-//! so many guesses of a cold start, or with `--grid on` a grid of timings, knee flexions, strides and barriers; one CSV row
-//! each.
+//! `cargo run --release -p gait-optimizer --example basins -- [--subjects 1,2] [--muscles on] [--threads 2] [--guesses
+//! 14] [--grid off]`: solves from the first `--guesses` initial guesses, or with `--grid on` from a grid of timings,
+//! knee flexions, strides and barrier parameters. Prints one CSV row for each.
 
 mod arguments;
 

@@ -1,6 +1,6 @@
-//! How long a solve goes on after it was cancelled, at instants spread over it.
+//! Time from a cancellation to the end of the solve, at instants spread over the solve.
 //!
-//! `cargo run --release -p gait-optimizer --example cancel_latency`: milliseconds of each, and the longest.
+//! `cargo run --release -p gait-optimizer --example cancel_latency` prints each time and the longest one, in ms.
 
 use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveStatus, Subject, solve};
 use std::error::Error;

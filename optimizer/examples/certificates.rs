@@ -1,18 +1,19 @@
-//! Certificates of the four default gaits: residuals off the mesh, orbit error, multipliers of both methods, pushes.
+//! Certificates of the four default gaits: residuals between nodes, orbit error, multipliers by both methods, and
+//! pushes.
 //!
-//! `cargo run --release -p gait-optimizer --example certificates [-- --all]` (--all: every check of every gait).
+//! `cargo run --release -p gait-optimizer --example certificates [-- --all]`; `--all` prints every check.
 
 use gait_optimizer::certificate::{Certificate, STRIDES, certify};
 use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, Subject, solve};
 use std::error::Error;
 use std::time::Instant;
 
-/// The checks of the table, by the beginning of their names, with a column title.
+/// The checks of the table by the prefix of their names, with the titles of their columns.
 const COLUMNS: [(&str, &str); 6] = [
     ("C1 equations of motion, forces, between", "C1 off mesh, N"),
     ("C2 virtual constraints, between", "C2 off mesh, rad"),
     ("C3 friction cone, between", "friction off mesh, N"),
-    ("C5-C7 fibre and tendon in equilibrium, between", "C5-C7 off mesh, F_max"),
+    ("C5-C7 equilibrium of fibre and tendon, between", "C5-C7 off mesh, F_max"),
     ("orbit error, angles", "orbit, rad"),
     ("orbit error, rates", "orbit, rad/s"),
 ];
@@ -45,16 +46,13 @@ fn print(certificate: &Certificate, all: bool) {
     }
     if let Some(map) = &certificate.return_map {
         println!(
-            "   multipliers: largest {:.5e} (variational), {:.5e} (differences, which resolve {:.1e}), relative difference {:.1e}",
+            "   multipliers: largest {:.5e} (variational), {:.5e} (differences, resolution {:.1e}), relative difference {:.1e}",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
             map.disagreement()
         );
-        println!(
-            "   of a change of speed a stride leaves {:.3e} (and {:.1e} elsewhere)",
-            map.speed_kept, map.speed_leak
-        );
+        println!("   response to a change of speed: {:.3e} (other directions {:.1e})", map.speed_kept, map.speed_leak);
         println!(
             "   gait to periodic motion: {:.1e}, residual there {:.1e} rad, rad/s",
             map.fixed_point_distance, map.fixed_point_residual
@@ -62,7 +60,7 @@ fn print(certificate: &Certificate, all: bool) {
     }
     if let Some(map) = &certificate.free_hip_return_map {
         println!(
-            "   hip velocity left alone: largest {:.6} (variational), {:.6} (differences), relative difference {:.1e}",
+            "   free hip velocity: largest {:.6} (variational), {:.6} (differences), relative difference {:.1e}",
             map.largest,
             map.largest_by_differences,
             map.disagreement()
@@ -70,7 +68,7 @@ fn print(certificate: &Certificate, all: bool) {
     }
     if let Some(pushes) = certificate.pushes {
         println!(
-            "   pushes recovered: {:.2} m/s forwards, {:.2} m/s backwards",
+            "   recovers from pushes of {:.2} m/s forwards, {:.2} m/s backwards",
             pushes.forwards_m_s, pushes.backwards_m_s
         );
     }
@@ -80,7 +78,7 @@ fn print(certificate: &Certificate, all: bool) {
     if all {
         for check in &certificate.checks {
             println!(
-                "      {}: {} ({}), allowed {}",
+                "      {}: {} ({}), limit {}",
                 check.name,
                 check.value_in_words(),
                 check.place,

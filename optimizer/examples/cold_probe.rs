@@ -1,8 +1,8 @@
-//! The four default cold starts: figures, every attempt, and the gap to the golden objectives.
+//! The four default cold starts: results, attempts, and the gap to the golden objectives.
 //!
-//! `cargo run --release -p gait-optimizer --example cold_probe -- [-n | -m] [-v] [--threads 2]
-//! [--reference-problem]` (-n: without muscles, -m: with muscles only, -v: every iteration to stderr; the golden
-//! objectives are those of the reference problem, which has no weight on the activations' bend).
+//! `cargo run --release -p gait-optimizer --example cold_probe -- [-n | -m] [-v] [--threads 2] [--reference-problem]`;
+//! `-n` without muscles only, `-m` with muscles only, `-v` prints every iteration to stderr. The golden objectives
+//! belong to the reference problem, which has no weight on the bend of activations.
 
 use gait_optimizer::{CancelToken, GaitProblem, GaitSettings, SolveOptions, Subject, solve};
 use std::error::Error;

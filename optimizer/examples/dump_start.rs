@@ -1,8 +1,7 @@
-//! Prints the first point of a cold start (posture and motion, without muscles) as JSON: the scaled variables in the order
-//! of `Layout`, for solvers outside this crate that are to start from the same point.
+//! Prints the initial guess of a cold start without muscles as JSON: scaled variables in the order of `Layout`, for
+//! solvers outside this crate.
 //!
-//! `cargo run --release -p gait-optimizer --example dump_start -- [--subject 1|2] [--a5 0.013] [--guess 1]` (number of the
-//! guess: the catalogue's, then perturbed ones)
+//! `cargo run --release -p gait-optimizer --example dump_start -- [--subject 1|2] [--a5 0.013] [--guess 1]`
 
 use gait_optimizer::{ColdGuess, GaitProblem, Subject};
 use std::error::Error;

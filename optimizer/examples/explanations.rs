@@ -1,9 +1,9 @@
-//! Explanations of bounds without a gait, each checked by solving with what it names.
+//! Infeasibility explanations, each checked by solves with the relaxations that it names.
 //!
-//! `cargo run --release -p gait-optimizer --example explanations -- [--subject 1] [--muscles off] [--actions 10] [--seed 1]
-//! [--threads 1] [--bounds "a4=0.5,a7=5;a2=10"]`: draws bounds far tighter than Table I, two at a time, until so many have no gait (or takes those that are given); explains each, then
-//! solves with every relaxation that is said to help (it has to converge, every constraint met) and prints one line per
-//! relaxation. Ends with an error when one does not hold.
+//! `cargo run --release -p gait-optimizer --example explanations -- [--subject 1] [--muscles off] [--actions 10]
+//! [--seed 1] [--threads 1] [--bounds "a4=0.5,a7=5;a2=10"]` explains the given bounds, or draws pairs of bounds far
+//! tighter than Table I until `--actions` of them have no gait. Then it solves with every relaxation that should give a
+//! gait, and prints one line for each. It fails if a solve does not converge.
 
 mod arguments;
 mod splitmix;
@@ -72,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let action = tightened.map(|(name, (own, _))| format!("{name}={own}")).collect::<Vec<_>>().join(" ");
         wrong += print(&problem, &action, &explanation, &options)?;
     }
-    eprintln!("{explained} of {drawn} drawn have no gait; {wrong} relaxations do not hold");
+    eprintln!("{explained} of {drawn} draws have no gait; {wrong} relaxations give no gait");
     if wrong > 0 { Err("an explanation names a relaxation with which no gait converges".into()) } else { Ok(()) }
 }
 
@@ -86,7 +86,7 @@ fn drawn_bounds(random: &mut SplitMix) -> Result<TunedBounds, Box<dyn Error>> {
     Ok(bounds)
 }
 
-/// Prints a line for each relaxation, after solving with it where it is said to help: how many do not hold.
+/// Solves with each relaxation that should give a gait, and prints a line for each. Returns how many do not converge.
 fn print(
     problem: &GaitProblem,
     action: &str,
@@ -95,7 +95,7 @@ fn print(
 ) -> Result<usize, Box<dyn Error>> {
     let conflicts = explanation.conflicts.iter().map(|conflict| {
         let names: Vec<&str> = conflict.bounds.iter().map(|bound| bound.bound.as_str()).collect();
-        if names.is_empty() { "what is fixed".to_owned() } else { names.join(" ") }
+        if names.is_empty() { "fixed constraints".to_owned() } else { names.join(" ") }
     });
     let conflict = if explanation.gait_found { "none".to_owned() } else { conflicts.collect::<Vec<_>>().join(" | ") };
     let worst = explanation.conflicts.first().and_then(|conflict| conflict.violations.first());

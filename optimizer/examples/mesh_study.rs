@@ -1,8 +1,8 @@
-//! Objective and joint angles against the mesh, each mesh started from the gait of the one before.
+//! Objective and joint angles as functions of the mesh. Each mesh starts from the gait of the previous one.
 //!
-//! `cargo run --release -p gait-optimizer --example mesh_study -- [--subject 1] [--muscles on] [--threads 2]
-//! [--finest 3]`: CSV, one row a mesh: the default one (intervals 4,4,6,6) and its doublings; differences are to the row
-//! before, at the points that both meshes have.
+//! `cargo run --release -p gait-optimizer --example mesh_study -- [--subject 1] [--muscles on] [--threads 2] [--finest
+//! 3]` prints one CSV row for the default mesh (intervals 4,4,6,6) and for each refinement by two. Differences are
+//! relative to the previous row, at the common nodes.
 
 mod arguments;
 
@@ -10,8 +10,8 @@ use arguments::argument;
 use gait_optimizer::{CancelToken, GaitProblem, Mesh, SolveOptions, SolveOutcome, Subject, solve};
 use std::error::Error;
 
-/// Largest and root-mean-square difference of the seven joint angles at the points of the coarser of two meshes, of which
-/// the other is the doubling, rad.
+/// Largest and RMS difference of the seven joint angles between a mesh and its refinement, at the nodes of the coarser
+/// mesh, rad.
 fn difference_of_angles(coarse: &SolveOutcome, fine: &SolveOutcome) -> (f64, f64) {
     let (mut largest, mut squares, mut count) = (0.0_f64, 0.0, 0.0);
     for (a, b) in coarse.gait.domains.iter().zip(&fine.gait.domains) {

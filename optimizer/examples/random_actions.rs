@@ -1,4 +1,4 @@
-//! Random actions of Table I, all different, as `gaitwright sweep --actions` reads them.
+//! Distinct random actions of Table I, in the format of `gaitwright sweep --actions`.
 //!
 //! `cargo run --release -p gait-optimizer --example random_actions -- [--count 200] [--seed 1] > actions.csv`
 

@@ -1,10 +1,10 @@
-//! One cold solve of the reference problem with its figures as JSON: our side of `benches/casadi/race.py`.
+//! One cold start of the reference problem from one initial guess, with its results as JSON, for
+//! `benches/casadi/race.py`.
 //!
-//! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1]
-//! [--guess 1] [--mesh 4,4,6,6] [--bounds a4=0.5,a7=5] [--solver '{"tau_min": 0.995}'] [--trace]` (one guess, as the other
-//! side has one start; the service tries two; `--trace` prints a line per iteration on stderr). Where the time went: `report` has the
-//! parts that were measured, `seconds_other` is the rest (preparing the start, line search, barrier). `peak_resident_mb` is
-//! of the whole process, "unknown" where the system does not say it.
+//! `cargo run --release -p gait-optimizer --example timed_solve -- [--subject 1|2] [--muscles] [--threads 1] [--guess
+//! 1] [--mesh 4,4,6,6] [--bounds a4=0.5,a7=5] [--solver '{"tau_min": 0.995}'] [--trace]`. `--trace` prints every
+//! iteration to stderr. `report` has the measured parts of the time, `seconds_other` the rest (initial guess, line
+//! search, barrier update). `peak_resident_mb` is the peak memory of the process.
 
 mod peak_memory;
 
@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             match phases.last_mut() {
                 Some((name, count)) if *name == phase => *count += 1,
-                _ => phases.push((phase, 0)), // the record of the start is not an iteration
+                _ => phases.push((phase, 0)), // The record of the start is not an iteration.
             }
         },
         &CancelToken::new(),

@@ -1,12 +1,13 @@
-//! Warm starts against cold starts after changing bounds of Table I.
+//! Comparison of warm starts and cold starts after changes of bounds of Table I.
 //!
-//! `cargo run --release -p gait-optimizer --example warm_starts -- [--subject 1] [--muscles on] [--changes 20] [--seed 1]
-//! [--cold on] [--threads 1] [--at-once 1] [--from 20,90,0.3,1.4,0,0.5,50,40] [--values table|tight]`: solves the problem
-//! with the bounds `--from` (default: the default ones), then for each random change of `--at-once` bounds solves warm
-//! from it (and cold, for comparison, with `--cold on`), one CSV row each, medians at the end. `--values tight` draws far
-//! beyond Table I, where warm starts fail. `warm_attempt` is how the start ended by itself, before any cold start after
-//! it; `violation_stands` its longest run of iterations in which the smallest violation did not fall to .9 of what it was,
-//! `residuals_stand` the same of the largest of violation, dual infeasibility and barrier parameter, to .5.
+//! `cargo run --release -p gait-optimizer --example warm_starts -- [--subject 1] [--muscles on] [--changes 20] [--seed
+//! 1] [--cold on] [--threads 1] [--at-once 1] [--from 20,90,0.3,1.4,0,0.5,50,40] [--values table|tight]` solves with
+//! the bounds `--from`, then for each random change of `--at-once` bounds from that gait and, with `--cold on`, cold.
+//! It prints one CSV row for each, and medians at the end. `--values tight` draws values far beyond Table I.
+//!
+//! `warm_attempt` is the end of the warm start itself. `violation_stands` is its longest run of iterations in which the
+//! smallest violation did not decrease to 0.9 times its value; `residuals_stand` is the same for the largest of
+//! violation, dual infeasibility and barrier parameter, with 0.5.
 
 mod arguments;
 mod median;
@@ -33,7 +34,7 @@ fn run(
     Ok(solve(problem, warm, &options, observer, &CancelToken::new())?)
 }
 
-/// The bounds with some of them, all different, set to other values.
+/// The bounds with some distinct ones set to other values.
 fn changed(from: TunedBounds, count: usize, values: &[&[f64]; 8], random: &mut SplitMix) -> (TunedBounds, String) {
     loop {
         let mut action = from.to_array();
@@ -54,7 +55,7 @@ fn changed(from: TunedBounds, count: usize, values: &[&[f64]; 8], random: &mut S
     }
 }
 
-/// Longest run of iterations in which the smallest value did not fall to this share of what it was.
+/// Longest run of iterations in which the smallest value did not decrease to this fraction of itself.
 fn longest_stand(records: &[IterationRecord], share: f64, value: impl Fn(&IterationRecord) -> f64) -> usize {
     let (mut least, mut since, mut longest) = (f64::INFINITY, 0, 0);
     for (number, record) in records.iter().enumerate() {

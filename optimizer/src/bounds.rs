@@ -1,4 +1,4 @@
-//! The tuned constraint bounds a1..a8 (Table I of the paper): what a learner's action sets.
+//! The tuned constraint bounds a1 to a8 (Table I of the paper).
 
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TunedBounds {
-    /// a1: bound on every coordinate velocity, rad/s (m/s for the hip point).
+    /// a1: upper bound of the magnitude of every coordinate velocity, rad/s (m/s for the hip point).
     pub a1: f64,
-    /// a2: bound on every coordinate acceleration, rad/s² (m/s² for the hip point).
+    /// a2: upper bound of the magnitude of every coordinate acceleration, rad/s² (m/s² for the hip point).
     pub a2: f64,
     /// a3: lower bound of the hip velocity v_hip, m/s.
     pub a3: f64,
     /// a4: upper bound of the hip velocity v_hip, m/s.
     pub a4: f64,
-    /// a5: swing-foot clearance at mid-swing, m.
+    /// a5: lower bound of the swing-foot clearance at mid-swing, m.
     pub a5: f64,
-    /// a6: bound on the torso lean, rad.
+    /// a6: upper bound of the magnitude of the torso lean, rad.
     pub a6: f64,
-    /// a7: bound on both hip angles, degrees.
+    /// a7: upper bound of the magnitude of both hip angles, degrees.
     pub a7: f64,
-    /// a8: bound on both ankle angles, degrees.
+    /// a8: upper bound of the magnitude of both ankle angles, degrees.
     pub a8: f64,
 }
 
@@ -32,9 +32,9 @@ impl Default for TunedBounds {
 }
 
 impl TunedBounds {
-    /// Names in action order.
+    /// Names, in the order of an action.
     pub const NAMES: [&'static str; 8] = ["a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"];
-    /// What each bound limits, with its unit, in action order.
+    /// Quantity that each bound limits, with its unit, in the order of an action.
     pub const MEANINGS: [&'static str; 8] = [
         "coordinate velocity, rad/s",
         "coordinate acceleration, rad/s²",
@@ -45,16 +45,16 @@ impl TunedBounds {
         "hip angle, °",
         "ankle angle, °",
     ];
-    /// Allowed range of each bound, in action order.
+    /// Allowed range of each bound, in the order of an action.
     pub const RANGES: [(f64, f64); 8] =
         [(1.0, 100.0), (5.0, 1000.0), (0.05, 3.0), (0.05, 3.0), (0.0, 0.3), (0.0, 1.0), (5.0, 68.0), (5.0, 60.0)];
 
-    /// Values in action order.
+    /// Values, in the order of an action.
     pub fn to_array(self) -> [f64; 8] {
         [self.a1, self.a2, self.a3, self.a4, self.a5, self.a6, self.a7, self.a8]
     }
 
-    /// From values in action order, validated.
+    /// Validated bounds from values in the order of an action.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] naming the bound.
@@ -65,10 +65,10 @@ impl TunedBounds {
         Ok(bounds)
     }
 
-    /// Sets one bound by name (`a1`..`a8`), without the checks across bounds of [`Self::validate`].
+    /// Sets one bound by name, `a1` to `a8`. [`Self::validate`] checks the bounds against each other.
     ///
     /// # Errors
-    /// [`ModelError::Unknown`] for another name, [`ModelError::OutOfRange`] for a value outside its range.
+    /// [`ModelError::Unknown`] for any other name, [`ModelError::OutOfRange`] for a value outside its range.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), ModelError> {
         let Some(index) = Self::NAMES.iter().position(|n| *n == name) else {
             return Err(ModelError::Unknown {
@@ -92,10 +92,10 @@ impl TunedBounds {
         Ok(())
     }
 
-    /// Parses `a1=20,a5=0.013`; bounds that are not named keep their defaults.
+    /// Parses `a1=20,a5=0.013`. The other bounds keep their defaults.
     ///
     /// # Errors
-    /// [`ModelError`] naming the item that cannot be read, is repeated or is out of range.
+    /// [`ModelError`] with the item that is malformed, repeated or out of range.
     pub fn parse(text: &str) -> Result<Self, ModelError> {
         let mut bounds = Self::default();
         let mut seen: Vec<&str> = Vec::new();
@@ -118,15 +118,15 @@ impl TunedBounds {
         Ok(bounds)
     }
 
-    /// Checks every bound against its range, and a3 < a4.
+    /// Checks that each bound is in its range and that a3 is less than a4.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the bound.
+    /// [`ModelError::OutOfRange`] with the bound.
     pub fn validate(&self) -> Result<(), ModelError> {
         for ((name, value), (minimum, maximum)) in Self::NAMES.iter().zip(self.to_array()).zip(Self::RANGES) {
             ModelError::check_range(name, value, minimum, maximum)?;
         }
-        // The hip velocity needs an interval with an interior.
+        // The interior-point method needs an interval of hip velocities with an interior.
         ModelError::check_range("a3", self.a3, Self::RANGES[2].0, self.a4 - 1e-3)?;
         Ok(())
     }

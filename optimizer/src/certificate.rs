@@ -1,16 +1,16 @@
-//! The certificate of a gait: what the gait problem promised, checked without its code.
+//! The certificate of a gait: an independent check of the constraints, of the closed loop and of stability.
 //!
-//! From the gait as it is handed out (Bezier coefficients, phase limits, hip velocities, nodes) and the physics of
-//! [`crate::body`], [`crate::muscle`] and [`crate::walking`] alone:
+//! It uses the finished gait (Bezier coefficients, phase limits, hip velocities, nodes) and the physics of
+//! [`crate::body`], [`crate::muscle`] and [`crate::walking`], and shares no code with the gait problem:
 //!
-//! 1. the residuals of C1-C12 at the nodes and on a grid ten times finer (`residuals`);
-//! 2. the closed loop of the full hybrid system under feedback linearisation with the gait's own virtual constraints:
-//!    [`STRIDES`] strides, and contacts, friction and torques over a periodic stride (`closed_loop`);
-//! 3. the multipliers of the stride-to-stride map, by variational equations and by differences ([`ReturnMap`]), with the
-//!    hip velocity brought back by the controller and with the hip velocity left alone;
-//! 4. the largest pushes that are recovered ([`Pushes`]).
+//! 1. Residuals of C1 to C12 at the nodes and on a grid ten times finer (`residuals`).
+//! 2. The closed loop of the hybrid system under feedback linearisation with the virtual constraints of the gait:
+//!    [`STRIDES`] strides, and contacts, friction and torques over the periodic stride (`closed_loop`).
+//! 3. Multipliers of the stride-to-stride map, by variational equations and by differences ([`ReturnMap`]), with a
+//!    regulated and with a free hip velocity.
+//! 4. The largest pushes from which the walker recovers ([`Pushes`]).
 //!
-//! Muscles are checked in 1; the closed loop drives the joints by torques, as the device and the gait problem do.
+//! Step 1 checks the muscles. The closed loop has joint torques as inputs, like the device and the gait problem.
 
 mod check;
 mod closed_loop;
@@ -46,35 +46,34 @@ use control::join;
 use hybrid_walker::HybridWalker;
 use serde::{Deserialize, Serialize};
 
-/// Version of [`Certificate`]'s layout and of what it checks.
+/// Version of the layout and of the checks of [`Certificate`].
 pub const FORMAT_VERSION: u32 = 6;
 
-/// What was found.
+/// The result of certifying a gait.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// Version of this layout and of its checks.
     pub format_version: u32,
     /// Whether every check is within its limit, the walker does not fall, and the gait is stable.
     pub passed: bool,
-    /// Why not, in words; empty when passed.
+    /// The reasons for a failed certificate, as text; empty if it passed.
     pub objections: Vec<String>,
-    /// Every quantity with its worst value and its limit.
+    /// Each quantity with its worst value and its limit.
     pub checks: Vec<Check>,
-    /// How the simulation ended early, where it did: the walker fell, or no motion follows from the controller's demands; then
-    /// there is no return map.
+    /// The reason for an early end of the simulation: a fall, or a singular motion. There is no return map then.
     pub fall: Option<String>,
-    /// The stride-to-stride map.
+    /// The stride-to-stride map with a regulated hip velocity.
     pub return_map: Option<ReturnMap>,
-    /// The same with a hip velocity that nobody brings back: the hybrid zero dynamics, what contacts, impacts and SS1 alone
-    /// make of a change of speed. Its largest multiplier is theirs: all other directions are the controller's, and end
-    /// within a step. Reported without a judgement of stability; none when such a walker falls.
+    /// The stride-to-stride map with a free hip velocity. Its largest multiplier is that of the hybrid zero dynamics,
+    /// because the controller removes deviations in all other directions within a step. It has no limit. `None` if this
+    /// walker falls.
     pub free_hip_return_map: Option<ReturnMap>,
-    /// Pushes that are recovered; only of a stable gait.
+    /// Pushes from which the walker recovers, for a stable gait.
     pub pushes: Option<Pushes>,
 }
 
 impl Certificate {
-    /// The certificate of what cannot be certified: it failed, for this reason.
+    /// A failed certificate with this reason, for a gait that cannot be checked.
     pub fn failed_because(reason: &str) -> Self {
         Self { objections: vec![reason.to_owned()], ..Self::empty(Vec::new()) }
     }
@@ -93,10 +92,10 @@ impl Certificate {
     }
 }
 
-/// Certifies a gait. Deterministic; takes some seconds.
+/// Certifies a gait. Equal gaits give equal certificates. The check takes some seconds.
 ///
 /// # Errors
-/// [`ModelError`] when the gait is not well-formed.
+/// [`ModelError`] if the gait is malformed.
 pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
     gait.validate()?;
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
@@ -109,14 +108,14 @@ pub fn certify(gait: &Gait) -> Result<Certificate, ModelError> {
     Ok(certificate)
 }
 
-/// Everything that needs the closed loop, as far as it gets.
+/// Adds the results of the closed loop to the certificate, until the simulation ends early.
 fn simulate(model: &WalkerModel, gait: &Gait, certificate: &mut Certificate) -> Result<(), Fall> {
     let walker = HybridWalker::new(model, gait);
     let start = join(&gait.domains[0].q[0], &gait.domains[0].qd[0]);
     let (periodic, map) = return_map::return_map(&walker, &start)?;
     let stable = map.is_stable();
     certificate.return_map = Some(map);
-    // A walker that needs its hip velocity brought back is no worse for falling without.
+    // A fall with a free hip velocity does not count against a gait that is stable with a regulated one.
     let free = return_map::return_map(&walker.with_free_hip_velocity(), &periodic);
     certificate.free_hip_return_map = free.ok().map(|(_, map)| map);
     certificate.checks.extend(closed_loop::periodic_stride(&walker, gait, &periodic)?);
@@ -127,24 +126,28 @@ fn simulate(model: &WalkerModel, gait: &Gait, certificate: &mut Certificate) -> 
     Ok(())
 }
 
-/// Why a certificate does not pass, in words.
+/// The reasons for a failed certificate, as text.
 fn objections(certificate: &Certificate) -> Vec<String> {
     let mut objections: Vec<String> = certificate
         .checks
         .iter()
         .filter(|check| !check.passed())
-        .map(|c| format!("{}: {} ({}), allowed {}", c.name, c.value_in_words(), c.place, c.limit_in_words()))
+        .map(|c| format!("{}: {} ({}), limit {}", c.name, c.value_in_words(), c.place, c.limit_in_words()))
         .collect();
     if let Some(fall) = &certificate.fall {
         objections.push(fall.clone());
     }
     if let Some(map) = certificate.return_map.as_ref().filter(|map| !map.is_stable()) {
-        objections.push(format!("the gait is unstable: its largest multiplier is {:.4}", map.largest));
+        objections.push(format!(
+            "the gait is unstable: its largest multiplier is {:.4}, which must be less than 1",
+            map.largest
+        ));
     }
     for map in [&certificate.return_map, &certificate.free_hip_return_map].into_iter().flatten() {
         if !map.methods_agree() {
             objections.push(format!(
-                "a largest multiplier is {:.6e} by variational equations and {:.6e} by differences, which resolve {:.1e}",
+                "two computations of the largest multiplier disagree: {:.6e} by variational equations and {:.6e} by differences (resolution \
+                 {:.1e})",
                 map.largest, map.largest_by_differences, map.differences_resolve
             ));
         }

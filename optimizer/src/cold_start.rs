@@ -1,17 +1,17 @@
-//! A first guess that needs nothing from the user: posture from the reference, motion, torques and muscles from it.
+//! The initial guess of a cold start, computed from the reference gait.
 //!
-//! 1. [`posture`]: joint angles near the reference with exact contacts (sequential convex QPs, clarabel);
-//! 2. [`motion`]: Bezier fits per domain, their derivatives, contact-consistent torques and forces (least squares);
-//! 3. [`muscles`]: non-negative muscle forces (convex QPs, clarabel), then tendon, fibre, activation.
+//! 1. [`posture`]: joint angles near the reference gait with exact contacts, by sequential convex QPs (Clarabel)
+//! 2. [`motion`]: Bezier fits in each domain, their derivatives, and consistent torques and forces by least squares
+//! 3. [`muscles`]: non-negative muscle forces by convex QPs (Clarabel), then tendon, fibre and activation
 //!
-//! None of it can fail: where the bounds leave a convex part no solution, it gives the nearest thing to one, and the
-//! gait problem decides whether there is a gait.
+//! No step fails: if bounds make a QP infeasible, its constraints are relaxed, and the gait problem decides whether a
+//! gait exists.
 
 pub mod motion;
 pub mod muscles;
 pub mod posture;
 
-/// Stride time and length of a guess.
+/// Stride time and length of an initial guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuessSettings {
     /// Stride time, s.

@@ -1,4 +1,4 @@
-//! The prosthesis on the right leg, read from a data file.
+//! The device: a prosthesis on the right leg, read from a JSON file.
 
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
@@ -6,72 +6,72 @@ use std::collections::BTreeMap;
 
 /// A transfemoral prosthesis with powered knee and ankle, worn on the right leg through an adapter.
 ///
-/// The prosthetic knee sits `shank_length_m + ankle_height_m` above the ground; the right thigh link takes up the
-/// rest of the hip height, so that both feet are flat in upright standing.
+/// In upright standing both feet are flat: the prosthetic knee is `shank_length_m + ankle_height_m` above the ground,
+/// and the right thigh link spans the rest of the hip height.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Device {
-    /// Name shown to people.
+    /// Name of the model.
     pub name: String,
     /// Mass at the prosthetic knee that moves with the thigh, kg.
     pub knee_housing_mass_kg: f64,
-    /// Its moment of inertia about its own centre, kg m².
+    /// Moment of inertia of that mass about its own centre, kg m².
     pub knee_housing_inertia_kg_m2: f64,
     /// Mass of the adapter, midway between human and prosthetic knee, kg.
     pub adapter_mass_kg: f64,
     /// Radius of gyration of the adapter, m.
     pub adapter_gyration_radius_m: f64,
-    /// Whether the user's own bent shank and foot are carried behind (a non-disabled user with a bypass).
+    /// Whether the user's own bent shank and foot are carried behind: an able-bodied user with a bypass adapter.
     pub carried_limb: bool,
     /// Mass of the prosthetic shank, kg.
     pub shank_mass_kg: f64,
-    /// Knee to ankle, m.
+    /// Distance from knee to ankle, m.
     pub shank_length_m: f64,
-    /// Centre of mass below the knee, in shank lengths.
+    /// Distance of the centre of mass below the knee, in shank lengths.
     pub shank_com_fraction: f64,
     /// Radius of gyration about the centre of mass, in shank lengths.
     pub shank_gyration_fraction: f64,
     /// Mass of the prosthetic foot with shoe, kg.
     pub foot_mass_kg: f64,
-    /// Centre of mass ahead of the ankle, m.
+    /// Distance of the centre of mass ahead of the ankle, m.
     pub foot_com_forward_m: f64,
-    /// Centre of mass below the ankle, m.
+    /// Distance of the centre of mass below the ankle, m.
     pub foot_com_down_m: f64,
     /// Moment of inertia about the centre of mass, kg m².
     pub foot_inertia_kg_m2: f64,
-    /// Ankle above the sole, m.
+    /// Height of the ankle above the sole, m.
     pub ankle_height_m: f64,
-    /// Heel contact behind the ankle, m.
+    /// Distance of the heel contact behind the ankle, m.
     pub heel_behind_m: f64,
-    /// Toe contact ahead of the ankle, m.
+    /// Distance of the toe contact ahead of the ankle, m.
     pub toe_ahead_m: f64,
-    /// Largest knee torque, N m.
+    /// Largest magnitude of the knee torque, N m.
     pub knee_torque_limit_n_m: f64,
-    /// Largest ankle torque, N m.
+    /// Largest magnitude of the ankle torque, N m.
     pub ankle_torque_limit_n_m: f64,
-    /// Largest knee and ankle speed, rad/s.
+    /// Largest magnitude of the knee and ankle velocities, rad/s.
     pub joint_speed_limit_rad_s: f64,
     /// Plantarflexion stop, rad (dorsiflexion positive).
     pub ankle_min_rad: f64,
     /// Dorsiflexion stop, rad.
     pub ankle_max_rad: f64,
-    /// Where each value comes from, by field name; assumptions say so.
+    /// Source of each value, by field name. Assumed values are marked as such.
     #[serde(default)]
     pub sources: BTreeMap<String, String>,
 }
 
-/// A number of a device: its name with its unit, what it means, and its allowed range.
+/// A numeric field of a device.
 #[derive(Debug, Clone, Copy)]
 pub struct DeviceField {
-    /// As in the file: `shank_mass_kg`.
+    /// Name with unit, as in the file: `shank_mass_kg`.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub meaning: &'static str,
     /// Smallest allowed value.
     pub minimum: f64,
     /// Largest allowed value.
     pub maximum: f64,
-    /// What a device has there.
+    /// The value of a device.
     pub value: fn(&Device) -> f64,
 }
 
@@ -88,31 +88,43 @@ const fn field(
 const AMPRO3_JSON: &str = include_str!("../data/ampro3.json");
 
 impl Device {
-    /// Every number of a device, in the order of its file.
+    /// The numeric fields of a device, in the order of the file.
     pub const FIELDS: [DeviceField; 20] = [
         field("knee_housing_mass_kg", "mass at the prosthetic knee that moves with the thigh", (0.0, 10.0), |d| {
             d.knee_housing_mass_kg
         }),
-        field("knee_housing_inertia_kg_m2", "its moment of inertia about its own centre", (0.0, 0.5), |d| {
+        field("knee_housing_inertia_kg_m2", "moment of inertia of this mass about its own centre", (0.0, 0.5), |d| {
             d.knee_housing_inertia_kg_m2
         }),
-        field("adapter_mass_kg", "adapter midway between human and prosthetic knee", (0.0, 10.0), |d| {
+        field("adapter_mass_kg", "mass of the adapter, midway between human and prosthetic knee", (0.0, 10.0), |d| {
             d.adapter_mass_kg
         }),
-        field("adapter_gyration_radius_m", "its radius of gyration", (0.0, 0.5), |d| d.adapter_gyration_radius_m),
-        field("shank_mass_kg", "prosthetic shank", (0.2, 15.0), |d| d.shank_mass_kg),
-        field("shank_length_m", "knee to ankle", (0.2, 0.6), |d| d.shank_length_m),
-        field("shank_com_fraction", "centre of mass below the knee, in shank lengths", (0.05, 0.95), |d| {
-            d.shank_com_fraction
+        field("adapter_gyration_radius_m", "radius of gyration of the adapter", (0.0, 0.5), |d| {
+            d.adapter_gyration_radius_m
         }),
-        field("shank_gyration_fraction", "radius of gyration about it, in shank lengths", (0.05, 0.6), |d| {
-            d.shank_gyration_fraction
+        field("shank_mass_kg", "mass of the prosthetic shank", (0.2, 15.0), |d| d.shank_mass_kg),
+        field("shank_length_m", "distance from knee to ankle", (0.2, 0.6), |d| d.shank_length_m),
+        field(
+            "shank_com_fraction",
+            "centre of mass of the shank below the knee, in shank lengths",
+            (0.05, 0.95),
+            |d| d.shank_com_fraction,
+        ),
+        field(
+            "shank_gyration_fraction",
+            "radius of gyration of the shank about its centre of mass, in shank lengths",
+            (0.05, 0.6),
+            |d| d.shank_gyration_fraction,
+        ),
+        field("foot_mass_kg", "mass of the prosthetic foot with shoe", (0.1, 5.0), |d| d.foot_mass_kg),
+        field("foot_com_forward_m", "centre of mass of the foot ahead of the ankle", (-0.1, 0.2), |d| {
+            d.foot_com_forward_m
         }),
-        field("foot_mass_kg", "foot with shoe", (0.1, 5.0), |d| d.foot_mass_kg),
-        field("foot_com_forward_m", "its centre of mass ahead of the ankle", (-0.1, 0.2), |d| d.foot_com_forward_m),
-        field("foot_com_down_m", "and below the ankle", (0.0, 0.15), |d| d.foot_com_down_m),
-        field("foot_inertia_kg_m2", "moment of inertia about it", (1e-4, 0.2), |d| d.foot_inertia_kg_m2),
-        field("ankle_height_m", "ankle above the sole", (0.01, 0.2), |d| d.ankle_height_m),
+        field("foot_com_down_m", "centre of mass of the foot below the ankle", (0.0, 0.15), |d| d.foot_com_down_m),
+        field("foot_inertia_kg_m2", "moment of inertia of the foot about its centre of mass", (1e-4, 0.2), |d| {
+            d.foot_inertia_kg_m2
+        }),
+        field("ankle_height_m", "height of the ankle above the sole", (0.01, 0.2), |d| d.ankle_height_m),
         field("heel_behind_m", "heel contact behind the ankle", (0.01, 0.15), |d| d.heel_behind_m),
         field("toe_ahead_m", "toe contact ahead of the ankle", (0.05, 0.3), |d| d.toe_ahead_m),
         field("knee_torque_limit_n_m", "largest knee torque", (1.0, 500.0), |d| d.knee_torque_limit_n_m),
@@ -122,18 +134,18 @@ impl Device {
         field("ankle_max_rad", "dorsiflexion stop", (0.02, 1.2), |d| d.ankle_max_rad),
     ];
 
-    /// The AMPRO3 powered knee-ankle prosthesis (values and sources in `data/ampro3.json`).
+    /// The AMPRO3 powered knee-ankle prosthesis. `data/ampro3.json` has the values and their sources.
     ///
     /// # Errors
-    /// Never in practice: a test reads the built-in file.
+    /// If the built-in file is invalid; a test excludes it.
     pub fn ampro3() -> Result<Self, ModelError> {
         Self::from_json(AMPRO3_JSON)
     }
 
-    /// Reads a device from JSON and validates it.
+    /// Parses and validates a device in JSON.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] with line and column, or [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::Malformed`] with line and column, or [`ModelError::OutOfRange`] with the field.
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
         let device: Self = serde_json::from_str(text)
             .map_err(|e| ModelError::Malformed { what: "device file".to_owned(), reason: e.to_string() })?;
@@ -141,10 +153,10 @@ impl Device {
         Ok(device)
     }
 
-    /// Checks every number against its allowed range.
+    /// Checks each number against its allowed range.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         for DeviceField { name, minimum, maximum, value, .. } in &Self::FIELDS {
             ModelError::check_range(&format!("device.{name}"), value(self), *minimum, *maximum)?;

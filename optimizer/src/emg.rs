@@ -1,8 +1,9 @@
-//! Surface electromyograms: from raw signals to activity over the gait cycle.
+//! Surface electromyograms (EMG): from raw signals to muscle activity over the gait cycle.
 //!
-//! The chain: zero-phase Butterworth band-pass, full-wave rectification, zero-phase Butterworth low-pass ([`Envelope`]);
-//! cut at heel strikes, mean of strides at 101 points, division by the peak of normal walking ([`CycleActivity`]);
-//! distance of two gaits ([`emg_rmse`]).
+//! 1. Zero-phase Butterworth band-pass, full-wave rectification, zero-phase Butterworth low-pass: [`Envelope`].
+//! 2. Segmentation at heel strikes, mean of the strides at 101 points, normalisation by the peak of normal walking:
+//!    [`CycleActivity`].
+//! 3. Distance from normal walking: [`emg_rmse`].
 
 mod activity;
 mod cycle;
@@ -17,21 +18,22 @@ pub use recording::EmgRecording;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// The channels of the paper's experiment: rectus femoris, tibialis anterior, biceps femoris and gastrocnemius of the
-/// intact leg, rectus and biceps femoris of the residual limb.
+/// Channels of the experiment in the paper: rectus femoris, tibialis anterior, biceps femoris and gastrocnemius of the
+/// intact leg, rectus femoris and biceps femoris of the residual limb.
 pub const CHANNELS: [&str; 6] = ["RF_L", "TA_L", "BF_L", "GAS_L", "RF_R", "BF_R"];
-/// Points of a cycle: 0, 1, ..., 100 %.
+/// Number of points of a gait cycle: 0, 1, ..., 100 %.
 pub const CYCLE_POINTS: usize = 101;
 
-/// Filters of the chain. Orders are those of one pass, per edge; both passes together have twice as many.
+/// Settings of the filters. The order is that of one pass and edge; forward and backward pass together have twice the
+/// order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EmgSettings {
-    /// Lower edge of the band-pass, Hz: below are movements of cable and skin.
+    /// Lower edge of the band-pass, Hz. Motion artefacts of cable and skin are below.
     pub band_low_hz: f64,
     /// Upper edge of the band-pass, Hz; below half the sampling rate.
     pub band_high_hz: f64,
-    /// Edge of the low-pass that makes the envelope, Hz.
+    /// Edge of the low-pass for the envelope, Hz.
     pub envelope_hz: f64,
     /// Order of both filters: 2, 4, 6 or 8.
     pub order: usize,
@@ -44,10 +46,10 @@ impl Default for EmgSettings {
 }
 
 impl EmgSettings {
-    /// Checks the settings for signals of a sampling rate.
+    /// Checks the settings for signals with this sampling rate.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self, rate_hz: f64) -> Result<(), ModelError> {
         let half = 0.5 * rate_hz;
         ModelError::check_range("emg.band_low_hz", self.band_low_hz, 1.0, 0.9 * half)?;
@@ -65,7 +67,7 @@ impl EmgSettings {
     }
 }
 
-/// The smoothed, rectified signal of one channel.
+/// The envelope of one channel: its signal rectified and smoothed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Envelope {
     /// Name of the channel.
@@ -74,7 +76,7 @@ pub struct Envelope {
     pub start_s: f64,
     /// Samples per second.
     pub rate_hz: f64,
-    /// In the unit of the recording.
+    /// Samples, in the unit of the recording.
     pub values: Vec<f64>,
 }
 
@@ -84,7 +86,7 @@ impl Envelope {
         self.start_s + (self.values.len() - 1) as f64 / self.rate_hz
     }
 
-    /// The value at a time within the recording, linear between samples.
+    /// The value at a time of the recording, interpolated linearly.
     fn at(&self, time_s: f64) -> f64 {
         let position = ((time_s - self.start_s) * self.rate_hz).clamp(0.0, (self.values.len() - 1) as f64);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the indices

@@ -1,5 +1,5 @@
-//! Why no gait was found for a set of tuned bounds: which of them contradict each other, what cannot be met with those, and
-//! which one has to give way and how far, or which several. Nothing is said of bounds that were not solved with.
+//! Infeasibility explanations: which tuned bounds conflict, which constraint they make infeasible, and which relaxations of one
+//! or several bounds give a gait. All statements are about bounds for which a solve was done.
 
 use crate::bounds::TunedBounds;
 use crate::nlp::NonlinearProgram;
@@ -21,17 +21,17 @@ use conflict::{BoundSet, conflict, remedies};
 use solves::{Solves, Starts, Stop, Unmet};
 pub use words::verdict;
 
-/// The most bounds that are made to give way together.
+/// Largest number of bounds in a joint relaxation.
 const MOST_TOGETHER: usize = 3;
-/// The most violations that are kept of a conflict.
+/// Largest number of violations of a conflict that are kept.
 const VIOLATIONS: usize = 5;
 
-/// A solve that ended without a gait, as it left off.
+/// The end of a solve without a gait.
 #[derive(Debug, Clone, Copy)]
 pub struct Unsolved<'a> {
-    /// How it ended.
+    /// Status of the solve.
     pub status: SolveStatus,
-    /// What its last iterate violates, worst first.
+    /// Violations of its last iterate, worst first.
     pub violations: &'a [Violation],
     /// Its last iterate.
     pub last: &'a WarmStart,
@@ -43,7 +43,7 @@ impl<'a> From<&'a SolveOutcome> for Unsolved<'a> {
     }
 }
 
-/// A tuned bound that the last iterate runs into.
+/// A tuned bound that the last iterate reaches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoundAtLimit {
     /// `a1`..`a8`.
@@ -52,11 +52,11 @@ pub struct BoundAtLimit {
     pub meaning: String,
     /// Its value.
     pub value: f64,
-    /// Where it is reached.
+    /// Domains in which it is reached.
     pub domains: Vec<String>,
 }
 
-/// A tuned bound as it is given.
+/// A tuned bound with its given value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GivenBound {
     /// `a1`..`a8`.
@@ -67,28 +67,29 @@ pub struct GivenBound {
     pub value: f64,
 }
 
-/// Tuned bounds that contradict each other: no gait was found with all of them, one was without any one of them, every other
-/// tuned bound being at its loosest.
+/// A conflict of tuned bounds: with the other tuned bounds at their loosest values, no gait was found with all of them, and a
+/// gait was found without any one of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conflict {
-    /// Those bounds. None: no gait was found with every tuned bound at its loosest, so what is fixed contradicts itself.
+    /// The conflicting bounds. Empty if no gait was found with every tuned bound at its loosest value: then fixed constraints
+    /// conflict.
     pub bounds: Vec<GivenBound>,
-    /// Bounds of the other conflicts that had given way when this one was left.
+    /// Bounds of other conflicts that were relaxed when this conflict remained.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
     /// Wishes that are part of what is fixed, where that contradicts itself.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wishes: Vec<String>,
-    /// What these bounds make impossible: violated where the search for a gait came nearest, all other tuned bounds
-    /// loosened, worst first; a stationary point of the violation before others.
+    /// Violations of the nearest motion with these bounds and the other tuned bounds relaxed, worst first. Stationary points of
+    /// the violation are preferred.
     pub violations: Vec<Violation>,
-    /// From how many starts a gait was looked for.
+    /// Number of starts of the search.
     pub starts: usize,
-    /// Whether one of them gave up, at a limit or stalled: others are at a stationary point of the violation.
+    /// Whether a solve ended at a limit or stalled instead of at a stationary point of the violation.
     pub undecided: bool,
 }
 
-/// What relaxing one tuned bound alone achieves.
+/// The effect of relaxing one tuned bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Relaxation {
     /// `a1`..`a8`.
@@ -97,23 +98,23 @@ pub struct Relaxation {
     pub meaning: String,
     /// The given value.
     pub from: f64,
-    /// The value nearest to it, of those tried, with which a gait converged; `None`: not even with the loosest.
+    /// The nearest value with which a gait converged; `None` if no gait converged with the loosest value.
     pub to: Option<f64>,
-    /// The loosest value tried with which none did.
+    /// The loosest value with which no gait converged.
     pub not_with: f64,
-    /// Whether a solve with it gave up, at a limit or stalled: that there is no gait is not known then.
+    /// Whether a solve with it ended at a limit or stalled, so that a gait may exist.
     pub undecided: bool,
     /// Solves that this took.
     pub solves: usize,
-    /// From how many starts a gait with `not_with` was looked for; 0: unknown, or only those of the solve that is explained.
+    /// Number of starts of the search with `not_with`. 0 if unknown, or if only the explained solve was done.
     #[serde(default)]
     pub starts: usize,
-    /// Where the gait with `to` was found. It came from its neighbours: other starts may not reach it.
+    /// Warm start of the gait with `to`. The search found it from nearby gaits; other starts may not reach it.
     #[serde(skip)]
     pub warm_start: Option<WarmStart>,
 }
 
-/// How far one of several bounds gives way.
+/// One bound of a joint relaxation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RelaxedBound {
     /// `a1`..`a8`.
@@ -122,17 +123,18 @@ pub struct RelaxedBound {
     pub meaning: String,
     /// The given value.
     pub from: f64,
-    /// The value nearest to it, of those tried together, with which a gait converged; `None`: not even with the loosest.
+    /// The nearest value, together with the others, with which a gait converged; `None` if no gait converged with the loosest
+    /// values.
     pub to: Option<f64>,
-    /// The loosest value tried, together with those of the others, with which none did.
+    /// The loosest value, together with the others, with which no gait converged.
     pub not_with: f64,
 }
 
-/// What relaxing several tuned bounds together achieves, where no single one helps: each by the same share of the way to its
-/// loosest.
+/// The effect of relaxing several tuned bounds together, if no single one is sufficient: each by the same fraction of the way to
+/// its loosest value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointRelaxation {
-    /// Those bounds, one of each conflict.
+    /// The bounds, one of each conflict.
     pub bounds: Vec<RelaxedBound>,
     /// As in a [`Relaxation`].
     pub undecided: bool,
@@ -145,34 +147,33 @@ pub struct JointRelaxation {
     pub warm_start: Option<WarmStart>,
 }
 
-/// Why no gait was found.
+/// An infeasibility explanation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Explanation {
-    /// How the solve ended.
+    /// Status of the solve.
     pub status: SolveStatus,
-    /// What the last iterate violates, worst first.
+    /// Violations of the last iterate, worst first.
     pub violations: Vec<Violation>,
-    /// The bounds that contradict each other; further ones where no single bound resolves the first. Explanations of
-    /// earlier versions have none.
+    /// The conflicts: the first one, and further ones if no single bound resolves it. Empty if unknown.
     #[serde(default)]
     pub conflicts: Vec<Conflict>,
-    /// Whether the search found a gait with the bounds as they are: the solve missed it.
+    /// Whether the search found a gait with exactly the given bounds, which the solve had missed.
     #[serde(default)]
     pub gait_found: bool,
-    /// The bounds that the last iterate runs into.
+    /// The bounds that the last iterate reaches.
     pub at_limit: Vec<BoundAtLimit>,
-    /// What relaxing each bound of the first conflict alone achieves (no other can), the smallest relaxation (as a factor
-    /// or share of the range) first, those that do not help last.
+    /// Relaxations of each bound of the first conflict; no other bound can resolve it. The smallest one, as a factor or a share of
+    /// the range, is first. Insufficient ones are last.
     pub relaxations: Vec<Relaxation>,
-    /// What relaxing several together achieves, where no single one helps, smallest first.
+    /// Joint relaxations, if no single one is sufficient, smallest first.
     #[serde(default)]
     pub together: Vec<JointRelaxation>,
-    /// Where the gait that the solve missed was found.
+    /// Warm start of the gait that the solve had missed.
     #[serde(skip)]
     pub missed: Option<WarmStart>,
 }
 
-/// How far the bounds of a relaxation give way.
+/// The values of the bounds of a relaxation.
 fn size<'a>(bounds: impl Iterator<Item = (&'a str, f64, Option<f64>)>) -> f64 {
     bounds
         .map(|(name, from, to)| {
@@ -194,11 +195,11 @@ impl JointRelaxation {
     }
 }
 
-/// The search for what has to give way.
+/// The search for conflicts and relaxations.
 struct Search<'a> {
     problem: &'a GaitProblem,
     solves: Solves<'a>,
-    /// Bounds in the order in which they are suspected.
+    /// Bounds, the most suspected ones first.
     order: Vec<usize>,
 }
 
@@ -213,19 +214,19 @@ impl Search<'_> {
         set.bounds().map(given).collect()
     }
 
-    /// An irreducible conflict among the bounds, those of `without` at their loosest.
+    /// An irreducible conflict among the bounds, with those of `without` at their loosest values.
     fn conflict(&mut self, without: BoundSet) -> Result<Option<BoundSet>, Stop> {
         let order: Vec<usize> = self.order.iter().copied().filter(|bound| !without.contains(*bound)).collect();
         conflict(&order, |set| Ok(self.level(BoundSet::ALL.without(set))?.is_some()))
     }
 
-    /// How far the bounds of a set have to be loosened so that there is a gait, if that is any help.
+    /// The smallest relaxation of the bounds of a set that gives a gait, if there is one.
     fn level(&mut self, set: BoundSet) -> Result<Option<Level>, Stop> {
         let before = self.solves.count;
         if self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Usual)?, Starts::All)? {
             return Ok(Some(Level::Usual));
         }
-        // Cold guesses that found none there find none with the loosest: those are further from what walks.
+        // Initial guesses that failed there also fail with the loosest values, which are further from walking.
         let starts = if self.solves.count > before { Starts::Nearest } else { Starts::All };
         let loosest = self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Loosest)?, starts)?;
         Ok(loosest.then_some(Level::Loosest))
@@ -252,7 +253,7 @@ impl Search<'_> {
         })
     }
 
-    /// The searches that found no gait with a set loosened, at each level, the loosest last.
+    /// The failed searches with a relaxed set at each level, the loosest last.
     fn searched(&self, set: BoundSet) -> Result<Vec<&Unmet>, Stop> {
         let mut known: Vec<&Unmet> = Vec::new();
         for level in [Level::Usual, Level::Loosest] {
@@ -262,7 +263,7 @@ impl Search<'_> {
         Ok(known)
     }
 
-    /// How far the bounds of a set have to give way together.
+    /// The smallest joint relaxation of the bounds of a set.
     fn relaxed(&mut self, set: BoundSet) -> Result<JointRelaxation, Stop> {
         let given = self.problem.bounds;
         let before = self.solves.count;
@@ -271,7 +272,7 @@ impl Search<'_> {
             Some(level) => {
                 let loose = loosened(&given, set, level)?;
                 warm_start = self.solves.gait(&loose)?;
-                // What is tighter than bounds without a gait is not asked about again.
+                // Tighter bounds than those without a gait need no solve.
                 let tight = if level == Level::Usual { given } else { loosened(&given, set, Level::Usual)? };
                 let solves = &mut self.solves;
                 let (nearest, none) = least_move(&tight, &loose, |bounds| {
@@ -303,15 +304,14 @@ impl Search<'_> {
     }
 }
 
-/// A joint relaxation of one bound.
+/// A joint relaxation that consists of one bound.
 fn alone(joint: JointRelaxation) -> Option<Relaxation> {
     let JointRelaxation { bounds, undecided, solves, starts, warm_start } = joint;
     let RelaxedBound { bound, meaning, from, to, not_with } = bounds.into_iter().next()?;
     Some(Relaxation { bound, meaning, from, to, not_with, undecided, solves, starts, warm_start })
 }
 
-/// Bounds by how much they are suspected: those that the last iterate runs into before others, tightened ones before those at
-/// their usual values.
+/// Bounds in order of suspicion: those that the last iterate reaches first, and tightened ones before those at their defaults.
 fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
     let (own, usual) = (bounds.to_array(), TunedBounds::default().to_array());
     let tightened = |bound: usize| step(bound, own[bound], loosest(bound)) > step(bound, usual[bound], loosest(bound));
@@ -320,14 +320,14 @@ fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
     order
 }
 
-/// Explains a solve that did not converge: finds the smallest conflict among its tuned bounds, then which of them has to give
-/// way and how far, by solving with other bounds.
+/// Explains a solve that did not converge: finds an irreducible conflict among its tuned bounds, and the smallest relaxations that
+/// give a gait, by solves with other bounds.
 ///
-/// Takes some dozens of solves. `progress` hears of each step. `None`: cancelled, or the solve converged or was
-/// cancelled itself.
+/// It takes dozens of solves; `progress` receives each step. `None` if it was cancelled, or if the solve converged or was
+/// cancelled.
 ///
 /// # Errors
-/// [`SolveError`] when the problem is invalid or the last iterate belongs to another one.
+/// [`SolveError`] if the problem is invalid or the last iterate belongs to another problem.
 pub fn explain(
     problem: &GaitProblem,
     unsolved: Unsolved<'_>,
@@ -380,7 +380,7 @@ fn found_out(
     };
     let order = suspects(&problem.bounds, reached);
     let mut search = Search { problem, solves: Solves::new(problem, options, cancel), order };
-    progress("which bounds contradict each other?");
+    progress("searching for conflicting bounds");
     let Some(first) = search.conflict(BoundSet::EMPTY)? else {
         explanation.gait_found = true;
         explanation.missed = search.solves.gait(&problem.bounds)?;
@@ -397,7 +397,7 @@ fn found_out(
     }
     for set in found.help.into_iter().chain(found.do_not_help) {
         let names: Vec<&str> = set.bounds().map(|bound| TunedBounds::NAMES[bound]).collect();
-        progress(&format!("how far must {} give way?", names.join(" and ")));
+        progress(&format!("searching for the smallest relaxation of {}", names.join(" and ")));
         let relaxed = search.relaxed(set)?;
         if relaxed.bounds.len() > 1 {
             explanation.together.push(relaxed);
@@ -416,14 +416,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_tightened_is_suspected_first_then_what_is_reached() {
+    fn tightened_bounds_are_suspected_first_then_reached_ones() {
         let bounds = TunedBounds { a3: 0.5, a5: 0.02, a7: 10.0, a8: 50.0, ..TunedBounds::default() };
         let at_limit = [1, 6, 7].into_iter().fold(BoundSet::EMPTY, BoundSet::with);
         assert_eq!(suspects(&bounds, at_limit), [6, 2, 4, 1, 7, 0, 3, 5]);
     }
 
     #[test]
-    fn explanations_of_earlier_versions_are_read() {
+    fn explanation_without_conflicts_is_read() {
         let kept = r#"{"status": "infeasible", "violations": [], "at_limit": [], "relaxations": [{"bound": "a5",
             "meaning": "swing-foot clearance, m", "from": 0.04, "to": 0.03, "not_with": 0.031, "undecided": false, "solves": 8}]}"#;
         let read: Explanation = serde_json::from_str(kept).unwrap();

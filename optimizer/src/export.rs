@@ -1,6 +1,6 @@
-//! Gaits for other programs: OpenSim motion files and controller files for the device.
+//! Export of gaits: OpenSim motion files, and controller files for the device.
 //!
-//! JSON (everything) is [`crate::Gait`]'s own form.
+//! The JSON of [`crate::Gait`] has all data of a gait.
 
 pub mod controller;
 pub mod motion_file;
@@ -15,8 +15,8 @@ use crate::subject::ModelError;
 /// Allowed sampling rates, Hz.
 pub const RATE_RANGE_HZ: (f64, f64) = (10.0, 5000.0);
 
-/// Times (s from right heel strike) and instants of a stride at a rate; the last one is the stride's end, so that the last
-/// gap may be shorter.
+/// Samples of a stride at a rate, with their times in s from right heel strike. The last sample is the end of the
+/// stride, so the last interval may be shorter.
 fn samples(gait: &Gait, rate_hz: f64) -> Result<Vec<(f64, Instant)>, ModelError> {
     gait.validate()?;
     ModelError::check_range("rate_hz", rate_hz, RATE_RANGE_HZ.0, RATE_RANGE_HZ.1)?;

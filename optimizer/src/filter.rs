@@ -1,4 +1,4 @@
-//! Digital filters that delay nothing.
+//! Zero-phase digital filters.
 
 mod butterworth;
 mod zero_phase;

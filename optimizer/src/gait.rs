@@ -1,4 +1,4 @@
-//! The result: an optimised walking trajectory over one stride, in SI units and radians.
+//! A gait: a walking trajectory over one stride, in SI units and radians.
 
 use crate::bounds::TunedBounds;
 use crate::device::Device;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) mod motion;
 mod shape;
 
-/// Version of [`Gait`]'s layout.
+/// Version of the layout of [`Gait`].
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// A gait: eight domains over one stride from right heel strike.
@@ -17,11 +17,11 @@ pub(crate) const FORMAT_VERSION: u32 = 1;
 pub struct Gait {
     /// Version of this layout.
     pub format_version: u32,
-    /// Who walks.
+    /// The subject.
     pub subject: Subject,
-    /// With which device.
+    /// The device.
     pub device: Device,
-    /// Whether the muscle constraints C5-C12 are part of the problem.
+    /// Whether the gait satisfies the muscle constraints C5 to C12.
     pub muscles: bool,
     /// The tuned bounds.
     pub bounds: TunedBounds,
@@ -35,13 +35,14 @@ pub struct Gait {
     pub right_step_length_m: f64,
     /// Stride time, s.
     pub stride_time_s: f64,
-    /// v_hip of the four impact-free runs of domains (DS2_R; DS3_R+SS2_R; DS2_L; DS3_L+SS2_L), m/s.
+    /// Hip velocity v_hip of the four sequences of domains without impact (DS2_R; DS3_R and SS2_R; DS2_L; DS3_L and
+    /// SS2_L), m/s.
     pub hip_velocity_m_s: [f64; 4],
     /// The eight domains in order.
     pub domains: Vec<DomainTrajectory>,
 }
 
-/// One contact row of a domain: a component of the ground force on one point of a foot.
+/// A component of the ground reaction force on one contact point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ContactRowName {
     /// `heel` or `toe`.
@@ -82,64 +83,65 @@ pub enum Axis {
     Z,
 }
 
-/// The trajectory within one domain at its equidistant nodes.
+/// The trajectory in one domain, at equidistant nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DomainTrajectory {
     /// `DS2_R`, `DS3_R`, `SS2_R`, `SS1_R`, `DS2_L`, ... (R: stance on the prosthesis).
     pub name: String,
     /// Duration, s.
     pub duration_s: f64,
-    /// Times of the points from the start of the stride, s.
+    /// Time of each node from the start of the stride, s.
     pub time_s: Vec<f64>,
-    /// q at each point: px, pz (m), torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R (rad).
+    /// Coordinates q at each node: px, pz (m), torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R (rad).
     pub q: Vec<[f64; 9]>,
-    /// Velocities, m/s and rad/s.
+    /// Velocities at each node, m/s and rad/s.
     pub qd: Vec<[f64; 9]>,
-    /// Accelerations, m/s² and rad/s².
+    /// Accelerations at each node, m/s² and rad/s².
     pub qdd: Vec<[f64; 9]>,
-    /// Joint torques hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R, N m.
+    /// Joint torques at each node: hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R, N m.
     pub u: Vec<[f64; 6]>,
-    /// Which ground-force component each entry of `contact_forces` is.
+    /// The components of `contact_forces`, in their order.
     pub contact_rows: Vec<ContactRowName>,
-    /// Ground forces on the walker at each point, N.
+    /// Ground reaction forces at each node, N.
     pub contact_forces: Vec<Vec<f64>>,
-    /// Muscle states at each point, in the variant with muscles.
+    /// Muscle states at each node, in the variant with muscles.
     pub muscles: Option<MuscleTrajectory>,
-    /// Coordinates (indices into q) that the virtual constraints drive.
+    /// Coordinates that the virtual constraints drive, as indices into q.
     pub outputs: Vec<usize>,
-    /// Bezier coefficients: one row of degree + 1 per output, rad.
+    /// Bezier coefficients of each output, degree + 1 of them, rad.
     pub bezier: Vec<Vec<f64>>,
-    /// Hip-position phase limits of the domain, m.
+    /// Hip position at the start of the domain, where the phase is 0, m.
     pub phase_start_m: f64,
-    /// See `phase_start_m`.
+    /// Hip position at the end of the domain, where the phase is 1, m.
     pub phase_end_m: f64,
-    /// Impulse of the impact that opens the domain (DS2, DS3), N s, in the order of `contact_rows`.
+    /// Impulse of the impact at the start of the domain (DS2 and DS3), N s, in the order of `contact_rows`.
     pub impulse: Option<Vec<f64>>,
 }
 
 /// States of the ten muscles (HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MuscleTrajectory {
-    /// Fibre length over optimal length.
+    /// Fibre length, in optimal fibre lengths.
     pub fibre_length: Vec<[f64; 10]>,
-    /// Fibre velocity, optimal lengths per second (shortening negative).
+    /// Fibre velocity, in optimal fibre lengths per second; negative in shortening.
     pub fibre_velocity: Vec<[f64; 10]>,
-    /// Activation, 0..1.
+    /// Activation, 0 to 1.
     pub activation: Vec<[f64; 10]>,
 }
 
 impl Gait {
-    /// Coordinates at a time of the stride, s, linear between nodes; clamped to the stride.
+    /// Coordinates at a time of the stride in s, interpolated linearly between nodes. Times are clamped to the stride.
     pub fn coordinates_at(&self, time_s: f64) -> [f64; 9] {
         self.between(time_s, |domain| Some(&domain.q)).unwrap_or([0.0; 9])
     }
 
-    /// Activations of the ten muscles at a time of the stride, s, linear between nodes; none without muscles.
+    /// Activations of the ten muscles at a time of the stride in s, interpolated linearly between nodes. `None` without
+    /// muscles.
     pub fn activations_at(&self, time_s: f64) -> Option<[f64; 10]> {
         self.between(time_s, |domain| domain.muscles.as_ref().map(|muscles| &muscles.activation))
     }
 
-    /// What the nodes have at a time of the stride.
+    /// Linear interpolation of a quantity of the nodes.
     fn between<const N: usize>(
         &self,
         time_s: f64,

@@ -1,14 +1,14 @@
-//! The paper's nonlinear programme: variables, rows C1..C12, objective, bounds, cold start, mesh transfer.
+//! The gait problem: the nonlinear programme of the paper with variables, rows C1 to C12, objective and bounds.
 //!
 //! | constraint | rows here |
 //! |---|---|
 //! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`outputs`], [`hip_velocity`], [`transitions`] |
 //! | C3 physical limits: friction, unilateral contact, clearance, touchdown | [`contact_limits`] |
-//! | C4 bounds of the gait: a1..a8, joints, torques, speed, steps | [`limits`], [`stride`] |
+//! | C4 bounds of the gait: a1 to a8, joints, torques, speed, steps | [`limits`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
 //! | C8 fibre kinematics | [`fibres`] |
-//! | C9-C12 joint torques from muscles | [`muscle_forces`] |
+//! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
 
 mod answer;
 pub mod contact_limits;

@@ -1,6 +1,6 @@
-//! Figures as people read them.
+//! Numbers formatted for messages.
 
-/// Three digits; as a power of ten where there would be many noughts.
+/// Three significant digits, with an exponent if there would be many zeros.
 pub(crate) fn figure(value: f64) -> String {
     let magnitude = value.abs();
     if value != 0.0 && !(1e-3..1e4).contains(&magnitude) {

@@ -1,8 +1,8 @@
 //! Gait optimisation for a human walking with a powered transfemoral prosthesis.
 //!
-//! (subject, device, bounds, variant) -> gait: the multi-domain hybrid-zero-dynamics gait problem with
-//! Hill-type muscles of Li, Tucker, Gehlhar, Yue and Ames (RA-L 2022), solved by the crate's own sparse
-//! interior point. The crate knows nothing of learning, storage or HTTP.
+//! The crate maps (subject, device, bounds, variant) to a gait. It solves the multi-domain hybrid-zero-dynamics problem
+//! with Hill-type muscles of Li, Tucker, Gehlhar, Yue and Ames (RA-L 2022) by a sparse interior-point method, certifies
+//! the gait, explains bounds without a gait, and reads recordings. It does no learning, storage or HTTP.
 
 pub mod body;
 pub mod bounds;

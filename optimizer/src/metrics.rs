@@ -1,10 +1,10 @@
-//! Figures of a gait: Gait RMSE against a reference, smoothness of its activations.
+//! Metrics of a gait: Gait RMSE against a reference, and alternations of the muscle activations.
 
 use crate::gait::Gait;
 use crate::muscle::MUSCLE_COUNT;
 use crate::reference::ReferenceGait;
 
-/// Equidistant times of the stride at which gait and reference are compared.
+/// Number of equidistant times of the stride at which gait and reference are compared.
 pub const RMSE_SAMPLES: usize = 200;
 
 /// Gait RMSE and its parts, rad.
@@ -12,12 +12,12 @@ pub const RMSE_SAMPLES: usize = 200;
 pub struct GaitRmse {
     /// Sum of the parts.
     pub total: f64,
-    /// RMS difference of torso, hip_L, knee_L, ankle_L, hip_R.
+    /// RMS differences of torso, hip_L, knee_L, ankle_L and hip_R.
     pub parts: [f64; 5],
 }
 
-/// `sum_i sqrt(mean((q_i - ref_i)^2))` over the five human coordinates, at equidistant times of the stride (gait and
-/// reference linear between their points).
+/// Gait RMSE: `sum_i sqrt(mean((q_i - ref_i)^2))` over the five human coordinates, at equidistant times of the stride.
+/// Gait and reference are interpolated linearly.
 pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
     let mut squares = [0.0; 5];
     for sample in 0..RMSE_SAMPLES {
@@ -32,10 +32,10 @@ pub fn gait_rmse(gait: &Gait, reference: &ReferenceGait) -> GaitRmse {
     GaitRmse { total: parts.iter().sum(), parts }
 }
 
-/// A step of an activation below this is no part of an alternation.
+/// Smallest step of an activation that counts in an alternation.
 const ALTERNATING_STEP: f64 = 0.005;
 
-/// How often a curve alternates: three steps in a row of changing sign, each above 0.005.
+/// Number of alternations of a curve: three consecutive steps of alternating sign, each of more than 0.005.
 pub fn alternations(curve: &[f64]) -> usize {
     let steps: Vec<f64> = curve.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let alternate =
@@ -43,7 +43,7 @@ pub fn alternations(curve: &[f64]) -> usize {
     steps.windows(3).filter(alternate).count()
 }
 
-/// How often the muscles' activations alternate from node to node within the domains.
+/// Number of alternations of the muscle activations from node to node, over all muscles and domains.
 pub fn activation_alternations(gait: &Gait) -> usize {
     let muscles = gait.domains.iter().filter_map(|domain| domain.muscles.as_ref());
     muscles

@@ -1,4 +1,4 @@
-//! Hill-type muscle-tendon units (Geyer & Herr 2010) and their attachment to the walker.
+//! Hill-type muscle-tendon units (Geyer and Herr 2010) and their attachments to the walker.
 
 pub mod curves;
 pub mod parameters;

@@ -1,9 +1,9 @@
-//! OpenSim's motion and storage files (.mot, .sto): a header that ends with `endheader`, then a table over time.
+//! OpenSim motion and storage files (.mot, .sto): a header that ends with `endheader`, then a table over time.
 
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table, lines_of, malformed};
 
-/// Unit of the angles of an OpenSim file whose header does not say it.
+/// Unit of the angles in an OpenSim file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AngleUnit {
     /// Degrees.
@@ -29,24 +29,24 @@ impl AngleUnit {
     }
 }
 
-/// A file as read: whole, or not at all.
+/// A parsed file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StorageFile {
     pub(crate) table: Table,
-    /// What the header says of the unit of angles.
+    /// Unit of the angles in the header.
     unit: Option<AngleUnit>,
-    /// Line that ends the header.
+    /// Number of the line `endheader`.
     header_end: usize,
 }
 
 impl StorageFile {
-    /// Reads the header and the table; `what` names the file.
+    /// Parses header and table; `what` is the name of the file.
     pub(crate) fn read(what: &str, text: &str) -> Result<Self, ModelError> {
         let lines = lines_of(text);
         let end = lines
             .iter()
             .position(|line| line.trim().eq_ignore_ascii_case("endheader"))
-            .ok_or_else(|| malformed(what, lines.len().max(1), None, "there is no line \"endheader\"".to_owned()))?;
+            .ok_or_else(|| malformed(what, lines.len().max(1), None, "the line \"endheader\" is missing".to_owned()))?;
         let header = &lines[..end];
         let unit = unit_said(what, header)?;
         let table = Table::read(what, &lines[end + 1..], end + 2, Separator::Blank, Clock::Column("time"))?
@@ -56,20 +56,27 @@ impl StorageFile {
             if let Some((line, value)) = settings(header, name).next()
                 && value.parse::<usize>() != Ok(found)
             {
-                let reason = format!("{name}={value}, but there are {found}: the file is not whole");
+                let reason = format!("the header has {name}={value}, but the file has {found}; the file is incomplete");
                 return Err(malformed(what, line, None, reason));
             }
         }
         Ok(Self { table, unit, header_end: end + 1 })
     }
 
-    /// The unit of angles: what the header says, else `unit`; both must not differ.
+    /// The unit of the angles: that of the header, or `unit` if the header has none. Both must agree.
     pub(crate) fn angle_unit(&self, what: &str, unit: Option<AngleUnit>) -> Result<AngleUnit, ModelError> {
-        let silent = || malformed(what, self.header_end, None, "the header has no inDegrees=yes or no".to_owned());
+        let silent = || {
+            malformed(
+                what,
+                self.header_end,
+                None,
+                "the header has neither inDegrees=yes nor inDegrees=no; give the unit".to_owned(),
+            )
+        };
         match (self.unit, unit) {
             (Some(said), Some(told)) if said != told => {
                 let (said, told) = (said.in_words(), told.in_words());
-                let reason = format!("inDegrees says that angles are in {said}, but {told} was asked for");
+                let reason = format!("the header gives angles in {said}, but the unit given is {told}");
                 Err(malformed(what, self.header_end, None, reason))
             }
             (said, told) => said.or(told).ok_or_else(silent),
@@ -77,8 +84,7 @@ impl StorageFile {
     }
 }
 
-/// Every line of a header that sets `name`, with its number and the value: `nRows=220`, and `datarows 220` as SIMM
-/// wrote it.
+/// All lines of a header that set `name`, with line number and value: `nRows=220`, or `datarows 220` in files of SIMM.
 fn settings<'a>(header: &'a [&'a str], name: &'a str) -> impl Iterator<Item = (usize, &'a str)> {
     header.iter().enumerate().filter_map(move |(index, line)| {
         let (key, value) = line.split_once('=').or_else(|| line.trim().split_once(char::is_whitespace))?;
@@ -86,19 +92,19 @@ fn settings<'a>(header: &'a [&'a str], name: &'a str) -> impl Iterator<Item = (u
     })
 }
 
-/// What a header says of the unit of angles; said twice, it must be the same.
+/// The unit of the angles in a header. Repeated entries must agree.
 fn unit_said(what: &str, header: &[&str]) -> Result<Option<AngleUnit>, ModelError> {
     let mut said: Option<(usize, AngleUnit)> = None;
     for (line, word) in settings(header, "inDegrees") {
         let unit = match word {
             word if word.eq_ignore_ascii_case("yes") => AngleUnit::Degrees,
             word if word.eq_ignore_ascii_case("no") => AngleUnit::Radians,
-            _ => return Err(malformed(what, line, None, format!("inDegrees={word}: expected yes or no"))),
+            _ => return Err(malformed(what, line, None, format!("inDegrees={word}: the value must be yes or no"))),
         };
         match said {
             Some((before, other)) if other != unit => {
                 let (unit, other) = (unit.in_words(), other.in_words());
-                let reason = format!("inDegrees says that angles are in {unit}, but in {other} in line {before}");
+                let reason = format!("this line gives angles in {unit}, but line {before} in {other}");
                 return Err(malformed(what, line, None, reason));
             }
             _ => said = Some((line, unit)),
@@ -107,7 +113,7 @@ fn unit_said(what: &str, header: &[&str]) -> Result<Option<AngleUnit>, ModelErro
     Ok(said.map(|(_, unit)| unit))
 }
 
-/// OpenSim 4 writes states by their paths: `/jointset/hip_r/hip_flexion_r/value` is the coordinate `hip_flexion_r`.
+/// The coordinate of a state path of OpenSim 4: `/jointset/hip_r/hip_flexion_r/value` is `hip_flexion_r`.
 fn coordinate_name(name: &str) -> &str {
     name.strip_suffix("/value").and_then(|path| path.rsplit('/').next()).unwrap_or(name)
 }

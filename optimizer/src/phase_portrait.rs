@@ -1,7 +1,8 @@
-//! Phase portraits of measured walking: joint angles over some seconds, each against its velocity.
+//! Phase portraits of measured walking: joint angles against their velocities over some seconds.
 //!
-//! Velocities are central differences of the angles after a zero-phase Butterworth low-pass of order 4 (of one pass);
-//! the portrait shows the filtered angle. Rows that are not evenly spaced are put on an even grid first, linearly. The first and last samples have no neighbour on one side and are left out.
+//! A zero-phase Butterworth low-pass (order 4 in one pass) filters the angles; velocities are their central
+//! differences. Unevenly spaced rows are first interpolated linearly on an even grid. The first and last samples have
+//! no central difference and are omitted.
 
 use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
@@ -12,19 +13,19 @@ use serde::{Deserialize, Serialize};
 
 /// Order of one pass of the low-pass.
 const ORDER: usize = 4;
-/// Longest time between two rows, s: what lies in a longer one is not known.
+/// Longest gap between two rows that is interpolated, s.
 const LONGEST_GAP_S: f64 = 0.05;
-/// Shortest recording, s: one stride and its way back; the paper shows ten seconds.
+/// Shortest recording that shows a limit cycle, s: more than one stride. The paper shows ten seconds.
 const SHORTEST_S: f64 = 2.0;
-/// What differences of times may be off by rounding, s.
+/// Rounding error of a difference of times, s.
 const ROUNDING_S: f64 = 1e-9;
-/// A joint that moves over no more than this does not walk, rad.
+/// Largest range of motion of a joint at rest, rad.
 const STILL_RAD: f64 = 0.05;
 
-/// The joints of the walker, as columns of our own table. Forward lean, flexion and dorsiflexion are positive, hips are
-/// measured from the trunk.
+/// The joints of the walker and their columns in Gaitwright's table. Forward lean, flexion and dorsiflexion are
+/// positive; hip angles are relative to the trunk.
 pub const JOINTS: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
-/// The columns of OpenSim's gait models that make a joint, each with its sign; hips and trunk are put together from two.
+/// Each joint as a signed sum of columns of OpenSim's gait models. Hips and trunk have two columns.
 const OPENSIM: [(&str, &[(&str, f64)]); 7] = [
     ("torso", &[("pelvis_tilt", -1.0), ("lumbar_extension", -1.0)]),
     ("hip_L", &[("hip_flexion_l", 1.0), ("lumbar_extension", -1.0)]),
@@ -40,11 +41,11 @@ const OPENSIM: [(&str, &[(&str, f64)]); 7] = [
 pub struct JointRecording {
     /// Samples per second.
     pub rate_hz: f64,
-    /// Name and angles of each joint that was recorded, rad.
+    /// Name and angles (rad) of each recorded joint.
     pub joints: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// A joint's angle and velocity, sample after sample.
+/// Angle and velocity of a joint, sample by sample.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PhasePortrait {
     /// Name of the joint.
@@ -56,7 +57,7 @@ pub struct PhasePortrait {
 }
 
 impl JointRecording {
-    /// Our own table: `time_s` and any of `torso_rad`, `hip_L_rad`, ..., `ankle_R_rad`.
+    /// Parses Gaitwright's table: `time_s` and any of `torso_rad`, `hip_L_rad`, ..., `ankle_R_rad`.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -68,7 +69,7 @@ impl JointRecording {
         Self::whole(&table, joints.collect())
     }
 
-    /// An OpenSim motion or storage file of a gait model, with the joints whose columns it has.
+    /// Parses an OpenSim motion or storage file of a gait model, with any of its joints.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -80,7 +81,7 @@ impl JointRecording {
             for (column, sign) in columns {
                 let values = match file.table.find(column) {
                     Some(values) => values,
-                    // A model without a lumbar joint has pelvis and trunk in one.
+                    // Without a lumbar joint, the pelvis stands for the trunk.
                     None if *column == "lumbar_extension" => continue,
                     None => return None,
                 };
@@ -95,18 +96,19 @@ impl JointRecording {
 
     fn whole(table: &Table, joints: Vec<(&'static str, Vec<f64>)>) -> Result<Self, ModelError> {
         if joints.is_empty() {
-            let reason = format!("no column is a joint's; there are {}", table.names().join(", "));
+            let reason = format!("no column is a joint angle; the columns are {}", table.names().join(", "));
             return Err(table.malformed_names(reason));
         }
         for (joint, angles) in &joints {
             if let Some(row) = angles.iter().position(|angle| angle.abs() > LARGEST_ANGLE_RAD) {
-                let reason = format!("{joint} is {:.1} rad: is the unit right?", angles[row]);
+                let reason = format!("{joint} is {:.1} rad; check the unit", angles[row]);
                 return Err(table.malformed_row(row, None, reason));
             }
         }
         let times = table.times();
         if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S + ROUNDING_S) {
-            let reason = format!("{:.3} s without a row, at most {LONGEST_GAP_S} s", times[row + 1] - times[row]);
+            let reason =
+                format!("{:.3} s without a row; at most {LONGEST_GAP_S} s are allowed", times[row + 1] - times[row]);
             return Err(table.malformed_row(row + 1, Some(1), reason));
         }
         let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
@@ -114,10 +116,10 @@ impl JointRecording {
         Ok(Self { rate_hz, joints })
     }
 
-    /// Checks that a limit cycle was recorded: long enough, and joints that walk.
+    /// Checks that the recording can show a limit cycle of walking: its duration and the motion of its joints.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`], of the file named `what`.
+    /// [`ModelError::Malformed`] for the file `what`.
     pub fn check_walking(&self, what: &str) -> Result<(), ModelError> {
         let refused = self.too_short().or_else(|| self.still()).or_else(|| {
             self.joints.iter().find_map(|(joint, angles)| {
@@ -132,7 +134,7 @@ impl JointRecording {
         let samples = self.joints.first().map_or(0, |(_, angles)| angles.len());
         let lasts = samples.saturating_sub(1) as f64 / self.rate_hz;
         (lasts < SHORTEST_S - ROUNDING_S)
-            .then(|| format!("{lasts:.3} s are recorded, a limit cycle needs at least {SHORTEST_S} s"))
+            .then(|| format!("the recording lasts {lasts:.3} s; a limit cycle needs at least {SHORTEST_S} s"))
     }
 
     fn still(&self) -> Option<String> {
@@ -142,13 +144,11 @@ impl JointRecording {
         };
         let most = self.joints.iter().map(|(_, angles)| range(angles)).fold(0.0, f64::max);
         (most <= STILL_RAD).then(|| {
-            format!(
-                "no joint moves over more than {STILL_RAD} rad, the farthest over {most:.3} rad; is the unit right?"
-            )
+            format!("no joint moves by more than {STILL_RAD} rad (the largest range is {most:.3} rad); check the unit")
         })
     }
 
-    /// Why no joint turns like this, the rows being evenly spaced.
+    /// The reason why an evenly sampled angle is implausible: it jumps.
     fn jump(&self, angles: &[f64]) -> Option<String> {
         let times: Vec<f64> = (0..angles.len()).map(|row| row as f64 / self.rate_hz).collect();
         let (row, jump_rad) = Recording::jump(&times, angles)?;
@@ -159,17 +159,17 @@ impl JointRecording {
         ))
     }
 
-    /// The phase portrait of every joint; `cutoff_hz` is the edge of the low-pass.
+    /// The phase portrait of each joint; `cutoff_hz` is the edge of the low-pass.
     ///
     /// # Errors
-    /// [`ModelError`] for an edge out of range, or when the recording is too short to be filtered.
+    /// [`ModelError`] if the edge is out of range or the recording is too short for the filter.
     pub fn portraits(&self, cutoff_hz: f64) -> Result<Vec<PhasePortrait>, ModelError> {
         ModelError::check_range("cutoff_hz", cutoff_hz, 0.5, 0.45 * self.rate_hz)?;
         let smooth = low_pass(ORDER, cutoff_hz / (0.5 * self.rate_hz));
         let fewest = extension(&smooth) + 1;
         let portrait = |(joint, angles): &(&'static str, Vec<f64>)| {
             if angles.len() < fewest {
-                let reason = format!("{} samples, the filter needs {fewest}", angles.len());
+                let reason = format!("the recording has {} samples; the filter needs at least {fewest}", angles.len());
                 return Err(ModelError::Malformed { what: format!("joint {joint}"), reason });
             }
             let filtered = filter(&smooth, angles);
@@ -183,7 +183,7 @@ impl JointRecording {
     }
 }
 
-/// A signal at as many evenly spaced times, linear between its samples.
+/// A signal interpolated linearly at the same number of evenly spaced times.
 fn evenly(times: &[f64], signal: &[f64]) -> Vec<f64> {
     let last = times.len() - 1;
     let step = (times[last] - times[0]) / last as f64;

@@ -1,4 +1,4 @@
-//! Reference gaits: what Gait RMSE is measured against, and where the cold start begins.
+//! Reference gaits, for Gait RMSE and for the initial guess of a cold start.
 
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
@@ -14,56 +14,56 @@ pub use recording::{Recording, VerticalForce};
 pub use strides::{HeelStrikes, STRIDE_RANGE_S, Walker};
 pub(crate) use strides::{contacts, given};
 
-/// The built-in reference (citation, licence and processing in its header).
+/// The built-in reference gait. Its header has citation, licence and processing.
 const BUILTIN_CSV: &str = include_str!("../data/reference_gait.csv");
-/// Largest joint angle that is read, rad: a wrong unit exceeds it.
+/// Largest plausible joint angle, rad. Angles in degrees exceed it.
 pub(crate) const LARGEST_ANGLE_RAD: f64 = PI;
-/// Rows of a reference: 0, 1, ..., 100 % of the cycle.
+/// Number of rows of a reference gait: 0, 1, ..., 100 % of the cycle.
 pub const REFERENCE_ROWS: usize = 101;
-/// Column names after the percentage.
+/// Names of the columns after the percentage.
 pub const REFERENCE_COLUMNS: [&str; 5] = ["torso_rad", "hip_L_rad", "knee_L_rad", "ankle_L_rad", "hip_R_rad"];
-/// Column names of the standard deviations of these angles, where a file has them.
+/// Names of the optional columns of standard deviations.
 pub const DEVIATION_COLUMNS: [&str; 5] =
     ["torso_sd_rad", "hip_L_sd_rad", "knee_L_sd_rad", "ankle_L_sd_rad", "hip_R_sd_rad"];
 
-/// Mean joint angles over one gait cycle from right heel strike, radians, seven-link convention.
+/// Mean joint angles over one gait cycle from right heel strike, in rad and in the convention of the walker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceGait {
-    /// Name shown to people.
+    /// Name.
     pub name: String,
     /// Citation, licence and processing of the data.
     pub provenance: String,
-    /// 101 rows (0..=100 % of the cycle) of torso, hip_L, knee_L, ankle_L, hip_R in rad.
+    /// 101 rows (0 to 100 % of the cycle) of torso, hip_L, knee_L, ankle_L and hip_R, rad.
     pub angles_rad: Vec<[f64; 5]>,
-    /// Standard deviation over strides, where there were several.
+    /// Standard deviation over strides, if there were several, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_deviation_rad: Option<Vec<[f64; 5]>>,
-    /// Height of the person, where it is known, m.
+    /// Height of the person, if known, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
-    /// Body mass of the person, where it is known, kg.
+    /// Body mass of the person, if known, kg.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_mass_kg: Option<f64>,
 }
 
 impl ReferenceGait {
-    /// The built-in reference: one healthy adult of Falisse et al. 2019 (MIT).
+    /// The built-in reference gait: one healthy adult of Falisse et al. 2019 (MIT licence).
     ///
     /// # Errors
-    /// Never in practice: a test reads the built-in file.
+    /// If the built-in file is invalid; a test excludes it.
     pub fn builtin() -> Result<Self, ModelError> {
-        // The source says the mass and not the height.
+        // The source has the mass but not the height.
         let reference = Self::from_csv("Falisse 2019, subject 1", BUILTIN_CSV)?;
         Ok(Self { body_mass_kg: Some(62.0), ..reference })
     }
 
-    /// Reads `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` with 101 rows, and where they are there the
-    /// standard deviations `torso_sd_rad,hip_L_sd_rad,knee_L_sd_rad,ankle_L_sd_rad,hip_R_sd_rad`; lines before the header
-    /// that start with `#` are the provenance.
+    /// Parses a table with the columns `pct_rhs,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad` and 101 rows.
+    /// Columns of standard deviations, `torso_sd_rad,hip_L_sd_rad,knee_L_sd_rad,ankle_L_sd_rad,hip_R_sd_rad`, are
+    /// optional. Lines that begin with `#` before the names are the provenance.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] with the line and the reason.
+    /// [`ModelError::Malformed`] with line and reason.
     pub fn from_csv(name: &str, text: &str) -> Result<Self, ModelError> {
         let malformed = |line: u64, reason: String| ModelError::Malformed {
             what: format!("reference gait {name:?}, line {line}"),
@@ -125,7 +125,7 @@ impl ReferenceGait {
         Ok(reference)
     }
 
-    /// Reads a reference as it is written in JSON, and checks it; `what` is the file's name.
+    /// Parses and validates a reference gait in JSON; `what` is the name of the file.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column, or the reason.
@@ -138,10 +138,10 @@ impl ReferenceGait {
         Ok(reference)
     }
 
-    /// Checks the numbers of rows, every angle and deviation, and whose gait it is.
+    /// Checks numbers of rows, angles, standard deviations, height and mass.
     ///
     /// # Errors
-    /// [`ModelError`] naming the field.
+    /// [`ModelError`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         check_curves("angles_rad", &self.angles_rad, -LARGEST_ANGLE_RAD)?;
         if let Some(deviation) = &self.standard_deviation_rad {
@@ -150,7 +150,7 @@ impl ReferenceGait {
         Walker { height_m: self.height_m, body_mass_kg: self.body_mass_kg }.validate()
     }
 
-    /// The five angles at a stride fraction (periodic, linear between rows), rad.
+    /// The five angles at a fraction of the stride, rad; periodic, interpolated linearly.
     pub fn at(&self, fraction: f64) -> [f64; 5] {
         let intervals = REFERENCE_ROWS - 1;
         let position = fraction.rem_euclid(1.0) * intervals as f64;
@@ -161,8 +161,8 @@ impl ReferenceGait {
         std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
     }
 
-    /// All seven joint angles of the walker at a stride fraction; the right knee and ankle, which no reference of an
-    /// intact person has, are the left ones half a stride later.
+    /// All seven joint angles of the walker at a fraction of the stride, rad. Right knee and ankle are the left ones
+    /// shifted by half a stride, because a reference gait does not have them.
     pub fn seven_angles(&self, fraction: f64) -> [f64; 7] {
         let [torso, hip_l, knee_l, ankle_l, hip_r] = self.at(fraction);
         let [_, _, knee_r, ankle_r, _] = self.at(fraction + 0.5);
@@ -170,10 +170,10 @@ impl ReferenceGait {
     }
 }
 
-/// Five curves over the cycle, each value from `least` to the largest angle.
+/// Checks five curves over the cycle: 101 rows with values from `least` to the largest plausible angle.
 fn check_curves(field: &str, curves: &[[f64; 5]], least: f64) -> Result<(), ModelError> {
     if curves.len() != REFERENCE_ROWS {
-        let reason = format!("{} rows, expected {REFERENCE_ROWS}", curves.len());
+        let reason = format!("the curve has {} rows; {REFERENCE_ROWS} are expected", curves.len());
         return Err(ModelError::Malformed { what: field.to_owned(), reason });
     }
     for (row, values) in curves.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Settings of the gait problem that are not tuned by the learner: mesh, limits, objective weights.
+//! Settings of the gait problem other than the tuned bounds: mesh, limits, and weights of the objective.
 
 mod naturalness;
 
@@ -9,17 +9,17 @@ use crate::muscle::MuscleParameters;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// Number of mesh intervals per domain type; a domain with N intervals has 2N+1 equidistant points.
+/// Number of mesh intervals of each kind of domain. A domain with N intervals has 2N + 1 equidistant nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mesh {
-    /// Double support on stance heel and trailing toe.
+    /// Intervals of DS2, double support on stance heel and trailing toe.
     pub ds2: usize,
-    /// Double support on the flat stance foot and trailing toe.
+    /// Intervals of DS3, double support on the flat stance foot and the trailing toe.
     pub ds3: usize,
-    /// Single support on the flat stance foot.
+    /// Intervals of SS2, single support on the flat stance foot.
     pub ss2: usize,
-    /// Single support on the stance toe.
+    /// Intervals of SS1, single support on the stance toe.
     pub ss1: usize,
 }
 
@@ -30,13 +30,13 @@ impl Default for Mesh {
 }
 
 impl Mesh {
-    /// Most intervals per domain.
+    /// Largest number of intervals of a domain.
     pub const MAX_INTERVALS: usize = 100;
 
-    /// Checks that every domain has 1 to [`Self::MAX_INTERVALS`] intervals.
+    /// Checks that each domain has 1 to [`Self::MAX_INTERVALS`] intervals.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         for (field, value) in
             [("mesh.ds2", self.ds2), ("mesh.ds3", self.ds3), ("mesh.ss2", self.ss2), ("mesh.ss1", self.ss1)]
@@ -47,7 +47,7 @@ impl Mesh {
     }
 }
 
-/// One number per domain type.
+/// A number for each kind of domain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerDomainKind {
@@ -61,60 +61,59 @@ pub struct PerDomainKind {
     pub ss1: f64,
 }
 
-/// Physical and chosen limits of a gait. Defaults are those of the reference problem; where no measured number
-/// exists the value is an assumption.
+/// Limits of a gait. Defaults are those of the reference problem. Some are assumptions, because no measurement exists.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GaitLimits {
     /// Friction coefficient of the feet (FROST's planar examples: 0.6).
     pub friction: f64,
-    /// Friction coefficient of the landing heel's impulse.
+    /// Friction coefficient of the impulse at heel strike.
     pub impact_friction: f64,
-    /// Walking-speed band D / sum T, m/s. Minimising cost alone shuffles at 0.26 m/s.
+    /// Smallest walking speed D / sum T, m/s. Without it, the minimum of the cost is a shuffling gait at 0.26 m/s.
     pub speed_min_m_s: f64,
-    /// See `speed_min_m_s`.
+    /// Largest walking speed, m/s.
     pub speed_max_m_s: f64,
-    /// Bounds of both step lengths, m.
+    /// Smallest length of each step, m.
     pub step_min_m: f64,
-    /// See `step_min_m`.
+    /// Largest length of each step, m.
     pub step_max_m: f64,
-    /// Shortest duration of each domain type, s.
+    /// Shortest duration of each kind of domain, s.
     pub duration_min_s: PerDomainKind,
-    /// Longest duration of each domain type, s.
+    /// Longest duration of each kind of domain, s.
     pub duration_max_s: PerDomainKind,
-    /// Smallest knee flexion, rad: keeps the knees off the singular straight posture.
+    /// Smallest knee flexion, rad. It excludes the singular straight posture.
     pub knee_min_rad: f64,
     /// Largest knee flexion, rad.
     pub knee_max_rad: f64,
-    /// Anatomical bound on both hip angles beside a7, rad.
+    /// Anatomical limit of both hip angles in addition to a7, rad.
     pub hip_max_rad: f64,
-    /// Human hip torque, N m.
+    /// Largest human hip torque, N m.
     pub hip_torque_n_m: f64,
-    /// Human knee torque, N m.
+    /// Largest human knee torque, N m.
     pub knee_torque_n_m: f64,
-    /// Human ankle plantarflexion torque, N m.
+    /// Largest human plantarflexion torque, N m.
     pub ankle_plantarflexion_torque_n_m: f64,
-    /// Human ankle dorsiflexion torque, N m.
+    /// Largest human dorsiflexion torque, N m.
     pub ankle_dorsiflexion_torque_n_m: f64,
-    /// Slowest forward hip velocity in SS1, m/s: keeps the phase monotone.
+    /// Smallest forward hip velocity in SS1, m/s. It makes the phase monotonic.
     pub phase_rate_min_m_s: f64,
-    /// Half width of the torso band when a6 is smaller, rad: keeps an interior when a6 = 0.
+    /// Smallest half width of the range of torso lean, rad. It gives the range an interior if a6 = 0.
     pub torso_tolerance_rad: f64,
-    /// Slowest downward toe speed at toe strike, m/s: keeps the guard transversal.
+    /// Smallest downward toe velocity at toe strike, m/s. It makes the guard transversal.
     pub toe_touchdown_m_s: f64,
-    /// Slowest downward heel speed at heel strike, m/s.
+    /// Smallest downward heel velocity at heel strike, m/s.
     pub heel_touchdown_m_s: f64,
-    /// Swing clearance at mid-swing when a5 is smaller, m.
+    /// Smallest swing clearance at mid-swing, m; it applies if a5 is smaller.
     pub clearance_min_m: f64,
-    /// Normal force at the start of a domain that ends by unloading, falling linearly to 0, N.
+    /// Smallest normal force at the start of a domain that ends by unloading, N. It decreases linearly to 0.
     pub liftoff_force_n: f64,
-    /// Largest contact force component, N.
+    /// Largest component of a contact force, N.
     pub contact_force_max_n: f64,
-    /// Largest impulse component, N s.
+    /// Largest component of an impulse, N s.
     pub impulse_max_n_s: f64,
-    /// Shortest fibre, optimal lengths.
+    /// Smallest fibre length, optimal fibre lengths.
     pub fibre_length_min: f64,
-    /// Longest fibre, optimal lengths.
+    /// Largest fibre length, optimal fibre lengths.
     pub fibre_length_max: f64,
 }
 
@@ -151,7 +150,7 @@ impl Default for GaitLimits {
 }
 
 impl GaitLimits {
-    /// Lowest and highest torque of hip_L, knee_L, ankle_L, hip_R and the prosthetic knee and ankle, N m.
+    /// Lowest and highest torques of hip_L, knee_L, ankle_L, hip_R, and of the prosthetic knee and ankle, N m.
     pub fn joint_torques_n_m(&self, device: &Device) -> [(f64, f64); 6] {
         let both = |largest: f64| (-largest, largest);
         [
@@ -164,10 +163,10 @@ impl GaitLimits {
         ]
     }
 
-    /// Checks every limit against its allowed range, and that bands have an interior.
+    /// Checks the range of each limit, and that ranges of the gait have an interior.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         let checks = [
             ("friction", self.friction, 0.1, 2.0),
@@ -211,24 +210,25 @@ impl GaitLimits {
     }
 }
 
-/// Regularisation beside the cost of transport. Each weight multiplies the time integral of its square.
+/// Regularisation of the objective. Each weight multiplies the time integral of a square.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Regularisation {
-    /// Smoothing of |P| as `sqrt(P^2 + eps^2) - eps`, W.
+    /// Smoothing eps of |P| to `sqrt(P^2 + eps^2) - eps`, W.
     pub power_smoothing_w: f64,
-    /// |u/100|²: fixes the internal torques of double support.
+    /// Weight of |u/100|², torques in N m. It determines the redundant torques of double support.
     pub torque: f64,
-    /// |qdd/30|².
+    /// Weight of |qdd/30|², accelerations in m/s² and rad/s².
     pub acceleration: f64,
-    /// |lambda/500|².
+    /// Weight of |lambda/500|², contact forces in N.
     pub contact_force: f64,
-    /// |activation|²: without it the ten redundant muscles co-contract.
+    /// Weight of |activation|². Without it, redundant muscles co-contract.
     pub activation: f64,
-    /// |v_ce/V|²: without it fibre velocities alternate between points and midpoints.
+    /// Weight of |v_ce/V|². Without it, fibre velocities alternate between nodes and midpoints.
     pub fibre_velocity: f64,
-    /// |s_(k-1) - 2 s_k + s_(k+1)|² of the activations at neighbouring points of a domain: damps their alternation from
-    /// point to point (`examples/activation_smoothness.rs`). Absent from [`GaitSettings::reference_problem`].
+    /// Weight of the squared bend |s_(k-1) - 2 s_k + s_(k+1)|² of activations at adjacent nodes of a domain. Without it,
+    /// activations alternate from node to node (`examples/activation_smoothness.rs`). Zero in
+    /// [`GaitSettings::reference_problem`].
     pub activation_bend: f64,
 }
 
@@ -247,10 +247,10 @@ impl Default for Regularisation {
 }
 
 impl Regularisation {
-    /// Checks every weight against its allowed range.
+    /// Checks the range of each weight.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::check_range("regularisation.power_smoothing_w", self.power_smoothing_w, 1e-3, 100.0)?;
         for (field, value) in [
@@ -267,11 +267,11 @@ impl Regularisation {
     }
 }
 
-/// Everything about the gait problem that is neither subject, device nor tuned bound.
+/// Settings of the gait problem other than subject, device and tuned bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct GaitSettings {
-    /// Mesh intervals per domain type.
+    /// Number of mesh intervals of each kind of domain.
     pub mesh: Mesh,
     /// Limits of the gait.
     pub limits: GaitLimits,
@@ -280,22 +280,22 @@ pub struct GaitSettings {
     /// Naturalness terms beyond the paper.
     #[serde(skip_serializing_if = "Naturalness::is_off")]
     pub naturalness: Naturalness,
-    /// How the subject's muscles differ from the published table.
+    /// Differences of the subject's muscles from the published table.
     #[serde(skip_serializing_if = "MuscleParameters::is_published")]
     pub muscles: MuscleParameters,
 }
 
 impl GaitSettings {
-    /// The problem that an independent implementation solved (`tests/data`, `benches/casadi`): the defaults without a
-    /// weight on the activations' bend.
+    /// The settings of the reference problem, which an independent implementation solves (`tests/data`, `benches/casadi`):
+    /// the defaults without the weight on the bend of activations.
     pub fn reference_problem() -> Self {
         Self { regularisation: Regularisation { activation_bend: 0.0, ..Regularisation::default() }, ..Self::default() }
     }
 
-    /// Checks every setting.
+    /// Checks each setting.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         self.mesh.validate()?;
         self.limits.validate()?;
@@ -311,7 +311,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_given_has_its_default() {
+    fn missing_fields_have_defaults() {
         for same in ["{}", r#"{"regularisation": {"torque": 0.003}}"#] {
             assert_eq!(serde_json::from_str::<GaitSettings>(same).unwrap(), GaitSettings::default(), "{same}");
         }
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_off_is_not_written() {
+    fn disabled_options_are_not_serialised() {
         let text = serde_json::to_string(&GaitSettings::default()).unwrap();
         assert!(!text.contains("naturalness") && !text.contains("muscles"), "{text}");
         let wished: GaitSettings = serde_json::from_str(r#"{"naturalness": {"trailing_load_share": 0.3}}"#).unwrap();

@@ -1,4 +1,4 @@
-//! The public face: one gait problem in, one honest outcome out.
+//! Solving a gait problem: attempts from initial guesses or a warm start, and the outcome.
 
 use crate::nlp::NlpError;
 use crate::subject::ModelError;
@@ -29,31 +29,32 @@ use run::Context;
 pub use warm_start::WarmStart;
 use warm_start::on_mesh_of;
 
-/// Why a solve could not even be tried.
+/// The reason why a solve could not start.
 #[derive(Debug, Error)]
 pub enum SolveError {
-    /// The input is not a valid problem.
+    /// The problem or an option is invalid.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The warm start does not belong to a problem of this shape.
-    #[error("the warm start is of another problem: {0}")]
+    /// The warm start belongs to another problem.
+    #[error("the warm start belongs to another problem: {0}")]
     WarmStartShape(String),
-    /// The interior point refused its input.
+    /// The interior-point solver rejected its input.
     #[error(transparent)]
     Solver(#[from] NlpError),
 }
 
-/// Solves one gait problem. Deterministic: same inputs, same bits.
+/// Solves a gait problem. Equal inputs give equal bits.
 ///
-/// A cold start tries [`SolveOptions::cold_guesses`] guesses and keeps one by [`SolveOptions::basin_choice`]; when none
-/// converges, it tries the others of the catalogue until one does ([`SolveOptions::retry`]). A warm start that does not
-/// converge falls back to a cold start; when that does not converge either, the outcome is where the violation is
-/// smallest. A gait that exceeds its bounds between its nodes is solved on with tightened bounds
+/// A cold start solves from [`SolveOptions::cold_guesses`] initial guesses and chooses a gait by
+/// [`SolveOptions::basin_choice`]. If none converges, it tries further guesses until one does ([`SolveOptions::retry`]). If a
+/// warm start does not converge, a cold start follows. Without a converged attempt, the outcome is the attempt with the smallest
+/// violation. If the gait violates bounds between its nodes, the solve continues with tightened bounds
 /// ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on the calling thread.
-/// A solve that ends without a gait is an `Ok` outcome with another status than `Converged`.
+///
+/// A solve without a gait is an `Ok` outcome with a status other than `Converged`.
 ///
 /// # Errors
-/// [`SolveError`] when the input is invalid.
+/// [`SolveError`] if the input is invalid.
 pub fn solve(
     problem: &GaitProblem,
     warm_start: Option<&WarmStart>,
@@ -83,10 +84,10 @@ pub fn solve(
     finish(&context, tried, chosen, started_from)
 }
 
-/// Solves one gait problem from an earlier solve only, as it is at its nodes.
+/// Solves a gait problem from a warm start only, without checks between nodes.
 ///
 /// # Errors
-/// [`SolveError`] when the input is invalid or the warm start is of another problem.
+/// [`SolveError`] if the input is invalid or the warm start belongs to another problem.
 pub(crate) fn solve_from_warm_start(
     problem: &GaitProblem,
     warm_start: &WarmStart,
@@ -101,11 +102,11 @@ pub(crate) fn solve_from_warm_start(
     finish(&context, vec![tried], 0, StartedFrom::Warm)
 }
 
-/// Solves one gait problem cold from the given guesses only, as it is at its nodes: for studies of basins and of
+/// Solves a gait problem from the given initial guesses only, without checks between nodes: for studies of local optima and of
 /// the solver.
 ///
 /// # Errors
-/// [`SolveError`] when the input is invalid or there is no guess.
+/// [`SolveError`] if the input is invalid or there is no guess.
 pub fn solve_from_guesses(
     problem: &GaitProblem,
     guesses: &[ColdGuess],
@@ -126,7 +127,7 @@ pub fn solve_from_guesses(
     finish(&context, tried, chosen, StartedFrom::Cold)
 }
 
-/// The outcome of what was tried.
+/// The outcome of the attempts.
 fn finish(
     context: &Context<'_>,
     tried: Vec<Tried>,

@@ -1,48 +1,48 @@
-//! The person and the prosthesis: what the walking model is built from.
+//! The subject, and the errors of invalid input.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Why a subject, device, bound or setting was refused. Names the field, the value and the allowed range.
+/// Why an input was rejected: a subject, device, bound, setting or file.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
-    /// A number outside its allowed range.
+    /// A number is outside its allowed range.
     #[error("{field} = {value} is outside the allowed range [{minimum}, {maximum}]")]
     OutOfRange {
-        /// Field name with its unit, as in the public interface (`height_m`).
+        /// Name of the field with its unit, as in the public interface (`height_m`).
         field: String,
-        /// The value that was given.
+        /// The value given.
         value: f64,
         /// Smallest allowed value.
         minimum: f64,
         /// Largest allowed value.
         maximum: f64,
     },
-    /// A name that is not known.
+    /// A name is unknown.
     #[error("{field}: unknown value {value:?}; known: {known}")]
     Unknown {
         /// Field name.
         field: String,
         /// The value that was given.
         value: String,
-        /// What would have been accepted.
+        /// The known values.
         known: String,
     },
-    /// A text or file that cannot be read.
+    /// A text or file cannot be parsed.
     #[error("{what}: {reason}")]
     Malformed {
-        /// What was being read.
+        /// Name of the text or file.
         what: String,
-        /// What is wrong, with the place where it is known.
+        /// The reason, with the place if it is known.
         reason: String,
     },
 }
 
 impl ModelError {
-    /// `Ok(value)` when `minimum <= value <= maximum`, else [`ModelError::OutOfRange`] (NaN is refused).
+    /// Returns the value if `minimum <= value <= maximum`.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field otherwise, and for NaN.
     pub fn check_range(field: &str, value: f64, minimum: f64, maximum: f64) -> Result<f64, Self> {
         if value >= minimum && value <= maximum {
             Ok(value)
@@ -52,7 +52,7 @@ impl ModelError {
     }
 }
 
-/// A person: the two numbers that scale the human segments (Winter 2009).
+/// A subject: the height and mass that scale the human segments (Winter 2009).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Subject {
@@ -63,7 +63,8 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// Allowed heights in metres: outside, the device's fixed shank leaves no sensible thigh link.
+    /// Allowed heights in metres. The prosthetic shank has a fixed length, which leaves a thigh link of valid length
+    /// for these heights only.
     pub const HEIGHT_RANGE_M: (f64, f64) = (1.4, 2.2);
     /// Allowed body masses in kilograms.
     pub const BODY_MASS_RANGE_KG: (f64, f64) = (35.0, 160.0);
@@ -71,14 +72,14 @@ impl Subject {
     /// A subject with validated height and mass.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming `height_m` or `body_mass_kg`.
+    /// [`ModelError::OutOfRange`] with `height_m` or `body_mass_kg`.
     pub fn new(height_m: f64, body_mass_kg: f64) -> Result<Self, ModelError> {
         let subject = Self { height_m, body_mass_kg };
         subject.validate()?;
         Ok(subject)
     }
 
-    /// The paper's subjects: 1 (female, 1.727 m, 65.7 kg) and 2 (male, 1.803 m, 75 kg).
+    /// A subject of the paper: 1 (female, 1.727 m, 65.7 kg) or 2 (male, 1.803 m, 75 kg).
     ///
     /// # Errors
     /// [`ModelError::Unknown`] for any other number.
@@ -89,15 +90,15 @@ impl Subject {
             other => Err(ModelError::Unknown {
                 field: "subject".to_owned(),
                 value: other.to_string(),
-                known: "1, 2 (the paper's subjects); or give height and mass".to_owned(),
+                known: "1, 2 (the subjects of the paper); or give height and mass".to_owned(),
             }),
         }
     }
 
-    /// Checks both numbers against their allowed ranges.
+    /// Checks height and mass against their allowed ranges.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::check_range("height_m", self.height_m, Self::HEIGHT_RANGE_M.0, Self::HEIGHT_RANGE_M.1)?;
         ModelError::check_range(

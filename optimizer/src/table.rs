@@ -1,53 +1,53 @@
-//! A table of numbers over time, read strictly: whatever is wrong is named with line and column, and half a table is none.
+//! Strict parser of tables of numbers over time. Errors name line and column; a table with an error is rejected.
 
 use crate::subject::ModelError;
 
-/// The lines of a file, without the byte order mark that spreadsheets write at the beginning.
+/// The lines of a file, without the byte order mark that spreadsheets write first.
 pub(crate) fn lines_of(text: &str) -> Vec<&str> {
     text.trim_start_matches('\u{feff}').lines().collect()
 }
 
-/// Named columns of equal length over time.
+/// Named columns over time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Table {
     what: String,
     /// Line of the column names in the file.
     first_line: usize,
     names: Vec<String>,
-    /// Where a column of words stood, which is left out.
+    /// Position of the column of words, which is skipped.
     words: Option<usize>,
     rows: Vec<Vec<f64>>,
     /// Line of each row in the file.
     lines: Vec<usize>,
-    /// Rows per second, where no column has the time.
+    /// Rows per second, if no column has the time.
     rate_hz: Option<f64>,
 }
 
-/// Where the time of a row comes from.
+/// Source of the time of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Clock<'a> {
-    /// The first column, which has this name: s, strictly increasing.
+    /// The first column, which has this name, in s and strictly increasing.
     Column(&'a str),
-    /// No column: so many rows per second, the first at 0 s.
+    /// A constant number of rows per second, the first row at 0 s.
     Rate(f64),
 }
 
-/// The column of the tables of gaits that has words: the name of the domain. A domain ends when the next one begins, so
-/// that time is there twice, with the same angles; the second is left out.
+/// The column of words in the table of a gait: the name of the domain. The last row of a domain and the first row of
+/// the next one have the same time and angles, so the second of them is skipped.
 const DOMAIN: &str = "domain";
-/// Times that differ by less are the same, s: sums of durations, rounded.
+/// Tolerance for equal times, s: the times of a gait are rounded sums of durations.
 const SAME_TIME_S: f64 = 1e-9;
 
-/// Fewest rows of a table over time.
+/// Smallest number of rows of a table.
 const FEWEST_ROWS: usize = 20;
 
-/// Largest deviation of a sample from its place on an even grid, sampling intervals.
+/// Largest deviation of a row from an even grid, in sampling intervals.
 const UNEVENNESS: f64 = 0.5;
 
-/// What separates the cells of a line.
+/// Separator of the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Separator {
-    /// Tabs or spaces, any number.
+    /// Any number of tabs or spaces.
     Blank,
     /// One comma.
     Comma,
@@ -63,8 +63,8 @@ impl Separator {
 }
 
 impl Table {
-    /// Reads the lines after a header: the first has the names, the rest numbers; empty lines at the end are allowed.
-    /// `first_line` is the number of the line of names in its file, `what` the file's name.
+    /// Parses the lines after a header: a line of names, then lines of numbers. Trailing empty lines are allowed.
+    /// `first_line` is the number of the line of names in the file `what`.
     pub(crate) fn read(
         what: &str,
         lines: &[&str],
@@ -81,11 +81,16 @@ impl Table {
             && names.first().map(String::as_str) != Some(time_name)
         {
             let found = names.first().map_or("", String::as_str);
-            return Err(malformed(first_line, format!("the first column is {found:?}, expected {time_name:?}")));
+            return Err(malformed(first_line, format!("the first column is {found:?}; it must be {time_name:?}")));
         }
         for (column, name) in names.iter().enumerate() {
             if names[..column].contains(name) {
-                return Err(self::malformed(what, first_line, Some(column + 1), format!("{name:?} is there twice")));
+                return Err(self::malformed(
+                    what,
+                    first_line,
+                    Some(column + 1),
+                    format!("column {name:?} occurs twice"),
+                ));
             }
         }
         let words = names.iter().position(|name| separator == Separator::Comma && name == DOMAIN);
@@ -112,17 +117,17 @@ impl Table {
             before = word;
         }
         if table.rows.len() < FEWEST_ROWS {
-            let reason = format!("{} rows, at least {FEWEST_ROWS} are needed", table.rows.len());
+            let reason = format!("the table has {} rows; at least {FEWEST_ROWS} are needed", table.rows.len());
             return Err(malformed(first_line + filled, reason));
         }
         Ok(table)
     }
 
-    /// `opens`: a domain begins with this row.
+    /// Parses a row; `opens` if it is the first row of a domain.
     fn add_row(&mut self, line: usize, cells: &[&str], opens: bool) -> Result<(), ModelError> {
         let columns = self.names.len() + usize::from(self.words.is_some());
         if cells.len() != columns {
-            let reason = format!("{} cells, but {columns} columns", cells.len());
+            let reason = format!("the row has {} cells; {columns} are expected", cells.len());
             return Err(malformed(&self.what, line, None, reason));
         }
         let mut row = Vec::with_capacity(cells.len());
@@ -140,7 +145,7 @@ impl Table {
         if let Some(before) = before
             && row[0] <= before[0]
         {
-            let reason = format!("the time {} does not follow {}", row[0], before[0]);
+            let reason = format!("time {} follows {}; times must increase", row[0], before[0]);
             return Err(malformed(&self.what, line, Some(1), reason));
         }
         self.rows.push(row);
@@ -148,7 +153,7 @@ impl Table {
         Ok(())
     }
 
-    /// The same table with other names of its columns.
+    /// Renames the columns.
     pub(crate) fn with_names(mut self, other: impl Fn(&str) -> &str) -> Self {
         for name in &mut self.names {
             *name = other(name).to_owned();
@@ -166,12 +171,12 @@ impl Table {
         self.names.len()
     }
 
-    /// Names of the columns, without that of the time.
+    /// Names of the columns, without the time.
     pub(crate) fn names(&self) -> &[String] {
         if self.rate_hz.is_some() { &self.names } else { &self.names[1..] }
     }
 
-    /// The times, s.
+    /// Times of the rows, s.
     pub(crate) fn times(&self) -> Vec<f64> {
         match self.rate_hz {
             Some(rate_hz) => (0..self.rows.len()).map(|row| row as f64 / rate_hz).collect(),
@@ -179,7 +184,7 @@ impl Table {
         }
     }
 
-    /// An error in a row, counted from 0.
+    /// An error in a row; rows count from 0.
     pub(crate) fn malformed_row(&self, row: usize, column: Option<usize>, reason: String) -> ModelError {
         malformed(&self.what, self.lines[row], column, reason)
     }
@@ -189,7 +194,10 @@ impl Table {
         malformed(&self.what, self.first_line, None, reason)
     }
 
-    /// Samples per second of an evenly sampled table.
+    /// Rows per second of an evenly sampled table.
+    ///
+    /// # Errors
+    /// If the rows are not evenly spaced.
     pub(crate) fn even_rate_hz(&self) -> Result<f64, ModelError> {
         let times = self.times();
         let start_s = times[0];
@@ -198,7 +206,7 @@ impl Table {
         if times.iter().enumerate().any(uneven) { Err(self.oddest_step(&times)) } else { Ok(rate_hz) }
     }
 
-    /// The row whose distance to the row before is least like the others.
+    /// The row whose distance to the previous row differs most from the usual one.
     fn oddest_step(&self, times: &[f64]) -> ModelError {
         let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let mut sorted = steps.clone();
@@ -207,7 +215,7 @@ impl Table {
         let odd = |k: &usize| (steps[*k] - usual).abs();
         let row = 1 + (0..steps.len()).max_by(|a, b| odd(a).total_cmp(&odd(b))).unwrap_or(0);
         let reason = format!(
-            "the time {} follows {} by {:.6} s, where rows are {usual:.6} s apart: the rows must be evenly spaced",
+            "time {} is {2:.6} s after {1}, but the usual spacing is {usual:.6} s; rows must be evenly spaced",
             times[row],
             times[row - 1],
             steps[row - 1]
@@ -215,20 +223,20 @@ impl Table {
         self.malformed_row(row, Some(1), reason)
     }
 
-    /// A column by name, if it is there.
+    /// The column with this name, if it exists.
     pub(crate) fn find(&self, name: &str) -> Option<Vec<f64>> {
         let column = self.names.iter().position(|n| n == name)?;
         Some(self.rows.iter().map(|row| row[column]).collect())
     }
 
-    /// A column by name.
+    /// The column with this name.
     pub(crate) fn column(&self, name: &str) -> Result<Vec<f64>, ModelError> {
-        let missing = || format!("column {name:?} is missing; there are {}", self.names.join(", "));
+        let missing = || format!("column {name:?} is missing; the columns are {}", self.names.join(", "));
         self.find(name).ok_or_else(|| self.malformed_names(missing()))
     }
 }
 
-/// An error at a place of a file; lines and columns count from 1.
+/// An error at a position in a file; lines and columns count from 1.
 pub(crate) fn malformed(what: &str, line: usize, column: Option<usize>, reason: String) -> ModelError {
     let column = column.map_or_else(String::new, |column| format!(", column {column}"));
     ModelError::Malformed { what: format!("{what}, line {line}{column}"), reason }

@@ -1,4 +1,4 @@
-//! The hybrid system: eight domains and their cycle, contact rows, outputs, Bezier curves, phase variable.
+//! The hybrid system: the cycle of eight domains, contacts, outputs, Bezier curves, impacts and the phase variable.
 
 pub mod bezier;
 mod clearance;

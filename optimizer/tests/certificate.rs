@@ -1,4 +1,4 @@
-//! Certificates of the golden gaits, and of gaits that were broken on purpose.
+//! Certificates of the golden gaits, and of gaits with deliberate errors.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,13 +25,13 @@ fn golden_gaits_pass() {
         let map = certificate.return_map.unwrap();
         assert!(map.is_stable());
         assert!(map.fixed_point_residual < 1e-7, "{}", map.fixed_point_residual);
-        // Collocation in SS1 leaves the gait itself this far from the periodic motion.
+        // The collocation error in SS1.
         assert!(map.fixed_point_distance < 5e-3, "{}", map.fixed_point_distance);
-        // However small it is: a multiplier of 3e-7 is found by both methods, and not in the noise of either.
+        // Both methods resolve even a multiplier of 3e-7.
         assert!(map.disagreement() < 1e-5, "{} {}", map.largest, map.largest_by_differences);
         assert!(map.differences_resolve < 1e-4 * map.largest, "{} {}", map.largest, map.differences_resolve);
         let free = certificate.free_hip_return_map.unwrap();
-        // With the hip velocity left alone the speed is what is left of a disturbance: stable, and no accident of rounding.
+        // With a free hip velocity, the multiplier of the zero dynamics is stable and clearly above the rounding error.
         assert!((0.3..0.9).contains(&free.largest), "{}", free.largest);
         assert!(free.disagreement() < 1e-5, "{} {}", free.largest, free.largest_by_differences);
         let pushes = certificate.pushes.unwrap();
@@ -42,7 +42,7 @@ fn golden_gaits_pass() {
 }
 
 #[test]
-fn a_certificate_is_deterministic_and_survives_json() {
+fn certificate_is_deterministic_and_round_trips_through_json() {
     let (_, gait) = golden_gait(1, false);
     let first = certificate(&gait);
     assert!(first == certificate(&gait), "differs");
@@ -51,7 +51,7 @@ fn a_certificate_is_deterministic_and_survives_json() {
 }
 
 #[test]
-fn a_changed_torque_is_found_at_its_node() {
+fn changed_torque_is_detected_at_its_node() {
     let (_, mut gait) = golden_gait(1, false);
     gait.domains[3].u[4][1] += 1.0;
     let certificate = certificate(&gait);
@@ -61,7 +61,7 @@ fn a_changed_torque_is_found_at_its_node() {
 }
 
 #[test]
-fn a_changed_curve_is_found_and_leaves_the_orbit() {
+fn changed_bezier_curve_is_detected_and_leaves_the_orbit() {
     let (_, mut gait) = golden_gait(1, false);
     gait.domains[7].bezier[4][5] += 0.05;
     let certificate = certificate(&gait);
@@ -71,22 +71,21 @@ fn a_changed_curve_is_found_and_leaves_the_orbit() {
 }
 
 #[test]
-fn an_impulse_that_makes_no_such_jump_is_found() {
+fn impulse_inconsistent_with_the_velocity_jump_is_detected() {
     let (_, mut gait) = golden_gait(1, false);
     gait.domains[1].impulse.as_mut().unwrap()[0] += 0.01;
     assert!(objects_to(&certificate(&gait), "C2 impulses of the impacts: 0.01 N s (DS2_R"));
 }
 
 #[test]
-fn a_tighter_bound_than_the_gait_keeps_is_found() {
+fn violated_tuned_bound_is_detected() {
     let (_, mut gait) = golden_gait(2, false);
     gait.bounds.a7 = 10.0;
     assert!(objects_to(&certificate(&gait), "C4 joint angles"));
 }
 
-/// Limits that the gait problem imposes and the gait does not keep, one at a time.
 #[test]
-fn every_limit_is_checked() {
+fn each_violated_limit_is_detected() {
     type Change = fn(&mut Gait);
     let changes: [(&str, Change); 6] = [
         ("C3 friction cone of heel strikes", |gait| gait.settings.limits.impact_friction = 0.1),
@@ -107,7 +106,7 @@ fn every_limit_is_checked() {
 }
 
 #[test]
-fn fibre_lengths_are_examined_at_every_point() {
+fn changed_fibre_length_is_detected_at_every_node() {
     let (_, whole) = golden_gait(1, true);
     for point in [0, 7, 12] {
         let mut gait = whole.clone();
@@ -122,7 +121,7 @@ fn fibre_lengths_are_examined_at_every_point() {
 }
 
 #[test]
-fn a_muscle_that_cannot_pull_like_that_is_found() {
+fn violated_muscle_equilibrium_is_detected() {
     let (_, mut gait) = golden_gait(1, true);
     for activation in &mut gait.domains[6].muscles.as_mut().unwrap().activation {
         activation[5] = 0.0;
@@ -131,9 +130,9 @@ fn a_muscle_that_cannot_pull_like_that_is_found() {
 }
 
 #[test]
-fn a_walker_that_misses_its_footfall_falls() {
+fn walker_without_heel_strike_falls() {
     let (_, mut gait) = golden_gait(1, false);
-    // The swing leg of SS1_R stays bent: the heel does not come down.
+    // The swing leg stays bent in SS1_R, so the heel does not land.
     for (output, row) in gait.domains[3].outputs.clone().into_iter().zip(&mut gait.domains[3].bezier) {
         if output == 4 {
             for coefficient in &mut row[3..] {
@@ -147,7 +146,7 @@ fn a_walker_that_misses_its_footfall_falls() {
 }
 
 #[test]
-fn an_incomplete_gait_is_refused_by_name() {
+fn incomplete_gait_is_rejected_with_the_field() {
     let (_, whole) = golden_gait(1, false);
     let mut gait = whole.clone();
     gait.domains.pop();
@@ -158,7 +157,7 @@ fn an_incomplete_gait_is_refused_by_name() {
     let mut gait = whole.clone();
     gait.domains[3].time_s.iter_mut().for_each(|time| *time += 1.0);
     let refused = certify(&gait).unwrap_err().to_string();
-    assert!(refused.contains("SS1_R: time_s[0] is 1.") && refused.contains("by the durations"), "{refused}");
+    assert!(refused.contains("SS1_R: time_s[0] is 1.") && refused.contains("from the durations"), "{refused}");
     for (change, field) in [
         ((|gait| gait.stride_time_s = -4.0) as fn(&mut Gait), "stride_time_s"),
         (|gait| gait.format_version = 2, "format_version"),
@@ -173,5 +172,5 @@ fn an_incomplete_gait_is_refused_by_name() {
     assert!(certify(&gait).unwrap_err().to_string().contains("DS2_R: impulse has None entries, expected Some(4)"));
     let mut gait = whole;
     gait.domains[4].q[2][3] = f64::NAN;
-    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_L: holds a number that is not finite"));
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_L: a number is not finite"));
 }

@@ -1,4 +1,4 @@
-//! The description of device files against what is accepted.
+//! Tests of the documented format of device files.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -18,7 +18,7 @@ fn with(field: &str, value: &Value) -> Result<Device, String> {
     Device::from_json(&device.to_string()).map_err(|e| e.to_string())
 }
 
-/// Field and range of every number in the description.
+/// Field and range of each number in the documentation.
 fn described() -> Vec<(&'static str, f64, f64)> {
     let devices = DESCRIPTION.split("\n## ").find(|section| section.starts_with("Devices")).unwrap();
     let rows = devices.lines().filter(|line| line.starts_with("| `"));
@@ -31,7 +31,7 @@ fn described() -> Vec<(&'static str, f64, f64)> {
 }
 
 #[test]
-fn every_described_range_is_the_one_that_is_accepted() {
+fn documented_ranges_are_the_accepted_ranges() {
     let described = described();
     let numbers = builtin().as_object().unwrap().values().filter(|value| value.is_number()).count();
     assert_eq!(described.len(), numbers);
@@ -48,7 +48,7 @@ fn every_described_range_is_the_one_that_is_accepted() {
 }
 
 #[test]
-fn what_is_missing_unknown_or_no_number_is_refused_by_name() {
+fn missing_unknown_and_non_numeric_fields_are_rejected_by_name() {
     let mut missing = builtin();
     missing.as_object_mut().unwrap().remove("foot_mass_kg");
     let refusal = Device::from_json(&missing.to_string()).unwrap_err().to_string();
@@ -59,11 +59,11 @@ fn what_is_missing_unknown_or_no_number_is_refused_by_name() {
 }
 
 #[test]
-fn an_amputee_does_not_carry_the_limb() {
+fn amputee_has_no_carried_limb() {
     let subject = Subject::builtin(1).unwrap();
     let mass = |device: &Device| WalkerModel::new(&subject, device).unwrap().total_mass;
     let carried = mass(&with("carried_limb", &json!(true)).unwrap());
     let amputee = mass(&with("carried_limb", &json!(false)).unwrap());
-    // Shank and foot of Winter's segments: 0.0465 and 0.0145 of the body mass.
+    // Shank and foot have 0.0465 and 0.0145 of the body mass (Winter).
     assert!((carried - amputee - 0.061 * subject.body_mass_kg).abs() < 1e-9, "{carried} {amputee}");
 }

@@ -1,4 +1,4 @@
-//! Electromyograms: the chain against SciPy, cycles and EMG RMSE against numbers worked out by hand.
+//! Tests of EMG processing against SciPy and against values computed by hand.
 
 #![allow(clippy::unwrap_used)]
 
@@ -16,7 +16,7 @@ use std::fmt::Write;
 /// Written by `tests/data/emg_scipy.py`.
 const SCIPY: &str = include_str!("data/emg_scipy.json");
 
-/// The signal of the script: bursts of 83 Hz, 211 Hz throughout, a movement artefact of 7 Hz, an offset.
+/// The signal of the script: bursts of 83 Hz, a constant 211 Hz, a motion artefact of 7 Hz, and an offset.
 fn raw(samples: usize) -> Vec<f64> {
     (0..samples)
         .map(|k| {
@@ -32,7 +32,7 @@ fn recording(samples: usize) -> EmgRecording {
 }
 
 #[test]
-fn the_envelope_is_scipys() {
+fn envelope_agrees_with_scipy() {
     let envelope = recording(4400).envelopes(&EmgSettings::default()).unwrap().remove(0);
     let scipy: Value = serde_json::from_str(SCIPY).unwrap();
     let every = usize::try_from(scipy["every"].as_u64().unwrap()).unwrap();
@@ -44,7 +44,7 @@ fn the_envelope_is_scipys() {
 }
 
 #[test]
-fn settings_are_refused_by_name() {
+fn invalid_settings_are_rejected_with_their_field() {
     let refusal = |change: &dyn Fn(&mut EmgSettings)| {
         let mut settings = EmgSettings::default();
         change(&mut settings);
@@ -55,20 +55,27 @@ fn settings_are_refused_by_name() {
     assert!(refusal(&|s| s.envelope_hz = f64::NAN).starts_with("emg.envelope_hz = NaN"));
     assert!(refusal(&|s| s.order = 3).contains("emg.order: unknown value \"3\"; known: 2, 4, 6, 8"));
     let short = recording(27).envelopes(&EmgSettings::default()).unwrap_err().to_string();
-    assert_eq!(short, "channel TA: 27 samples, the filters need 28");
+    assert_eq!(short, "channel TA: the recording has 27 samples; the filters need at least 28");
 }
 
-/// 0 to 2 s at 100 Hz, rising by 1 per second.
+/// 0 to 2 s at 100 Hz, increasing by 1 per second.
 #[test]
-fn channels_that_are_no_muscles_are_refused() {
+fn channels_without_muscle_signal_are_rejected() {
     let refused = |change: fn(&mut Vec<f64>)| {
         let mut changed = recording(2000);
         change(&mut changed.channels[0].1);
         changed.check_channels().unwrap_err().to_string()
     };
-    assert_eq!(refused(|samples| samples.fill(0.25)), "channel TA: every sample is 0.25: nothing was connected");
+    assert_eq!(
+        refused(|samples| samples.fill(0.25)),
+        "channel TA: every sample is 0.25; check that the electrode was connected"
+    );
     let artefact = refused(|samples| samples[700] = 1e6);
-    assert!(artefact.starts_with("channel TA: 1000000 at 0.7000 s is more than 100 times as far"), "{artefact}");
+    assert!(
+        artefact
+            .starts_with("channel TA: the sample 1000000 at 0.7000 s is an artefact: it is more than 100 times as far"),
+        "{artefact}"
+    );
 }
 
 /// Bursts of noise of 0 to 1 twice a second, 4 s at 1000 Hz.
@@ -78,7 +85,7 @@ fn bursts() -> Vec<f64> {
 }
 
 #[test]
-fn rectified_signals_and_envelopes_are_refused_and_raw_ones_are_not() {
+fn rectified_signals_and_envelopes_are_rejected() {
     let of =
         |samples: Vec<f64>| EmgRecording { start_s: 0.0, rate_hz: 1000.0, channels: vec![("TA".to_owned(), samples)] };
     let checked = |samples: Vec<f64>| of(samples).check_channels().map_err(|error| error.to_string());
@@ -93,7 +100,7 @@ fn rectified_signals_and_envelopes_are_refused_and_raw_ones_are_not() {
     let reason = checked(rectified.clone()).unwrap_err();
     assert!(reason.starts_with("channel TA: it is never below zero and often at it ("), "{reason}");
     println!("{reason}");
-    // Of this program's own chain, a running mean over 100 ms, and an envelope that keeps its mean of zero.
+    // An envelope of this crate, a running mean over 100 ms, and an envelope with mean zero.
     let own = of(bursts()).envelopes(&EmgSettings::default()).unwrap().remove(0).values;
     let running: Vec<f64> = rectified.windows(100).map(|near| near.iter().sum::<f64>() / 100.0).collect();
     let about_zero = own.iter().map(|value| value - 0.3).collect();
@@ -105,7 +112,7 @@ fn rectified_signals_and_envelopes_are_refused_and_raw_ones_are_not() {
             "{reason}"
         );
     }
-    // Too short to be filtered: the error names the place.
+    // Too short for the filters.
     assert_eq!(checked(bursts()[..25].to_vec()), Ok(()));
 }
 
@@ -115,16 +122,16 @@ fn ramp() -> Envelope {
 }
 
 #[test]
-fn a_cycle_is_the_mean_of_whole_strides() {
-    // Strides from 0.0 and from 0.9; a third would end after the recording, a fourth is too short.
+fn cycle_is_the_mean_of_complete_strides() {
+    // Two strides, from 0.0 and from 0.9. A third one would end after the recording, and a fourth one is too short.
     let cycle = CycleActivity::cut(&ramp(), &[0.0, 0.9, 1.8, 1.9, 2.9]).unwrap();
     assert_eq!((cycle.strides, cycle.mean.len()), (2, CYCLE_POINTS));
-    // Half way: 0.45 and 1.35, mean 0.9, standard deviation 0.9 / sqrt(2).
+    // In the middle of the cycle: 0.45 and 1.35, mean 0.9, standard deviation 0.9 / sqrt(2).
     assert!((cycle.mean[50] - 0.9).abs() < 1e-12);
     assert!((cycle.standard_deviation[50] - 0.9 / 2.0_f64.sqrt()).abs() < 1e-12);
     assert!((cycle.peak() - 1.35).abs() < 1e-12 && (cycle.average() - 0.9).abs() < 1e-12);
     let none = CycleActivity::cut(&ramp(), &[0.0, 0.2]).unwrap_err().to_string();
-    assert!(none.contains("none of the 1 strides lasts 0.8 to 1.6 s"), "{none}");
+    assert!(none.contains("none of the 1 strides is within the recording and lasts 0.8 to 1.6 s"), "{none}");
 }
 
 fn flat(channel: &str, level: f64) -> CycleActivity {
@@ -137,20 +144,21 @@ fn flat(channel: &str, level: f64) -> CycleActivity {
 }
 
 #[test]
-fn emg_rmse_is_what_the_hand_computes() {
+fn emg_rmse_matches_a_value_computed_by_hand() {
     let normal = [flat("TA", 0.5), flat("BF", 0.25)];
-    // Half the cycle (51 of 101 points) off by 0.2 in one channel, all of it by 0.3 in the other.
+    // One channel differs by 0.2 at 51 of 101 points, the other by 0.3 at all points.
     let mut gait = [flat("BF", 0.55), flat("TA", 0.5)];
     gait[1].mean[..51].fill(0.7);
     let by_hand = (51.0 / 101.0_f64).sqrt() * 0.2 + 0.3;
     assert!((emg_rmse(&gait, &normal).unwrap().total - by_hand).abs() < 1e-12);
     let parts = emg_rmse(&gait, &normal).unwrap().parts;
     assert!((parts[0] - (51.0 / 101.0_f64).sqrt() * 0.2).abs() < 1e-12 && (parts[1] - 0.3).abs() < 1e-12);
-    // Ten times the peak of normal walking may be, more is doubted.
+    // More than ten times the peak of normal walking is doubtful.
     gait[0].mean[7] = 2.5;
     assert_eq!(emg_rmse(&gait, &normal).unwrap().remarks, [""; 0]);
     gait[0].mean[7] = 2.75;
-    let doubted = ["BF peaks at 11.0 times the peak of normal walking: are both recorded in one unit?"];
+    let doubted =
+        ["the peak of BF is 11.0 times that of normal walking; check that both recordings have the same unit"];
     assert_eq!(emg_rmse(&gait, &normal).unwrap().remarks, doubted);
     assert!(matches!(emg_rmse(&gait[..1], &normal), Err(ModelError::Unknown { value, .. }) if value == "TA"));
 
@@ -160,7 +168,7 @@ fn emg_rmse_is_what_the_hand_computes() {
 }
 
 #[test]
-fn tables_are_read_strictly() {
+fn malformed_tables_are_rejected_with_their_place() {
     let table = |change: &dyn Fn(&mut String)| {
         let mut text = "# site A\ntime_s,TA,BF\n".to_owned();
         for k in 0..60 {
@@ -175,8 +183,8 @@ fn tables_are_read_strictly() {
     for (from, to, expected) in [
         ("\n0.01,0.10,1", "\n0.01,x,1", "emg.csv, line 13, column 2"),
         ("\n0.03,0.30,1\n", "\n0.0301,0.30,1\n0.0302,0,0\n", "rows must be evenly spaced"),
-        ("time_s,", "time,", "expected \"time_s\""),
-        ("TA,BF", "TA,TA", "is there twice"),
+        ("time_s,", "time,", "it must be \"time_s\""),
+        ("TA,BF", "TA,TA", "occurs twice"),
     ] {
         let refusal = table(&|text| *text = text.replace(from, to)).unwrap_err().to_string();
         assert!(refusal.contains(expected), "{refusal}");
@@ -184,10 +192,10 @@ fn tables_are_read_strictly() {
 }
 
 #[test]
-fn a_table_without_time_needs_its_rate_and_strikes_are_read_off_a_switch() {
+fn table_without_time_needs_a_rate_and_foot_switch_gives_heel_strikes() {
     let mut text = "EMG 1,switch\n".to_owned();
     for k in 0..2500 {
-        // Down from 0.3 s, 1.4 s, 2.5 s on, for 0.6 s each.
+        // The switch is closed for 0.6 s from 0.3 s, 1.4 s and 2.5 s.
         let down = k >= 300 && (k - 300) % 1100 < 600;
         writeln!(text, "0.5,{}", u8::from(down)).unwrap();
     }
@@ -208,9 +216,9 @@ fn a_table_without_time_needs_its_rate_and_strikes_are_read_off_a_switch() {
         recording.check_strikes("emg.csv", &[0.3, 9.0]).unwrap_err().to_string(),
     ];
     for (refusal, expected) in refusals.iter().zip([
-        "expected \"time_s\"",
+        "it must be \"time_s\"",
         "rate_hz = 1 is outside the allowed range [100, 20000]",
-        "column \"TA\" is missing; there are EMG 1, switch",
+        "column \"TA\" is missing; the columns are EMG 1, switch",
         "rises 0 times above 0.9",
         "heel strike (s) = 9",
     ]) {
@@ -219,7 +227,7 @@ fn a_table_without_time_needs_its_rate_and_strikes_are_read_off_a_switch() {
 }
 
 #[test]
-fn columns_of_an_opensim_file_are_channels() {
+fn opensim_columns_become_channels() {
     let mut text = "emg\nversion=1\nnRows=40\nnColumns=2\nendheader\ntime TA\n".to_owned();
     for k in 0..40 {
         writeln!(text, "{}\t0.{k}", f64::from(k) / 1000.0).unwrap();
@@ -227,11 +235,14 @@ fn columns_of_an_opensim_file_are_channels() {
     let recording = EmgRecording::from_opensim("emg.sto", &text).unwrap();
     assert_eq!(recording.channels[0].0, "TA");
     let half = EmgRecording::from_opensim("emg.sto", &text.replace("nRows=40", "nRows=41")).unwrap_err().to_string();
-    assert!(half.contains("emg.sto, line 3: nRows=41, but there are 40: the file is not whole"), "{half}");
+    assert!(
+        half.contains("emg.sto, line 3: the header has nRows=41, but the file has 40; the file is incomplete"),
+        "{half}"
+    );
 }
 
 #[test]
-fn the_model_is_held_against_a_channel_where_it_has_the_muscle() {
+fn model_activations_are_compared_with_channels_of_their_muscle() {
     let (_, gait) = golden_gait(1, true);
     let sole = |channel: &str| model_activity(&gait, &flat(channel, 0.5));
     assert!(sole("RF_L").is_none() && sole("SOL_L").is_none(), "the model has no rectus femoris");

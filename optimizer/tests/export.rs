@@ -1,4 +1,4 @@
-//! Exports of the golden gaits, read back.
+//! Tests of exported files of the golden gaits.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,7 +11,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 
 #[test]
-fn the_controller_file_reproduces_the_gait_at_its_domain_ends() {
+fn controller_file_reproduces_the_gait_at_domain_ends() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
         let text = serde_json::to_string_pretty(&ControllerFile::new(&gait, 200.0).unwrap()).unwrap();
@@ -37,7 +37,7 @@ fn the_controller_file_reproduces_the_gait_at_its_domain_ends() {
             assert!((set_point[0] - gait.domains[0].q[0][q]).abs() < 1e-12);
             assert!((set_point[end] - set_point[0]).abs() < 1e-9, "periodic");
         }
-        // Set points and their rates belong together, but where an impact makes the rate jump.
+        // Velocities are the derivatives of the set points, except at impacts.
         for k in 1..end - 1 {
             let near = |start: &f64| (start - trajectory.time_s[k]).abs() < 0.006;
             if gait.domains.iter().any(|domain| near(&domain.time_s[0])) {
@@ -54,7 +54,7 @@ fn the_controller_file_reproduces_the_gait_at_its_domain_ends() {
     }
 }
 
-/// Every field of a document by its path, but what is keyed by names of joints or fields.
+/// The paths of all fields of a document, except keys that are names of joints or fields.
 fn names(path: &str, value: &Value) -> BTreeSet<String> {
     match value {
         Value::Array(all) => all.iter().flat_map(|one| names(path, one)).collect(),
@@ -70,7 +70,7 @@ fn names(path: &str, value: &Value) -> BTreeSet<String> {
 }
 
 #[test]
-fn what_is_not_a_controller_file_is_refused_with_the_place() {
+fn malformed_controller_files_are_rejected_with_the_place() {
     let (_, gait) = golden_gait(1, false);
     let file = ControllerFile::new(&gait, 100.0).unwrap();
     let refused = |file: &ControllerFile| {
@@ -84,12 +84,12 @@ fn what_is_not_a_controller_file_is_refused_with_the_place() {
     assert!(refused(&other).contains("in order"));
     let mut other = file;
     other.trajectory.ankle_rad.pop();
-    assert!(refused(&other).contains("differ in length"));
+    assert!(refused(&other).contains("must have the same length"));
     assert!(ControllerFile::from_json("{\n \"format\": 3}").unwrap_err().to_string().contains("line 2"));
 }
 
 #[test]
-fn a_rate_out_of_range_is_refused_by_name() {
+fn sampling_rates_out_of_range_are_rejected_by_name() {
     let (_, gait) = golden_gait(1, false);
     for rate in [0.0, f64::NAN, 1e6] {
         assert!(matches!(motion_file(&gait, rate), Err(ModelError::OutOfRange { field, .. }) if field == "rate_hz"));
@@ -97,7 +97,7 @@ fn a_rate_out_of_range_is_refused_by_name() {
 }
 
 #[test]
-fn the_motion_file_has_its_header_and_opensims_signs() {
+fn motion_file_has_the_header_and_signs_of_opensim() {
     let (_, gait) = golden_gait(1, false);
     let text = motion_file(&gait, 100.0).unwrap();
     let (header, body) = text.split_once("endheader\n").unwrap();

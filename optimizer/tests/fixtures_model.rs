@@ -1,4 +1,4 @@
-//! The walking model and the muscles against independent values (`tests/data/README.md`).
+//! Walker and muscles match the values of an independent implementation (`tests/data/README.md`).
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
@@ -28,7 +28,7 @@ fn close(what: &str, ours: f64, theirs: f64, tolerance: f64) {
 }
 
 #[test]
-fn equations_of_motion_and_contacts() {
+fn dynamics_contacts_and_impacts_match_independent_values() {
     for number in [1, 2] {
         let data = fixture(number);
         let model = WalkerModel::new(&Subject::builtin(number).unwrap(), &Device::ampro3().unwrap()).unwrap();
@@ -82,7 +82,7 @@ fn equations_of_motion_and_contacts() {
 }
 
 #[test]
-fn muscle_lengths_arms_and_curves() {
+fn muscles_match_independent_values() {
     for number in [1, 2] {
         let data = fixture(number);
         for state in data["states"].as_array().unwrap() {
@@ -133,7 +133,7 @@ fn impacts() {
                 for (i, value) in numbers(&expected["Lambda"]).into_iter().enumerate() {
                     close(&format!("state {k} {} Lambda[{i}]", domain.name()), ours.impulse[i], value, 1e-8);
                 }
-                // A plastic impact cannot create energy.
+                // A plastic impact dissipates energy.
                 let (before, after) =
                     (kinetic_energy(&model, &q, &qd), kinetic_energy(&model, &q, &ours.velocity_after));
                 assert!(after <= before * (1.0 + 1e-12), "state {k}: {before} J to {after} J");

@@ -1,4 +1,4 @@
-//! The whole programme off a solution against independent sums, and its derivatives.
+//! The gait problem away from a solution matches independent sums, and its derivatives match finite differences.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
@@ -32,7 +32,7 @@ fn programme(muscles: bool) -> GaitProgramme {
 
 const DOMAINS: [&str; 8] = ["DS2_R", "DS3_R", "SS2_R", "SS1_R", "DS2_L", "DS3_L", "SS2_L", "SS1_L"];
 
-/// The group of the fixture that a row belongs to.
+/// The group of a row in the fixture.
 fn group(name: RowName) -> String {
     use RowKind as K;
     match name.place {
@@ -69,7 +69,7 @@ fn group(name: RowName) -> String {
 }
 
 #[test]
-fn whole_programme_agrees_off_the_solution() {
+fn gait_problem_matches_independent_sums() {
     for (name, muscles) in [("nlp_s1_n", false), ("nlp_s1_m", true)] {
         let data = fixture(name);
         let mut programme = programme(muscles);
@@ -83,7 +83,7 @@ fn whole_programme_agrees_off_the_solution() {
         assert!(g.iter().all(|v| v.is_finite()));
         let mut sums: BTreeMap<String, (usize, f64, f64, f64)> = BTreeMap::new();
         for (i, (row, value)) in programme.rows.names.iter().zip(&g).enumerate() {
-            // The fixture writes dp_dot - minimum >= 0; here the minimum is the row's bound.
+            // The fixture has rows dp_dot - minimum >= 0. Here the minimum is a bound of the row.
             let value = if row.kind == RowKind::PhaseRate { value - programme.rows.lower[i] } else { *value };
             let entry = sums.entry(group(*row)).or_insert((0, 0.0, 0.0, 0.0));
             entry.0 += 1;
@@ -117,7 +117,7 @@ fn whole_programme_agrees_off_the_solution() {
     }
 }
 
-/// Dense product of a compressed-column matrix with a vector.
+/// Product of a compressed-column matrix with a vector.
 fn multiply(pattern: &gait_optimizer::nlp::SparsityPattern, values: &[f64], v: &[f64], symmetric: bool) -> Vec<f64> {
     let mut result = vec![0.0; pattern.rows];
     for column in 0..pattern.columns {
@@ -133,7 +133,7 @@ fn multiply(pattern: &gait_optimizer::nlp::SparsityPattern, values: &[f64], v: &
 }
 
 #[test]
-fn derivatives_agree_with_differences() {
+fn derivatives_match_finite_differences() {
     for (name, muscles) in [("nlp_s1_n", false), ("nlp_s1_m", true)] {
         let x = numbers(&fixture(name)["x"]);
         let mut programme = programme(muscles);
@@ -196,12 +196,12 @@ fn derivatives_agree_with_differences() {
 }
 
 #[test]
-fn the_elimination_tree_separates_every_coupling() {
+fn elimination_tree_covers_every_coupling() {
     for muscles in [false, true] {
         let programme = programme(muscles);
         let blocks = programme.elimination_blocks().unwrap();
         let related = |mut a: usize, mut b: usize| {
-            // The smaller number must reach the larger one through parents.
+            // The block with the larger number must be an ancestor of the other.
             if a > b {
                 std::mem::swap(&mut a, &mut b);
             }

@@ -1,4 +1,4 @@
-//! Golden gaits: an independent implementation's solutions of the same programme (`tests/data/README.md`).
+//! Tests of the golden gaits: solutions of the same problem by an independent implementation (`tests/data/README.md`).
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
@@ -14,7 +14,7 @@ use gait_optimizer::{
 use golden_gaits::{golden, golden_gait, golden_with, numbers};
 
 #[test]
-fn residuals_of_the_golden_gaits() {
+fn golden_gaits_satisfy_all_rows() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let golden = golden(subject, muscles);
         let mut g = vec![0.0; golden.programme.rows()];
@@ -37,7 +37,7 @@ fn residuals_of_the_golden_gaits() {
 }
 
 #[test]
-fn the_golden_gaits_keep_the_least_clearance() {
+fn golden_gaits_satisfy_the_default_clearance() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
         let least = gait.settings.limits.clearance_min_m;
@@ -46,10 +46,10 @@ fn the_golden_gaits_keep_the_least_clearance() {
     }
 }
 
-/// What a solve may take that begins at its answer.
+/// Largest number of iterations of a solve that starts at its solution.
 const HANDFUL: usize = 5;
 
-/// Begins at a golden gait with the barrier at which the golden solver stopped (tolerance / 11).
+/// Settings to start at a golden gait: the barrier parameter is the last one of the other solver (tolerance / 11).
 fn from_a_golden_gait() -> NlpSettings {
     NlpSettings {
         tolerance: 1e-6,
@@ -62,7 +62,7 @@ fn from_a_golden_gait() -> NlpSettings {
 }
 
 #[test]
-fn the_solver_stays_at_the_golden_gaits() {
+fn solver_stays_at_the_golden_gaits() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let golden = golden(subject, muscles);
         let settings = NlpSettings { max_iterations: HANDFUL, ..from_a_golden_gait() };
@@ -80,7 +80,7 @@ fn the_solver_stays_at_the_golden_gaits() {
 }
 
 #[test]
-fn gait_rmse_of_the_golden_gaits() {
+fn golden_gaits_have_the_expected_gait_rmse() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let golden = golden(subject, muscles);
         let (problem, gait) = golden_gait(subject, muscles);
@@ -93,9 +93,8 @@ fn gait_rmse_of_the_golden_gaits() {
     }
 }
 
-/// In every domain the phase goes from 0 to 1, and the hip goes at the velocity that the virtual constraints hold.
 #[test]
-fn phase_and_hip_velocity_of_the_golden_gaits() {
+fn golden_gaits_have_phases_from_zero_to_one_and_their_hip_velocity() {
     for (subject, muscles) in [(1, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
         let made = progress(&gait).unwrap();
@@ -115,7 +114,7 @@ fn phase_and_hip_velocity_of_the_golden_gaits() {
     }
 }
 
-/// The programme of the golden gaits lets activations alternate from node to node; the default one does not.
+/// Activations of the golden gaits alternate from node to node, because their problem has no weight on the bend.
 #[test]
 fn activations_do_not_alternate_with_the_default_weights() {
     for subject in [1, 2] {
@@ -133,11 +132,10 @@ fn activations_do_not_alternate_with_the_default_weights() {
     }
 }
 
-/// What cold starts took in the mean of four accuracies of the linear algebra, by subject, variant and guess: rounding alone
-/// moves one of them by a third and all eight together by a sixteenth. Of the version before the posture of a cold start had a
-/// pass less: all eight together took 1,014, and 966 with the usual accuracy since.
+/// Expected iterations of cold starts, by subject, variant and initial guess: means over four accuracies of the linear
+/// algebra. Rounding changes a single one by up to a third, and the sum of all eight by up to 6 %.
 #[test]
-fn cold_starts_take_no_more_iterations_than_before() {
+fn cold_starts_take_at_most_the_expected_iterations() {
     let known = [
         ((1, false, ColdGuess::NATURAL), 92),
         ((1, false, ColdGuess::EARLY_RISE), 97),

@@ -1,5 +1,5 @@
-//! Bounds that no gait meets: how the solver ends on a spread of them. One fault of the linear algebra or of the restoration phase
-//! shows here first, as ends that only gave up.
+//! Solves with bounds that no gait satisfies. Errors in linear algebra or restoration phase show here as solves that
+//! end without a stationary point.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,7 @@ use gait_optimizer::{
 };
 use std::io::Write;
 
-/// Far tighter than Table I (Li et al. 2022), each of them a bound or two that leave no gait.
+/// Bounds far tighter than Table I (Li et al. 2022); in each case one or two of them are infeasible.
 const WITHOUT_A_GAIT: [&str; 12] = [
     "a2=10",
     "a1=2,a5=0.15",
@@ -25,12 +25,11 @@ const WITHOUT_A_GAIT: [&str; 12] = [
     "a2=10,a4=0.35",
 ];
 
-/// Ends that may give up instead of saying that there is nothing: none of the twelve did from either guess, but paths differ by
-/// rounding.
+/// Largest number of solves that may end without a stationary point of the violation, because paths depend on rounding.
 const MAY_GIVE_UP: usize = 1;
 
 #[test]
-fn nearly_every_start_on_bounds_without_a_gait_ends_at_a_stationary_point_of_the_violation() {
+fn infeasible_solves_end_at_stationary_points_of_the_violation() {
     let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
     let options = SolveOptions { threads: 2, ..SolveOptions::default() };
     let mut gave_up = Vec::new();
@@ -63,18 +62,20 @@ fn nearly_every_start_on_bounds_without_a_gait_ends_at_a_stationary_point_of_the
     assert!(gave_up.len() <= MAY_GIVE_UP, "gave up on {gave_up:?}");
 }
 
-/// Where bounds hardly leave a gait, a point that creeps towards the rows with steps of a hundredth (a thousand iterations with
-/// two per cent of what was left each) is helped by the restoration phase.
+/// Near the boundary of feasibility steps become very short, and the restoration phase must take over.
 #[test]
-fn long_a_start_at_the_edge_of_what_is_feasible_does_not_end_at_its_limit() {
+fn long_nearly_infeasible_solve_ends_before_its_iteration_limit() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        // Past the capture of the harness; nobody reads it when stderr is closed.
-        let _ = writeln!(std::io::stderr(), "long_a_start_at_the_edge: skipped: set GAITWRIGHT_LONG_TESTS=1");
+        // Writes to stderr directly, because the test harness captures `eprintln`.
+        let _ = writeln!(
+            std::io::stderr(),
+            "long_nearly_infeasible_solve_ends_before_its_iteration_limit: skipped: set GAITWRIGHT_LONG_TESTS=1"
+        );
         return;
     }
     let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), true).unwrap();
     let options = SolveOptions { threads: 2, ..SolveOptions::default() };
-    // The edge is between 14 and 15.
+    // The boundary of feasibility is between 14 and 15.
     for (bound, has_gaits) in [("a2=14", false), ("a2=15", true)] {
         problem.bounds = TunedBounds::parse(bound).unwrap();
         let ends = [ColdGuess::NATURAL, ColdGuess::EARLY_RISE].map(|guess| {

@@ -1,5 +1,5 @@
-//! What each malformed recording gets: line, column and reason, word for word. `cargo test -p gait-optimizer --test
-//! malformed_recordings -- --nocapture` prints the table.
+//! Exact error messages of malformed recordings. `cargo test -p gait-optimizer --test malformed_recordings --
+//! --nocapture` prints them as a table.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,10 +11,10 @@ use gait_optimizer::phase_portrait::JointRecording;
 use gait_optimizer::reference::Recording;
 use synthetic_recordings::{camargo, electromyogram, opensim, own_table};
 
-/// A file that is wrong, and what it gets.
+/// A malformed file: description, text and error message.
 type Case = (&'static str, String, &'static str);
 
-/// Holds the messages of a reader against a table, and prints it.
+/// Checks the messages of a parser, and prints them.
 fn check(kind: &str, read: impl Fn(&str) -> Option<ModelError>, cases: &[Case]) {
     let mut other = Vec::new();
     for (name, text, expected) in cases {
@@ -27,7 +27,7 @@ fn check(kind: &str, read: impl Fn(&str) -> Option<ModelError>, cases: &[Case]) 
     assert!(other.is_empty(), "{kind}: {other:#?}");
 }
 
-/// A whole file with the first `from` replaced by `to`.
+/// A file with the first `from` replaced by `to`.
 fn changed(whole: &str, from: &str, to: &str) -> String {
     assert!(whole.contains(from), "{from}");
     whole.replacen(from, to, 1)
@@ -38,7 +38,7 @@ fn line(text: &str, number: usize) -> String {
     text.lines().nth(number - 1).unwrap().to_owned()
 }
 
-/// A motion file with its angles in radians and everything else as it was.
+/// A motion file with its angles converted to radians.
 fn in_radians(whole: &str) -> String {
     let (header, rows) = whole.split_at(whole.find("\n0.0000").unwrap() + 1);
     let angle = |(column, cell): (usize, &str)| match column {
@@ -51,7 +51,7 @@ fn in_radians(whole: &str) -> String {
 }
 
 #[test]
-fn motion_files_of_opensim() {
+fn malformed_opensim_files_are_rejected_with_place_and_reason() {
     let whole = opensim(2);
     let read = |text: &str| Recording::from_opensim("walk.mot", text, None, Some("right_vy")).err();
     assert_eq!(read(&whole), None);
@@ -63,66 +63,78 @@ fn motion_files_of_opensim() {
         cells[column - 1] = cell;
         change(&row, &cells.join("\t"))
     };
-    let names = "there are time, pelvis_tilt, hip_flexion_r, knee_angle_r, ankle_angle_r, hip_flexion_l";
+    let names = "the columns are time, pelvis_tilt, hip_flexion_r, knee_angle_r, ankle_angle_r, hip_flexion_l";
     let missing =
         |name: &str, rest: &str| format!("walk.mot, line 7: column {name:?} is missing; {rest}").leak() as &str;
     let cases = [
-        ("empty", String::new(), "walk.mot, line 1: there is no line \"endheader\""),
-        ("no endheader", change("endheader\n", ""), "walk.mot, line 227: there is no line \"endheader\""),
-        ("binary", "\u{0}\u{1}\u{2}PNG\n\u{3}".to_owned(), "walk.mot, line 2: there is no line \"endheader\""),
+        ("empty", String::new(), "walk.mot, line 1: the line \"endheader\" is missing"),
+        ("no endheader", change("endheader\n", ""), "walk.mot, line 227: the line \"endheader\" is missing"),
+        ("binary", "\u{0}\u{1}\u{2}PNG\n\u{3}".to_owned(), "walk.mot, line 2: the line \"endheader\" is missing"),
         (
             "header alone",
             whole[..whole.find("time").unwrap()].to_owned(),
             "walk.mot, line 7: the line of column names is missing",
         ),
-        ("no unit", change("inDegrees=yes\n", ""), "walk.mot, line 5: the header has no inDegrees=yes or no"),
-        ("odd unit", change("inDegrees=yes", "inDegrees=grad"), "walk.mot, line 5: inDegrees=grad: expected yes or no"),
+        (
+            "no unit",
+            change("inDegrees=yes\n", ""),
+            "walk.mot, line 5: the header has neither inDegrees=yes nor inDegrees=no; give the unit",
+        ),
+        (
+            "odd unit",
+            change("inDegrees=yes", "inDegrees=grad"),
+            "walk.mot, line 5: inDegrees=grad: the value must be yes or no",
+        ),
         (
             "two units",
             change("inDegrees=yes\n", "inDegrees=yes\ninDegrees = no\n"),
-            "walk.mot, line 6: inDegrees says that angles are in radians, but in degrees in line 5",
+            "walk.mot, line 6: this line gives angles in radians, but line 5 in degrees",
         ),
         (
             "wrong unit",
             change("inDegrees=yes", "inDegrees=no"),
-            "walk.mot, line 8: torso_rad is 7.0 rad, beyond 3.14 rad; is the unit right?",
+            "walk.mot, line 8: torso_rad is 7.0 rad; at most 3.14 rad is plausible; check the unit",
         ),
         (
             "radians under a header of degrees",
             in_radians(&whole),
-            "walk.mot, line 8: knee_L_rad moves over 0.012 rad only, less than 0.1 rad; is the unit right?",
+            "walk.mot, line 8: knee_L_rad moves by only 0.012 rad, less than 0.1 rad; check the unit",
         ),
         ("an absurd sample", with(9, "120"), "walk.mot, line 11: torso_rad jumps by -2.16 rad in 0.0100 s"),
-        ("cut in half", whole[..whole.len() / 2].to_owned(), "walk.mot, line 117: 7 cells, but 10 columns"),
+        (
+            "cut in half",
+            whole[..whole.len() / 2].to_owned(),
+            "walk.mot, line 117: the row has 7 cells; 10 are expected",
+        ),
         (
             "a row taken out",
             change(&format!("{}\n", line(&whole, 50)), ""),
-            "walk.mot, line 3: nRows=221, but there are 220: the file is not whole",
+            "walk.mot, line 3: the header has nRows=221, but the file has 220; the file is incomplete",
         ),
         (
             "number of columns",
             change("nColumns=10", "nColumns=9"),
-            "walk.mot, line 4: nColumns=9, but there are 10: the file is not whole",
+            "walk.mot, line 4: the header has nColumns=9, but the file has 10; the file is incomplete",
         ),
         (
             "number of rows no number",
             change("nRows=221", "nRows=many"),
-            "walk.mot, line 3: nRows=many, but there are 221: the file is not whole",
+            "walk.mot, line 3: the header has nRows=many, but the file has 221; the file is incomplete",
         ),
         (
             "no column names",
             change(&format!("{}\n", line(&whole, 7)), ""),
-            "walk.mot, line 7: the first column is \"0.0000\", expected \"time\"",
+            "walk.mot, line 7: the first column is \"0.0000\"; it must be \"time\"",
         ),
         (
             "time not first",
             change("time\t", "frame\t"),
-            "walk.mot, line 7: the first column is \"frame\", expected \"time\"",
+            "walk.mot, line 7: the first column is \"frame\"; it must be \"time\"",
         ),
         (
             "a name twice",
             change("hip_flexion_l", "hip_flexion_r"),
-            "walk.mot, line 7, column 6: \"hip_flexion_r\" is there twice",
+            "walk.mot, line 7, column 6: column \"hip_flexion_r\" occurs twice",
         ),
         (
             "knee missing",
@@ -138,22 +150,34 @@ fn motion_files_of_opensim() {
         ("not a number", with(5, "NaN"), "walk.mot, line 11, column 5: ankle_angle_r = \"NaN\" is not a number"),
         ("infinity", with(10, "inf"), "walk.mot, line 11, column 10: right_vy = \"inf\" is not a number"),
         ("decimal comma", with(3, "30,5"), "walk.mot, line 11, column 3: hip_flexion_r = \"30,5\" is not a number"),
-        ("a cell missing", change(&row, &cells[..9].join("\t")), "walk.mot, line 11: 9 cells, but 10 columns"),
-        ("a cell too many", change(&row, &format!("{row}\t1")), "walk.mot, line 11: 11 cells, but 10 columns"),
-        ("an empty line", change(&row, &format!("\n{row}")), "walk.mot, line 11: 0 cells, but 10 columns"),
-        ("time stands still", with(1, "0.0200"), "walk.mot, line 11, column 1: the time 0.02 does not follow 0.02"),
-        ("time goes back", with(1, "-1"), "walk.mot, line 11, column 1: the time -1 does not follow 0.02"),
+        (
+            "a cell missing",
+            change(&row, &cells[..9].join("\t")),
+            "walk.mot, line 11: the row has 9 cells; 10 are expected",
+        ),
+        (
+            "a cell too many",
+            change(&row, &format!("{row}\t1")),
+            "walk.mot, line 11: the row has 11 cells; 10 are expected",
+        ),
+        ("an empty line", change(&row, &format!("\n{row}")), "walk.mot, line 11: the row has 0 cells; 10 are expected"),
+        (
+            "time stands still",
+            with(1, "0.0200"),
+            "walk.mot, line 11, column 1: time 0.02 follows 0.02; times must increase",
+        ),
+        ("time goes back", with(1, "-1"), "walk.mot, line 11, column 1: time -1 follows 0.02; times must increase"),
         (
             "ten rows",
             changed(&whole.lines().take(17).collect::<Vec<_>>().join("\n"), "nRows=221\n", ""),
-            "walk.mot, line 16: 10 rows, at least 20 are needed",
+            "walk.mot, line 16: the table has 10 rows; at least 20 are needed",
         ),
     ];
     check("motion file", read, &cases);
 }
 
 #[test]
-fn tables_of_camargo_2021_and_own_tables() {
+fn malformed_tables_are_rejected_with_place_and_reason() {
     let (whole, own) = (camargo(2), own_table());
     let read = |text: &str| Recording::from_camargo_csv("AB06.csv", text).err();
     assert_eq!(read(&whole), None);
@@ -166,20 +190,24 @@ fn tables_of_camargo_2021_and_own_tables() {
             (
                 "another table of the data set",
                 changed(&whole, "Header,", "HeelStrike,"),
-                "AB06.csv, line 1: the first column is \"HeelStrike\", expected \"Header\"",
+                "AB06.csv, line 1: the first column is \"HeelStrike\"; it must be \"Header\"",
             ),
             (
                 "semicolons",
                 whole.replace(',', ";"),
                 "AB06.csv, line 1: the first column is \"Header;pelvis_tilt;hip_flexion_r;knee_angle_r;ankle_angle_r;\
-                 hip_flexion_l;knee_angle_l;ankle_angle_l;lumbar_extension;right_vy\", expected \"Header\"",
+                 hip_flexion_l;knee_angle_l;ankle_angle_l;lumbar_extension;right_vy\"; it must be \"Header\"",
             ),
             (
                 "a gap of the markers",
                 changed(&whole, &row, &row.replacen("-3.000000000", "NaN", 1)),
                 "AB06.csv, line 100, column 2: pelvis_tilt = \"NaN\" is not a number",
             ),
-            ("cut off", whole[..whole.len() - 30].to_owned(), "AB06.csv, line 222: 8 cells, but 10 columns"),
+            (
+                "cut off",
+                whole[..whole.len() - 30].to_owned(),
+                "AB06.csv, line 222: the row has 8 cells; 10 are expected",
+            ),
         ],
     );
     let read = |text: &str| Recording::from_csv("own.csv", text).err();
@@ -192,12 +220,12 @@ fn tables_of_camargo_2021_and_own_tables() {
             (
                 "degrees",
                 own.replace(",0.400000,", ",23,"),
-                "own.csv, line 3: knee_L_rad is 23.0 rad, beyond 3.14 rad; is the unit right?",
+                "own.csv, line 3: knee_L_rad is 23.0 rad; at most 3.14 rad is plausible; check the unit",
             ),
             (
                 "hip missing",
                 changed(&own, "hip_R_rad", "hip_rad"),
-                "own.csv, line 2: column \"hip_R_rad\" is missing; there are time_s, torso_rad, hip_L_rad, knee_L_rad, \
+                "own.csv, line 2: column \"hip_R_rad\" is missing; the columns are time_s, torso_rad, hip_L_rad, knee_L_rad, \
                  ankle_L_rad, hip_rad, knee_R_rad",
             ),
             (
@@ -208,14 +236,14 @@ fn tables_of_camargo_2021_and_own_tables() {
             (
                 "rows swapped",
                 changed(&own, "\n0.5,", "\n0.47,"),
-                "own.csv, line 53, column 1: the time 0.47 does not follow 0.49",
+                "own.csv, line 53, column 1: time 0.47 follows 0.49; times must increase",
             ),
         ],
     );
 }
 
 #[test]
-fn electromyograms() {
+fn malformed_emg_files_are_rejected_with_place_and_reason() {
     let whole = electromyogram();
     let read = |text: &str| EmgRecording::from_csv("emg.csv", text, None).err();
     assert_eq!(read(&whole), None);
@@ -227,14 +255,18 @@ fn electromyograms() {
             (
                 "no time",
                 changed(&whole, "time_s", "t"),
-                "emg.csv, line 1: the first column is \"t\", expected \"time_s\"",
+                "emg.csv, line 1: the first column is \"t\"; it must be \"time_s\"",
             ),
             (
                 "time alone",
                 whole.lines().map(|l| l.split(',').next().unwrap()).collect::<Vec<_>>().join("\n"),
-                "emg.csv, line 1: there is no channel beside the time",
+                "emg.csv, line 1: the file has no channel, only the time",
             ),
-            ("a channel twice", changed(&whole, "BF_L", "TA_L"), "emg.csv, line 1, column 3: \"TA_L\" is there twice"),
+            (
+                "a channel twice",
+                changed(&whole, "BF_L", "TA_L"),
+                "emg.csv, line 1, column 3: column \"TA_L\" occurs twice",
+            ),
             (
                 "a word",
                 changed(&whole, "\n0.5,", "\n0.5,off"),
@@ -243,20 +275,20 @@ fn electromyograms() {
             (
                 "a sample at the wrong time",
                 changed(&whole, "\n0.5,", "\n0.5009,"),
-                "emg.csv, line 503, column 1: the time 0.501 follows 0.5009 by 0.000100 s, where rows are 0.001000 s apart: \
-                 the rows must be evenly spaced",
+                "emg.csv, line 503, column 1: time 0.501 is 0.000100 s after 0.5009, but the usual spacing is 0.001000 s; rows \
+                 must be evenly spaced",
             ),
             (
                 "a pause",
                 whole.replace("\n0.9", "\n7.9"),
-                "emg.csv, line 902, column 1: the time 7.9 follows 0.899 by 7.001000 s, where rows are 0.001000 s apart: the \
-                 rows must be evenly spaced",
+                "emg.csv, line 902, column 1: time 7.9 is 7.001000 s after 0.899, but the usual spacing is 0.001000 s; rows \
+                 must be evenly spaced",
             ),
-            ("cut off", whole[..whole.len() - 6].to_owned(), "emg.csv, line 1001: 3 cells, but 4 columns"),
+            ("cut off", whole[..whole.len() - 6].to_owned(), "emg.csv, line 1001: the row has 3 cells; 4 are expected"),
             (
                 "ten samples",
                 whole.lines().take(11).collect::<Vec<_>>().join("\n"),
-                "emg.csv, line 11: 10 rows, at least 20 are needed",
+                "emg.csv, line 11: the table has 10 rows; at least 20 are needed",
             ),
         ],
     );
@@ -272,23 +304,23 @@ fn electromyograms() {
         EmgRecording::from_csv("emg.csv", &whole, Some(5.0)).unwrap_err(),
     ];
     let expected = [
-        "emg.csv: column \"EMG 1\" is missing; there are TA_L, BF_L, heel",
-        "emg.csv: column \"BF_L\" is wanted for RF_L and for GAS_L: each muscle has its own",
-        "emg.csv, line 1: the column \"time_s\" has the time: rate_hz is for files without one",
-        "emg.csv: column \"toe\" is missing; there are TA_L, BF_L, heel",
-        "emg.csv: column \"heel\" rises 0 times above 2, two make a stride",
+        "emg.csv: column \"EMG 1\" is missing; the columns are TA_L, BF_L, heel",
+        "emg.csv: column \"BF_L\" is selected for both RF_L and GAS_L; each channel needs its own column",
+        "emg.csv, line 1: the file has a time column, \"time_s\"; rate_hz is for files without one",
+        "emg.csv: column \"toe\" is missing; the columns are TA_L, BF_L, heel",
+        "emg.csv: column \"heel\" rises 0 times above 2; a stride needs two heel strikes",
         "heel strike (s) = 9 is outside the allowed range [0, 0.999]",
-        "emg.csv: the heel strikes are not in order",
+        "emg.csv: the heel strikes must increase",
         "rate_hz = 5 is outside the allowed range [100, 20000]",
     ];
     for error in &refused {
-        println!("| electromyogram | asked for what is not in it | {error} |");
+        println!("| electromyogram | invalid request | {error} |");
     }
     assert_eq!(refused.map(|error| error.to_string()), expected);
 }
 
 #[test]
-fn joint_angles() {
+fn malformed_joint_tables_are_rejected_with_place_and_reason() {
     let whole = own_table();
     let read = |text: &str| JointRecording::from_csv("angles.csv", text).err();
     assert_eq!(read(&whole), None);
@@ -299,13 +331,9 @@ fn joint_angles() {
             (
                 "no joint",
                 whole.replace("_rad", ""),
-                "angles.csv, line 2: no column is a joint's; there are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
+                "angles.csv, line 2: no column is a joint angle; the columns are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
             ),
-            (
-                "degrees",
-                whole.replace(",0.400000,", ",23,"),
-                "angles.csv, line 3: knee_L is 23.0 rad: is the unit right?",
-            ),
+            ("degrees", whole.replace(",0.400000,", ",23,"), "angles.csv, line 3: knee_L is 23.0 rad; check the unit"),
             (
                 "a gap",
                 whole
@@ -315,7 +343,7 @@ fn joint_angles() {
                     .map(|(_, line)| line)
                     .collect::<Vec<_>>()
                     .join("\n"),
-                "angles.csv, line 51, column 1: 0.210 s without a row, at most 0.05 s",
+                "angles.csv, line 51, column 1: 0.210 s without a row; at most 0.05 s are allowed",
             ),
         ],
     );

@@ -1,4 +1,4 @@
-//! Phase portraits: velocities of a known motion, columns and signs of the two forms, files that are refused.
+//! Tests of phase portraits: velocities of a known motion, columns and signs of both formats, and rejected files.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -7,7 +7,7 @@ use gait_optimizer::reference::AngleUnit;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
-/// 10 s at 100 Hz of a knee that swings by 0.5 rad with 0.9 Hz.
+/// 10 s at 100 Hz of a knee that oscillates with amplitude 0.5 rad and frequency 0.9 Hz.
 fn csv() -> String {
     let mut text = "# site A\ntime_s,knee_R_rad\n".to_owned();
     for k in 0..1000 {
@@ -22,11 +22,11 @@ fn knee_at(time: f64) -> f64 {
 }
 
 #[test]
-fn the_velocity_is_that_of_the_motion() {
+fn velocity_matches_the_motion() {
     let portraits = JointRecording::from_csv("walk.csv", &csv()).unwrap().portraits(6.0).unwrap();
     let [knee] = &portraits[..] else { panic!("{portraits:?}") };
     assert_eq!((knee.joint.as_str(), knee.angle_rad.len(), knee.velocity_rad_s.len()), ("knee_R", 998, 998));
-    // Away from the ends, where the filter knows nothing beyond them: samples 1, 2, ... of the recording.
+    // Away from the ends, where the filter extrapolates. The portrait begins with sample 1.
     for k in 100..900 {
         let time = (k + 1) as f64 / 100.0;
         let (angle, velocity) = (knee_at(time), 0.5 * TAU * 0.9 * (TAU * 0.9 * time).cos());
@@ -36,8 +36,8 @@ fn the_velocity_is_that_of_the_motion() {
 }
 
 #[test]
-fn rows_that_are_not_evenly_spaced_are_put_on_an_even_grid() {
-    // A last row that ends the stride, as in the program's own motion files, and one in between.
+fn unevenly_spaced_rows_are_interpolated_on_an_even_grid() {
+    // A last row at the end of the stride, as in exported motion files, and one extra row.
     let text = csv() + "9.993,0.5\n";
     let text = text.replace("\n0.5,", "\n0.494,0.1\n0.5,");
     let recording = JointRecording::from_csv("walk.csv", &text).unwrap();
@@ -45,7 +45,7 @@ fn rows_that_are_not_evenly_spaced_are_put_on_an_even_grid() {
     assert!((recording.rate_hz - 1001.0 / 9.993).abs() < 1e-9);
     let knee = &recording.joints[0].1;
     let time = 700.0 / recording.rate_hz;
-    // Linear between samples 10 ms apart: off by at most h^2/8 of the second derivative.
+    // Linear interpolation over 10 ms has an error of at most h^2/8 times the second derivative.
     assert!((knee[700] - knee_at(time)).abs() < 0.5 * (TAU * 0.9 * 0.01).powi(2) / 8.0 + 1e-12);
     assert!((knee[1001] - 0.5).abs() < 1e-12);
 }
@@ -60,22 +60,22 @@ fn opensim(unit: &str) -> String {
 }
 
 #[test]
-fn opensim_columns_get_the_walkers_signs_and_joints_that_are_missing_are_left_out() {
+fn opensim_columns_get_the_signs_of_the_walker() {
     let recording = JointRecording::from_opensim("walk.mot", &opensim("inDegrees=yes\n"), None).unwrap();
     let first: Vec<(&str, f64)> =
         recording.joints.iter().map(|(name, angles)| (*name, angles[1].to_degrees().round())).collect();
     assert_eq!(first, [("torso", 5.0), ("hip_R", 22.0), ("knee_R", 10.0), ("ankle_R", 1.0)]);
     let silent = JointRecording::from_opensim("walk.mot", &opensim(""), None).unwrap_err().to_string();
-    assert!(silent.contains("inDegrees=yes or no"), "{silent}");
+    assert!(silent.contains("neither inDegrees=yes nor inDegrees=no"), "{silent}");
     assert!(JointRecording::from_opensim("walk.mot", &opensim(""), Some(AngleUnit::Degrees)).is_ok());
 }
 
 #[test]
-fn what_is_not_whole_is_refused_with_its_place() {
+fn incomplete_recordings_are_rejected_with_their_place() {
     let refusal = |text: &str| JointRecording::from_csv("walk.csv", text).unwrap_err().to_string();
     assert!(refusal(&csv().replace("\n0.5,", "\n0.5,x")).contains("walk.csv, line 53, column 2"));
     assert!(refusal(&csv().replace("\n0.5,", "\n0.5,9")).contains("walk.csv, line 53"), "an angle of more than pi");
-    assert!(refusal(&csv().replace("knee_R_rad", "knee")).contains("no column is a joint's; there are knee"));
+    assert!(refusal(&csv().replace("knee_R_rad", "knee")).contains("no column is a joint angle; the columns are knee"));
     let gap: Vec<String> = csv().lines().filter(|line| !line.starts_with("0.5")).map(str::to_owned).collect();
     assert!(
         refusal(&gap.join("\n")).contains("walk.csv, line 53, column 1: 0.110 s without a row"),
@@ -83,14 +83,14 @@ fn what_is_not_whole_is_refused_with_its_place() {
     );
     let short: Vec<String> = csv().lines().take(62).map(str::to_owned).collect();
     let short = JointRecording::from_csv("walk.csv", &short.join("\n")).unwrap().check_walking("walk.csv");
-    let reason = "walk.csv: 0.590 s are recorded, a limit cycle needs at least 2 s";
+    let reason = "walk.csv: the recording lasts 0.590 s; a limit cycle needs at least 2 s";
     assert_eq!(short.unwrap_err().to_string(), reason);
     let recording = JointRecording::from_csv("walk.csv", &csv()).unwrap();
     assert_eq!(recording.check_walking("walk.csv"), Ok(()));
     assert!(recording.portraits(60.0).unwrap_err().to_string().starts_with("cutoff_hz = 60 is outside"));
 }
 
-/// A table of joints over time, rows so many seconds apart.
+/// A table of joints over time with a given spacing of rows in s.
 fn table(names: &str, rows: usize, step_s: f64, at: impl Fn(f64) -> Vec<f64>) -> String {
     let mut text = format!("time_s,{names}\n");
     for k in 0..rows {
@@ -102,29 +102,29 @@ fn table(names: &str, rows: usize, step_s: f64, at: impl Fn(f64) -> Vec<f64>) ->
 }
 
 #[test]
-fn what_does_not_walk_has_no_limit_cycle() {
+fn recordings_without_walking_are_rejected() {
     let swing = |time: f64| (TAU * 0.9 * time).sin();
     let check = |text: &str| JointRecording::from_csv("walk.csv", text).unwrap().check_walking("walk.csv");
     let refused = |text: &str| check(text).unwrap_err().to_string();
     let still = refused(&table("torso_rad,ankle_R_rad", 300, 0.01, |time| vec![0.1, 0.024 * swing(time)]));
-    let expected = "walk.csv: no joint moves over more than 0.05 rad, the farthest over 0.048 rad; is the unit right?";
+    let expected = "walk.csv: no joint moves by more than 0.05 rad (the largest range is 0.048 rad); check the unit";
     assert_eq!(still, expected);
     let backward = refused(&table("hip_R_rad,knee_R_rad", 300, 0.01, |time| vec![swing(time), -knee_at(time)]));
     assert_eq!(
         backward,
-        "walk.csv: knee_R is from -1.00 to -0.00 rad with flexion positive: the file's knee angle has the other sign"
+        "walk.csv: knee_R ranges from -1.00 to -0.00 rad, but flexion must be positive; check the sign of the knee angle"
     );
     let stiff = refused(&table("hip_R_rad,knee_L_rad", 300, 0.01, |time| vec![swing(time), 0.04 * knee_at(time)]));
-    assert_eq!(stiff, "walk.csv: knee_L moves over 0.040 rad only, less than 0.1 rad; is the unit right?");
+    assert_eq!(stiff, "walk.csv: knee_L moves by only 0.040 rad, less than 0.1 rad; check the unit");
     let jump = |time: f64| if time > 1.5005 { 0.9 } else { 0.0 };
     let jumps = refused(&table("hip_R_rad,ankle_R_rad", 300, 0.01, |time| vec![swing(time), jump(time)]));
     assert_eq!(jumps, "walk.csv: ankle_R jumps by 0.90 rad in 0.0100 s, 1.510 s after the first row");
-    // A trunk or an ankle may hardly move where other joints walk.
+    // Trunk and ankle may move little if other joints walk.
     assert_eq!(check(&table("torso_rad,hip_R_rad", 300, 0.01, |time| vec![0.1, swing(time)])), Ok(()));
 }
 
 #[test]
-fn twenty_rows_per_second_for_two_seconds_are_enough() {
+fn two_seconds_at_twenty_hertz_are_sufficient() {
     let text = table("knee_R_rad", 41, 0.05, |time| vec![knee_at(time)]);
     let recording = JointRecording::from_csv("walk.csv", &text).unwrap();
     assert_eq!(recording.check_walking("walk.csv"), Ok(()));
@@ -132,5 +132,5 @@ fn twenty_rows_per_second_for_two_seconds_are_enough() {
     let later = table("knee_R_rad", 400, 0.05, |time| vec![knee_at(time)]);
     assert!(JointRecording::from_csv("walk.csv", &later).is_ok());
     let slower = JointRecording::from_csv("walk.csv", &table("knee_R_rad", 41, 0.0501, |time| vec![knee_at(time)]));
-    assert!(slower.unwrap_err().to_string().contains("0.050 s without a row, at most 0.05 s"));
+    assert!(slower.unwrap_err().to_string().contains("0.050 s without a row; at most 0.05 s are allowed"));
 }

@@ -1,4 +1,4 @@
-//! Reference gaits from recordings: what is read, how strides are cut, and what malformed files get.
+//! Tests of reference gaits from recordings: file formats, segmentation of strides, and rejected recordings.
 
 #![allow(clippy::unwrap_used)]
 
@@ -20,7 +20,7 @@ fn read(text: &str) -> Result<Recording, ModelError> {
 }
 
 #[test]
-fn opensims_signs_become_the_walkers() {
+fn opensim_signs_are_converted_to_those_of_the_walker() {
     let recording = read(&opensim(2)).unwrap();
     let [torso, hip_l, knee_l, ankle_l, hip_r] = recording.angles_rad[0];
     assert!((torso - 7.0_f64.to_radians()).abs() < 1e-9, "lean = -(tilt + lumbar)");
@@ -29,11 +29,11 @@ fn opensims_signs_become_the_walkers() {
     assert!((knee_l - 45.0_f64.to_radians()).abs() < 1e-9, "flexion positive");
     assert!(ankle_l.abs() < 1e-9);
     let radians = opensim(2).replace("inDegrees=yes", "inDegrees=no");
-    assert!(read(&radians).unwrap_err().to_string().contains("is the unit right?"));
+    assert!(read(&radians).unwrap_err().to_string().contains("check the unit"));
 }
 
 #[test]
-fn three_ways_of_finding_heel_strikes_agree() {
+fn three_methods_find_the_same_heel_strikes() {
     let recording = read(&opensim(5)).unwrap();
     let by_force = recording.heel_strikes(&HeelStrikes::Force).unwrap();
     assert_eq!(by_force.len(), 4, "{by_force:?}");
@@ -49,9 +49,8 @@ fn three_ways_of_finding_heel_strikes_agree() {
     assert_eq!(recording.heel_strikes(&given).unwrap(), [0.0, 1.1, 2.2]);
 }
 
-/// The forms in which OpenSim and its users write the same two strides, and the forces beside them.
 #[test]
-fn every_form_of_opensims_files_is_read() {
+fn every_variant_of_opensim_files_gives_the_same_recording() {
     let names = "time\tpelvis_tilt\thip_flexion_r\tknee_angle_r\tankle_angle_r\thip_flexion_l\tknee_angle_l\tankle_angle_l\t\
                  lumbar_extension\tright_vy";
     let rows = opensim_rows(2, 1.0);
@@ -63,7 +62,7 @@ fn every_form_of_opensims_files_is_read() {
         }
         assert_eq!(found.right_force, whole.right_force, "{form}");
     };
-    // Inverse kinematics of OpenSim 3 and 4, with the sentence that explains inDegrees.
+    // Inverse kinematics of OpenSim 3 and 4, whose header explains inDegrees.
     let explained = "Units are S.I. units (second, meters, Newtons, ...)\nIf the header above contains a line with \
                      'inDegrees', this indicates whether rotational values are in degrees (yes) or radians (no).\n";
     let ik = format!(
@@ -79,35 +78,35 @@ fn every_form_of_opensims_files_is_read() {
         rows.replace('\t', "   ")
     );
     same("blanks in place of tabs", &spaced, None);
-    // What OpenSim 4 writes from a table, in radians: no numbers of rows.
+    // A table of OpenSim 4 in radians, without numbers of rows.
     let radians = opensim_rows(2, std::f64::consts::PI / 180.0);
     let table = format!(
         "inDegrees=no\nDataType=double\nversion=3\nOpenSimVersion=4.5-2024-01-10\nendheader\n{names}\n{radians}"
     );
     same("storage file of OpenSim 4", &table, None);
-    // States of OpenSim Moco, by their paths.
+    // States of OpenSim Moco, with paths as names.
     let path = |name: &str| match name {
         "time" | "right_vy" => name.to_owned(),
         other => format!("/jointset/somewhere/{other}/value"),
     };
     let paths: Vec<String> = names.split('\t').map(path).collect();
     same("states by path", &table.replace(names, &paths.join("\t")), None);
-    // SIMM, before OpenSim: the header does not say the unit.
+    // SIMM: the header has no unit.
     let simm = format!("name walk.mot\ndatacolumns 10\ndatarows 221\nrange 0 2.2\nendheader\n{names}\n{rows}");
     assert!(Recording::from_opensim("walk.mot", &simm, None, None).is_err());
     same("motion file of SIMM", &simm, Some(AngleUnit::Degrees));
-    // A header that says the unit is not overruled.
+    // A unit that contradicts the header is an error.
     let refused = Recording::from_opensim("walk.mot", &opensim(2), Some(AngleUnit::Radians), None);
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("inDegrees says that angles are in degrees, but radians was asked for"), "{refused}");
+    assert!(refused.contains("the header gives angles in degrees, but the unit given is radians"), "{refused}");
     let half = simm.replace("datarows 221", "datarows 220");
     let refused = Recording::from_opensim("walk.mot", &half, Some(AngleUnit::Degrees), None).unwrap_err().to_string();
-    assert!(refused.contains("line 3: datarows=220, but there are 221"), "{refused}");
+    assert!(refused.contains("line 3: the header has datarows=220, but the file has 221"), "{refused}");
 }
 
 #[test]
-fn forces_may_be_in_a_file_of_their_own_at_their_own_rate() {
-    // As OpenSim's examples have them: both plates, ten times as many samples, from before the motion on.
+fn forces_from_a_separate_file_have_their_own_rate() {
+    // As in OpenSim's examples: two plates, ten times the sampling rate, and an earlier start.
     let mut forces =
         "walk_grf.mot\nversion=1\nnRows=6001\nnColumns=4\ninDegrees=yes\nendheader\ntime\tground_force_vx\t\
                       ground_force_vy\t1_ground_force_vy\n"
@@ -129,11 +128,11 @@ fn forces_may_be_in_a_file_of_their_own_at_their_own_rate() {
         reference.provenance.contains("walk_grf.mot: 6001 rows, ground_force_vy is the force under the right foot")
     );
     let refused = motion.with_force_file("walk_grf.mot", &forces, "fy").unwrap_err().to_string();
-    assert!(refused.starts_with("walk_grf.mot, line 7: column \"fy\" is missing; there are time, "), "{refused}");
+    assert!(refused.starts_with("walk_grf.mot, line 7: column \"fy\" is missing; the columns are time, "), "{refused}");
 }
 
 #[test]
-fn forces_of_camargos_tables_cut_its_strides() {
+fn camargo_forces_segment_the_strides() {
     let mut forces = "Header,Treadmill_R_vx,Treadmill_R_vy\n".to_owned();
     for k in 0..5501 {
         let time = f64::from(k) / 1000.0;
@@ -151,7 +150,7 @@ fn forces_of_camargos_tables_cut_its_strides() {
 }
 
 #[test]
-fn a_stride_that_was_not_wholly_recorded_is_dropped() {
+fn strides_with_gaps_are_dropped() {
     let whole = opensim(5);
     let (header, body) = whole.split_once("lumbar_extension\tright_vy\n").unwrap();
     let kept: Vec<&str> =
@@ -168,18 +167,21 @@ fn a_stride_that_was_not_wholly_recorded_is_dropped() {
     }
     let only_that = HeelStrikes::Given(vec![2.2, 3.3]);
     let refused = read(&text).unwrap().reference("x", &only_that, Walker::default()).unwrap_err().to_string();
-    assert!(refused.contains("none of 1 strides lasts 0.8 to 1.6 s, without a gap of 0.1 s"), "{refused}");
+    assert!(refused.contains("none of the 1 strides lasts 0.8 to 1.6 s, without a gap of 0.1 s"), "{refused}");
 }
 
 type Change = fn(&mut ReferenceGait);
 
 #[test]
-fn a_reference_that_no_joint_can_follow_is_refused_by_field() {
+fn implausible_reference_is_rejected_with_the_field() {
     let whole = ReferenceGait::builtin().unwrap();
     let changes: [(Change, &str); 5] = [
         (|r| r.angles_rad.iter_mut().flatten().for_each(|a| *a = a.to_degrees()), "angles_rad[0][0] = 7"),
         (|r| r.standard_deviation_rad = Some(vec![[-0.1; 5]; 101]), "standard_deviation_rad[0][0] = -0.1"),
-        (|r| r.standard_deviation_rad = Some(vec![[0.1; 5]; 50]), "standard_deviation_rad: 50 rows, expected 101"),
+        (
+            |r| r.standard_deviation_rad = Some(vec![[0.1; 5]; 50]),
+            "standard_deviation_rad: the curve has 50 rows; 101 are expected",
+        ),
         (|r| r.height_m = Some(175.0), "height_m = 175"),
         (|r| r.body_mass_kg = Some(f64::NAN), "body_mass_kg = NaN"),
     ];
@@ -192,10 +194,10 @@ fn a_reference_that_no_joint_can_follow_is_refused_by_field() {
 }
 
 #[test]
-fn strides_are_averaged_with_their_deviation_and_provenance() {
+fn strides_are_averaged_with_standard_deviation_and_provenance() {
     let recording = read(&opensim(5)).unwrap();
     let walker = Walker { height_m: Some(1.75), body_mass_kg: Some(70.0) };
-    // The middle stride, of two, is too long and dropped.
+    // The stride between the other two is too long.
     let strikes = HeelStrikes::Given(vec![0.0, 1.1, 3.3, 4.4]);
     let reference = recording.reference("synthetic", &strikes, walker).unwrap();
     for row in [0, 25, 100] {
@@ -215,13 +217,13 @@ fn strides_are_averaged_with_their_deviation_and_provenance() {
 }
 
 #[test]
-fn an_exported_gait_comes_back_as_the_same_curves() {
+fn exported_gait_is_imported_with_the_same_curves() {
     for (subject, muscles) in [(1, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
         let text = motion_file(&gait, 2000.0).unwrap();
         let recording = Recording::from_opensim("gait.mot", &text, None, None).unwrap();
-        // The file has eight decimals; linear between rows, 90 rad/s² leave h²/8 qdd = 3e-6 rad. Where an impact changes
-        // a velocity by up to 10 rad/s between two rows, h/4 of that: 1.3e-3 rad.
+        // Linear interpolation has an error of h²/8 qdd = 3e-6 rad at 90 rad/s². An impact that changes a velocity by
+        // 10 rad/s between two rows gives h/4 times that: 1.3e-3 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
         let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
         assert!(
@@ -230,7 +232,7 @@ fn an_exported_gait_comes_back_as_the_same_curves() {
                 .contains(&format!("2 right heel strikes at the ends of the recording: 0.0000, {end:.4} s"))
         );
         let within = recording.heel_strikes(&HeelStrikes::Kinematics).unwrap_err().to_string();
-        assert!(within.ends_with("a recording of one stride begins and ends with one: choose its ends"), "{within}");
+        assert!(within.ends_with("for a recording of exactly one stride, use its ends"), "{within}");
         for (domain, name) in gait.domains.iter().zip(0..) {
             for ((time, q), k) in domain.time_s.iter().zip(&domain.q).zip(0..) {
                 let at_an_impact = k == 0 || k + 1 == domain.time_s.len();
@@ -258,7 +260,7 @@ fn recording_at(recording: &Recording, time: f64) -> [f64; 5] {
 }
 
 #[test]
-fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
+fn columns_of_tables_are_found_by_name() {
     let mut camargo = "Header,knee_angle_l,knee_angle_r,hip_flexion_l,hip_flexion_r,ankle_angle_l,ankle_angle_r,\
                        pelvis_tilt,lumbar_extension\n"
         .to_owned();
@@ -281,7 +283,7 @@ fn a_camargo_table_and_our_own_table_are_read_by_column_names() {
 }
 
 #[test]
-fn hips_the_other_way_round_are_refused() {
+fn exchanged_hips_are_rejected() {
     let recording = read(&opensim(5)).unwrap();
     let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2]);
     let refused = |change: fn(&mut [f64; 5]), how: &HeelStrikes| {
@@ -303,10 +305,10 @@ fn hips_the_other_way_round_are_refused() {
 }
 
 #[test]
-fn the_built_in_reference_has_the_deviations_of_its_trials() {
+fn built_in_reference_has_the_published_deviations() {
     let reference = ReferenceGait::builtin().unwrap();
     let deviation = reference.standard_deviation_rad.unwrap();
-    // Falisse 2019: torso .77°, hip .53°, knee 1.08°, ankle 1.43° at heel strike; the left leg half a cycle later.
+    // Falisse 2019: torso 0.77°, hip 0.53°, knee 1.08°, ankle 1.43° at heel strike; the left leg is half a cycle later.
     for (found, wanted) in [deviation[0][0], deviation[0][4], deviation[50][2], deviation[50][3]].into_iter().zip([
         0.773_924,
         0.532_748,
@@ -325,7 +327,7 @@ fn the_built_in_reference_has_the_deviations_of_its_trials() {
 }
 
 #[test]
-fn the_nearest_reference_in_height_and_mass_is_found() {
+fn nearest_reference_in_height_and_mass_is_chosen() {
     let reference = |name: &str, height_m, body_mass_kg| ReferenceGait {
         name: name.to_owned(),
         height_m,
@@ -346,21 +348,21 @@ fn the_nearest_reference_in_height_and_mass_is_found() {
 }
 
 #[test]
-fn recordings_without_a_stride_are_refused_with_the_reason() {
+fn recordings_without_a_stride_are_rejected_with_the_reason() {
     let recording = read(&opensim(2)).unwrap();
     let refused = |strikes: Vec<f64>| {
         recording.reference("x", &HeelStrikes::Given(strikes), Walker::default()).unwrap_err().to_string()
     };
-    assert!(refused(vec![0.5]).contains("1 right heel strikes, two make a stride"));
-    assert!(refused(vec![0.5, 0.9]).contains("none of 1 strides lasts 0.8 to 1.6 s"));
-    assert!(refused(vec![1.5, 0.5]).contains("not in order"));
+    assert!(refused(vec![0.5]).contains("1 right heel strikes found; a stride needs two"));
+    assert!(refused(vec![0.5, 0.9]).contains("none of the 1 strides lasts 0.8 to 1.6 s"));
+    assert!(refused(vec![1.5, 0.5]).contains("must increase"));
     assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) = 9 is outside"));
     // Forces that end before the first stride.
     let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
     let early = Recording { right_force: Some(force), ..recording.clone() };
     let early = early.reference("x", &HeelStrikes::Force, Walker::default()).unwrap_err().to_string();
     let expected =
-        "0 right heel strikes (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s), two make a stride";
+        "0 right heel strikes found (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s); a stride needs two";
     assert!(early.contains(expected), "{early}");
     let unforced = Recording::from_opensim("x", &opensim(2), None, None).unwrap();
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
@@ -369,8 +371,8 @@ fn recordings_without_a_stride_are_refused_with_the_reason() {
     assert!(error.to_string().contains("height_m = 0.5"));
 }
 
-/// Five strides of 1.1 s of the built-in reference as a recording of our own, its seven angles changed by `change`, and
-/// `late` of a stride after the heel strikes at 0 s, 1.1 s, ...
+/// Five strides of 1.1 s of the built-in reference as a recording, with angles modified by `change` and delayed by the
+/// fraction `late` of a stride after the heel strikes at 0 s, 1.1 s, ...
 fn walk(late: f64, change: impl Fn([f64; 7]) -> [f64; 7]) -> Recording {
     let builtin = ReferenceGait::builtin().unwrap();
     of_fractions(|fraction| change(builtin.seven_angles(fraction + late)))
@@ -386,7 +388,7 @@ fn of_fractions(angles_at: impl Fn(f64) -> [f64; 7]) -> Recording {
     Recording::from_csv("walk.csv", &text).unwrap()
 }
 
-/// What is said of a recording that is cut at 0 s, 1.1 s, ...: the refusal, else the remark, else nothing.
+/// The error or the warning for a recording that is segmented at 0 s, 1.1 s, ...; empty if there is neither.
 fn said_of(recording: &Recording) -> String {
     let given = HeelStrikes::Given((0..5).map(|k| 1.1 * f64::from(k)).collect());
     match recording.reference("walk", &given, Walker::default()) {
@@ -403,37 +405,37 @@ fn remark(reference: &ReferenceGait) -> String {
 type Angles = fn([f64; 7]) -> [f64; 7];
 
 #[test]
-fn what_no_walker_does_is_refused() {
+fn impossible_mean_strides_are_rejected() {
     let unaltered = walk(0.0, |angles| angles);
     assert_eq!(said_of(&unaltered), "", "the walk as it is");
-    // The right heel is farthest ahead a little before it strikes.
+    // The right heel is farthest ahead slightly before heel strike.
     let found = unaltered.reference("walk", &HeelStrikes::Kinematics, Walker::default()).unwrap();
     assert_eq!(remark(&found), "", "{}", found.provenance);
     let cases: [(Angles, &str); 6] = [
         (
             |[torso, rest @ ..]| with_trunk(torso + 0.8, rest),
-            "torso_rad is 52° on average over the stride, beyond 45° either way: are sign and upright right?",
+            "torso_rad is 52° on average over the stride; at most 45° in either direction is plausible; check the sign and the upright position",
         ),
         (
             |[torso, rest @ ..]| with_trunk(torso - 1.0, rest),
-            "torso_rad is -51° on average over the stride, beyond 45° either way: are sign and upright right?",
+            "torso_rad is -51° on average over the stride; at most 45° in either direction is plausible; check the sign and the upright position",
         ),
         (
             |angles| with_knee(angles, 0.25 * angles[2]),
-            "knee_L_rad never bends beyond 20° in the stride, at most to 16.5°: are sign and unit right?",
+            "knee_L_rad bends to at most 16.5° in the stride; at least 20° is plausible; check sign and unit",
         ),
         (
             |angles| with_knee(angles, angles[2] + 0.8),
-            "knee_L_rad is never less bent than 57°, a knee that walks is below 40° once in a stride",
+            "knee_L_rad is bent by at least 57° in the whole stride; its minimum must be at most 40°",
         ),
         (
             |angles| with_ankle(angles, angles[3] + std::f64::consts::FRAC_PI_2),
-            "ankle_L_rad is 92° on average over the stride, beyond 30° either way: is it 0° where foot and shank are at right \
-             angles?",
+            "ankle_L_rad is 92° on average over the stride; at most 30° in either direction is plausible; check that 0° is the right angle \
+             between foot and shank",
         ),
         (
             |angles| with_ankle(angles, angles[3].to_radians()),
-            "ankle_L_rad moves over 0.57° only in the stride, less than 2°; is the unit right?",
+            "ankle_L_rad moves by only 0.57° in the stride, less than 2°; check the unit",
         ),
     ];
     for (change, expected) in cases {
@@ -460,7 +462,7 @@ fn with_ankle(angles: [f64; 7], ankle_l: f64) -> [f64; 7] {
 }
 
 #[test]
-fn what_is_unlike_the_built_in_reference_is_said() {
+fn unusual_mean_strides_get_a_warning() {
     let swapped = |pairs: &'static [(usize, usize)]| {
         move |mut angles: [f64; 7]| {
             for &(left, right) in pairs {
@@ -470,7 +472,8 @@ fn what_is_unlike_the_built_in_reference_is_said() {
         }
     };
     let builtin = ReferenceGait::builtin().unwrap();
-    // The lumbar joint's sign: the trunk leans as far to the other side of a pelvis that leans by 0.2 rad.
+    // A wrong sign of the lumbar joint: the trunk leans in the other direction relative to a pelvis that leans by 0.2
+    // rad.
     let lumbar = |[torso, hip_l, knee_l, ankle_l, hip_r, knee_r, ankle_r]: [f64; 7]| {
         let twice = 2.0 * (torso - 0.2);
         [torso - twice, hip_l - twice, knee_l, ankle_l, hip_r - twice, knee_r, ankle_r]
@@ -480,7 +483,7 @@ fn what_is_unlike_the_built_in_reference_is_said() {
         (
             "knees swapped",
             said_of(&walk(0.0, swapped(&[(2, 5)]))),
-            "the left knee bends to 66° in the second half of the stride from right heel strike and to 28° in the first",
+            "the left leg swings in the first half of the stride from right heel strike, but the left knee bends to 28° there and to 66°",
         ),
         ("ankles swapped", said_of(&walk(0.0, swapped(&[(3, 6)]))), "left ankle (correlation 0.00)"),
         (
@@ -506,9 +509,9 @@ fn what_is_unlike_the_built_in_reference_is_said() {
         (
             "reversed in time",
             said_of(&of_fractions(|fraction| builtin.seven_angles(-fraction))),
-            "the left knee bends to 66° in the second half of the stride from right heel strike and to 28° in the first",
+            "the left leg swings in the first half of the stride from right heel strike, but the left knee bends to 28° there and to 66°",
         ),
-        // Nothing tells it: the trunk's lean is possible, and the hips keep their shape.
+        // Undetectable: the lean of the trunk is plausible, and the shapes of the hip curves do not change.
         ("lumbar sign", said_of(&walk(0.0, lumbar)), ""),
     ];
     let mut other = Vec::new();
@@ -522,7 +525,7 @@ fn what_is_unlike_the_built_in_reference_is_said() {
 }
 
 #[test]
-fn gaits_of_this_program_become_references() {
+fn computed_gaits_can_become_reference_gaits() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
         let recording = Recording::from_opensim("gait.mot", &motion_file(&gait, 200.0).unwrap(), None, None).unwrap();
@@ -531,8 +534,8 @@ fn gaits_of_this_program_become_references() {
     }
 }
 
-/// Forces at 1000 Hz under the strides of [`opensim`]: 700 N for 0.66 s of each 1.1 s, within 20 ms, and what else the
-/// plate says.
+/// Forces at 1000 Hz for the strides of [`opensim`]: 700 N for 0.66 s of each 1.1 s with edges of 20 ms, plus a
+/// disturbance of the plate.
 fn plate(disturbance: impl Fn(usize) -> f64) -> VerticalForce {
     let time_s: Vec<f64> = (0..5500).map(|k| f64::from(k) / 1000.0).collect();
     let force = |time: f64| {
@@ -544,7 +547,7 @@ fn plate(disturbance: impl Fn(usize) -> f64) -> VerticalForce {
 }
 
 #[test]
-fn noise_and_offsets_of_a_plate_are_no_heel_strikes() {
+fn noise_and_offset_of_a_force_plate_cause_no_heel_strikes() {
     let normal = noise(5500);
     for (offset_n, noise_n) in [(0.0, 0.0), (0.0, 8.0), (0.0, 10.0), (15.0, 4.0)] {
         let force = plate(|k| offset_n + noise_n * normal[k]);
@@ -556,7 +559,7 @@ fn noise_and_offsets_of_a_plate_are_no_heel_strikes() {
             assert!(off.abs() < 0.003, "{offset_n} N, noise of {noise_n} N: {off}");
         }
     }
-    // An offset above the threshold never lets go.
+    // With an offset above the threshold the contact never ends.
     let lifted = Recording { right_force: Some(plate(|_| 25.0)), ..read(&opensim(5)).unwrap() };
     let refused = lifted.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string();
     assert!(refused.starts_with("walk.mot: 0 right heel strikes"), "{refused}");

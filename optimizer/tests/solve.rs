@@ -1,4 +1,4 @@
-//! The public face on the real problem, on a coarse mesh and without muscles, so that it takes seconds.
+//! Tests of `solve` and `explain` with the real gait problem, on a coarse mesh and without muscles.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
@@ -38,7 +38,7 @@ fn cold_then_warm() {
     assert!(report.cost_of_transport > 0.01 && report.cost_of_transport < 0.2, "{}", report.cost_of_transport);
     assert!(report.gait_rmse_rad > 0.1 && report.gait_rmse_rad < 3.0, "{}", report.gait_rmse_rad);
     assert_eq!(COLD.gait.domains.len(), 8);
-    // Two guesses, each in a local optimum of its own or both in one.
+    // The two initial guesses end in one or two local optima.
     let basins: Vec<_> = report.attempts.iter().map(|a| (a.basin, a.objective)).collect();
     assert_eq!(basins[0].0, Some(1));
     assert_eq!(basins[1].0 == Some(1), (basins[1].1 / basins[0].1 - 1.0).abs() < 1e-4, "{basins:?}");
@@ -79,13 +79,13 @@ fn bounds_hold_between_the_nodes() {
     let dearer = kept.report.objective / at_points.report.objective - 1.0;
     assert!((0.0..0.01).contains(&dearer), "{dearer}");
 
-    // What was tightened comes along with the gait: nothing is left to do, and nothing changes.
+    // A warm start keeps the tightened bounds, so the gait does not change.
     let again = run(Some(&kept.warm_start), 4);
     assert_eq!((again.report.iterations, again.report.tightened_bounds), (0, kept.report.tightened_bounds));
     assert_eq!(again.gait, kept.gait);
 }
 
-/// The force under the trailing toe at the first and last point of a double-support domain, N.
+/// The force under the trailing toe at the first and last node of a double-support domain, N.
 fn trailing_force(outcome: &SolveOutcome, domain: usize) -> (f64, f64) {
     let domain = &outcome.gait.domains[domain];
     let row = domain.contact_rows.iter().position(|r| r.axis == Axis::Z && r.side == Side::Left).unwrap();
@@ -101,8 +101,7 @@ fn wishes_beyond_the_paper_are_met() {
     assert_eq!(found.report.status, SolveStatus::Converged);
     assert!(found.report.gait_rmse_rad < COLD.report.gait_rmse_rad, "nearer to the reference");
     assert!(found.report.cost_of_transport > COLD.report.cost_of_transport, "nothing is for free");
-    // 0.4 of the weight of the first subject with the device at heel strike, half of it at the end of DS2, nothing at
-    // toe-off.
+    // 0.4 of the weight of subject 1 with the device at heel strike, half of it at the end of DS2, and 0 at toe-off.
     let load = 0.4 * 73.15 * 9.81;
     let (ds2, ds3) = (trailing_force(&found, 0), trailing_force(&found, 1));
     assert!(ds2.0 > 0.999 * load && ds2.1 > 0.499 * load && ds3.0 > 0.499 * load, "{ds2:?} {ds3:?} {load}");
@@ -110,14 +109,14 @@ fn wishes_beyond_the_paper_are_met() {
     let free = (trailing_force(&COLD, 0), trailing_force(&COLD, 1));
     assert!(
         free.0.1 < 0.5 * load || free.1.0 < 0.5 * load,
-        "the weight changes feet early where it may: {free:?} {load}"
+        "without the term the weight transfers early: {free:?} {load}"
     );
 }
 
-/// No posture meets these bounds, so the convex part of a cold start has no solution. The gait problem is tried all the
-/// same, and its status is the answer, with what the warm start gave.
+/// No posture satisfies these bounds, so the QP of the initial guess is infeasible. The solve continues with its
+/// relaxation.
 #[test]
-fn bounds_that_leave_no_posture_are_tried_all_the_same() {
+fn bounds_without_a_posture_are_solved_from_a_relaxed_guess() {
     let strategies = [
         "warm start",
         "cold, direct",
@@ -150,7 +149,7 @@ fn bounds_that_leave_no_posture_are_tried_all_the_same() {
 }
 
 #[test]
-fn a_start_from_which_nothing_can_be_done_is_an_attempt_with_a_reason() {
+fn unusable_warm_start_is_an_attempt_with_a_reason() {
     let mut warm = COLD.warm_start.clone();
     warm.point.x[7] = f64::NAN;
     let attempts = solved(&problem(""), Some(&warm), 5).report.attempts;
@@ -160,7 +159,7 @@ fn a_start_from_which_nothing_can_be_done_is_an_attempt_with_a_reason() {
 }
 
 #[test]
-fn a_cold_start_may_be_told_not_to_try_again() {
+fn cold_start_without_retry_tries_its_guesses_only() {
     let options = SolveOptions { max_iterations: 3, retry: false, ..SolveOptions::default() };
     let outcome = solve(&problem(""), None, &options, &mut |_| {}, &CancelToken::new()).unwrap();
     assert_ne!(outcome.report.status, SolveStatus::Converged);
@@ -168,7 +167,7 @@ fn a_cold_start_may_be_told_not_to_try_again() {
 }
 
 #[test]
-fn a_warm_start_of_another_mesh_is_moved_to_this_one() {
+fn warm_start_is_transferred_between_meshes() {
     let mut finer = problem("");
     finer.settings.mesh = Mesh { ds2: 6, ds3: 6, ss2: 8, ss1: 8 };
     let fine = solved(&finer, Some(&COLD.warm_start), 400);
@@ -182,7 +181,7 @@ fn a_warm_start_of_another_mesh_is_moved_to_this_one() {
 }
 
 #[test]
-fn a_warm_start_that_is_not_of_its_mesh_is_refused_in_words() {
+fn warm_start_inconsistent_with_its_mesh_is_rejected_with_a_reason() {
     let mut warm = COLD.warm_start.clone();
     warm.mesh.ss1 += 1;
     let error = solve(&problem(""), Some(&warm), &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
@@ -191,20 +190,19 @@ fn a_warm_start_that_is_not_of_its_mesh_is_refused_in_words() {
 }
 
 #[test]
-fn a_converged_gait_needs_no_explanation() {
+fn converged_solve_has_no_explanation() {
     let explanation =
         explain(&problem(""), (&*COLD).into(), &SolveOptions::default(), &mut |_| {}, &CancelToken::new());
     assert_eq!(explanation.unwrap(), None);
 }
 
-/// The bounds are in conflict; each relaxation that is named gives a gait.
 #[test]
-fn an_explanation_names_relaxations_that_were_solved() {
+fn explanation_names_relaxations_that_give_a_gait() {
     if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        // Past the capture of the harness; nobody reads it when stderr is closed.
+        // Writes to stderr directly, because the test harness captures `eprintln`.
         let _ = writeln!(
             std::io::stderr(),
-            "an_explanation_names_relaxations_that_were_solved: skipped: set GAITWRIGHT_LONG_TESTS=1"
+            "explanation_names_relaxations_that_give_a_gait: skipped: set GAITWRIGHT_LONG_TESTS=1"
         );
         return;
     }
@@ -244,9 +242,9 @@ fn an_explanation_names_relaxations_that_were_solved() {
     }
 }
 
-/// On the default mesh, where the linear algebra does use its threads.
+/// On the default mesh, on which the linear algebra uses its threads.
 #[test]
-fn one_and_two_threads_give_the_same_bits_in_no_more_iterations_than_before() {
+fn one_and_two_threads_give_the_same_bits_within_the_expected_iterations() {
     let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
     let with = |threads: usize| {
         let options = SolveOptions { threads, cold_guesses: 1, ..SolveOptions::default() };
@@ -254,7 +252,7 @@ fn one_and_two_threads_give_the_same_bits_in_no_more_iterations_than_before() {
     };
     let (one, two) = (with(1), with(2));
     assert_eq!(one.report.status, SolveStatus::Converged);
-    // 92 where this was written; other vector instructions round differently.
+    // Vector instructions of other processors round differently, so the limit has a margin.
     assert!(one.report.iterations <= 115, "{}", one.report.iterations);
     assert_eq!(one.report.iterations, two.report.iterations);
     assert_eq!(one.report.objective.to_bits(), two.report.objective.to_bits());
@@ -262,9 +260,9 @@ fn one_and_two_threads_give_the_same_bits_in_no_more_iterations_than_before() {
     assert_eq!(one.gait, two.gait);
 }
 
-/// The answer is moved back into bounds that the solver widened: by so little that a tight tolerance is still met.
+/// The solver widens bounds by 1e-8 and projects its result onto them, which must preserve a tight tolerance.
 #[test]
-fn the_tightest_tolerance_that_is_permitted_is_met() {
+fn tightest_allowed_tolerance_is_reached() {
     let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
     for tolerance in [1e-8, 1e-10] {
         let options = SolveOptions { tolerance, cold_guesses: 1, retry: false, ..SolveOptions::default() };

@@ -88,7 +88,11 @@ fn what_is_no_gait_or_recording_is_refused() {
     let times_s: Vec<String> = (0..30).map(|row| row.to_string()).collect();
     std::fs::write(folder.join("walk.mot"), format!("walk\nendheader\ntime\n{}\n", times_s.join("\n"))).unwrap();
     let reference = ["reference", "walk.mot", "--name", "x", "--out", "r.json"];
-    refused(folder, &reference, "walk.mot, line 2: the header has no inDegrees=yes or no");
+    refused(
+        folder,
+        &reference,
+        "walk.mot, line 2: the header has neither inDegrees=yes nor inDegrees=no; give the unit",
+    );
     refused(folder, &["solve", "--reference", "list.json"], "list.json: not a reference gait");
 }
 

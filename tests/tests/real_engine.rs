@@ -103,7 +103,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     let output = cli::run(BINARY, folder, &[&sweep[..], &["200", "--muscles", "on"]].concat());
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("it is without muscles, the problem is with muscles"), "{text}");
+    assert!(text.contains("it is without muscles, but the problem is with muscles"), "{text}");
 }
 
 /// The answer of a solve as those that start from it name it.

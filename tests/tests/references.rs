@@ -74,7 +74,7 @@ async fn what_is_not_whole_imports_nothing_and_says_where() {
         (json!({"recording": text.replace("\n1.5,0.1,", "\n1.5,x,")}), "recording, line 152"),
         (json!({"recording": text.replace("hip_R_rad", "hip_rad")}), "hip_R_rad"),
         (json!({"form": "opensim"}), "endheader"),
-        (json!({"strikes": "force"}), "no force under the right foot was recorded"),
+        (json!({"strikes": "force"}), "the recording has no force under the right foot"),
         (json!({"heel_strikes_s": [0.5, 99.0]}), "heel strike (s) = 99"),
         (json!({"height_m": 17.2}), "height_m = 17.2 is outside the allowed range [1.4, 2.2]"),
         (json!({"recording": format!("# {}\n{text}", "x".repeat(30_000))}), "at most 20000 bytes of comments"),
@@ -116,14 +116,14 @@ async fn the_form_imports_and_comes_back_as_it_was_typed() {
     let encoded = |text: &str| text.replace('\n', "%0D%0A").replace('\t', "%09");
     let with = |forces: &str| form(&recording(), "").replace("kinematics", "force") + "&forces=" + &encoded(forces);
     let refused = service.post_text("/references", kind, &with("not a file")).await;
-    assert!(refused.text.contains("forces, line 1: there is no line &#34;endheader&#34;"), "{}", refused.text);
+    assert!(refused.text.contains("forces, line 1: the line &#34;endheader&#34; is missing"), "{}", refused.text);
     assert!(refused.text.contains(">not a file</textarea>") && refused.text.contains("<details open>"), "as typed");
     let imported = service.post_text("/references", kind, &with(&forces)).await;
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await.text;
     assert!(
         page.contains("ground_force_vy is the force under the right foot")
-            && page.contains("heel strikes by the force")
+            && page.contains("heel strikes by the vertical force")
     );
     // More than the usual limit of a body is accepted here, and only here.
     let mut body = new("long", 1.7);

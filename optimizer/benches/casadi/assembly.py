@@ -1,4 +1,4 @@
-"""A sparse nonlinear programme as a sum of small elements, differentiated element by element.
+"""A sparse nonlinear programme as a sum of small elements with symbolic derivatives.
 
 Each element type is a function of a few local variables z (gathered from x) and constants p: rows r(z, p) and a share of
 the objective f(z, p, w). CasADi differentiates the small functions symbolically (SX: exact, sparse, common
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Element:
-    """One element type.
+    """An element type.
 
     z, p, w: SX columns (local variables, constants per instance, weights of the objective shared by all);
     rows: SX column; objective: SX scalar or None;
@@ -52,7 +52,7 @@ class Element:
 
 
 def _accumulate(sparsity, triplets, values):
-    """Sums `values` (one per (row, column) of `triplets`) into a matrix of the given sparsity."""
+    """Sums `values`, one for each (row, column) of `triplets`, to a matrix of the given sparsity."""
     place = {at: i for i, at in enumerate(zip(*sparsity.get_triplet()))}
     slots = [place[at] for at in triplets]
     if len(set(slots)) == len(slots) == sparsity.nnz():

@@ -1,4 +1,4 @@
-"""The swing-up of a cart-pole (Sleipnir's benchmark), ours and CasADi + IPOPT alternately.
+"""Alternate solves of the swing-up of a cart-pole (Sleipnir's benchmark) by Gaitwright and by CasADi with IPOPT.
 
     python cart_pole.py [--intervals 100 150 200 250 300] [--runs 5]
 
@@ -35,7 +35,7 @@ def rates(state, force):
 
 
 def programme(intervals):
-    """The solver, its start and bounds."""
+    """The solver with its starting point and bounds."""
     step = DURATION_S / intervals
     state, force = ca.SX.sym("state", 4), ca.SX.sym("force")
     a = rates(state, force)

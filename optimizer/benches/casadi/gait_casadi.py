@@ -1,4 +1,4 @@
-"""The gait problem in CasADi + IPOPT (MUMPS): an independent reference and the other side of the race.
+"""The gait problem in CasADi with IPOPT (MUMPS): an independent reference, and the other side of `race.py`.
 
     python gait_casadi.py solve OPTIONS.json RESULT.json    solve from a given start (see README.md)
     python gait_casadi.py check                             compare with the fixtures and the golden gaits
@@ -31,7 +31,7 @@ COST = {"w": [1.0, 0.0], "relaxed": False, "tol": 1e-6, "constr_viol_tol": 1e-7}
 ROUGH = {"tol": 1e-2, "constr_viol_tol": 1e-3, "compl_inf_tol": 1e-2}
 FIRM = {"tol": 1e-3, "constr_viol_tol": 1e-5, "acceptable_tol": 1e-2, "acceptable_iter": 5}
 PUSHED = {"bound_push": 0.1, "bound_frac": 0.1}
-# By name: those of the crate, which do not track again with muscles, and those that this implementation had of its own.
+# Phase settings: `same` are those of the crate, without a second tracking phase; `own` were chosen for IPOPT.
 PHASES = {
     "same": {
         "tracking": TRACKING | ROUGH | PUSHED | {"w": [0.0, 3.0], "mu_init": 1e-3},
@@ -48,7 +48,7 @@ PHASES = {
 
 
 class Solver:
-    """A gait programme with its functions, in the virtual machine or compiled, and IPOPT on it."""
+    """A gait problem with its functions, interpreted or compiled, and IPOPT as its solver."""
 
     def __init__(self, options, backend="vm", cache=None):
         started = time.perf_counter()
@@ -64,7 +64,7 @@ class Solver:
         self.backend = backend
 
     def _compile(self, cache):
-        """Generates C for all functions; a library already compiled from the same text is taken from `cache`."""
+        """Compiles all functions through C. `cache` keeps libraries by their source text."""
         generator = ca.CodeGenerator("gait.c")
         for function in self.functions:
             generator.add(function)
@@ -76,13 +76,13 @@ class Solver:
         if not library.exists():
             source = library.with_suffix(".c")
             source.write_text(text)
-            # -O2 takes more than a quarter of an hour with muscles, -O1 a minute.
+            # -O2 takes more than fifteen minutes with muscles, -O1 one minute.
             flags = ["-O1", "-march=native", "-fPIC", "-shared"]
             subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
         self.functions = [ca.external(function.name(), str(library)) for function in self.functions]
 
     def solve(self, x0, phase, extra=None, quiet=True):
-        """One phase from x0; returns (x, figures)."""
+        """Solves a phase from x0; returns x and a report."""
         gait = self.gait
         x, p = ca.MX.sym("x", gait.layout.n), ca.MX.sym("p", 2)
         ipopt = {
@@ -138,7 +138,7 @@ class Solver:
 
 
 def solve(options):
-    """All phases of a cold start from the scaled start x of the programme without muscles."""
+    """All phases of a cold start from scaled variables x without muscles."""
     problem = options["problem"]
     start = np.array(options["start"], dtype=float)
     backend = options.get("backend", "vm")
@@ -183,7 +183,7 @@ def solve(options):
 
 
 def time_functions(options):
-    """Seconds of one evaluation of each function, median of `repetitions`."""
+    """Time of an evaluation of each function, s; median of `repetitions`."""
     backend = options.get("backend", "vm")
     solver = Solver(options["problem"], backend, options.get("cache"))
     x = np.array(options["x"], dtype=float)
@@ -248,7 +248,7 @@ def golden_x(gait, data):
 
 
 def check_fixture(letter):
-    """Group sums of rows and parts of the objective at the disturbed point."""
+    """Compares group sums of rows and parts of the objective at the disturbed point."""
     data = json.loads((FIXTURES / f"nlp_s1_{letter}.json").read_text())
     solver = Solver({"subject": data["subject"], "muscles": data["muscles"]})
     x = np.array(data["x"])
@@ -273,7 +273,7 @@ def check_fixture(letter):
 
 
 def check_derivatives(solver, x):
-    """Block-wise derivatives against CasADi's own derivatives of the whole programme along random directions."""
+    """Compares assembled derivatives with those of CasADi for the whole problem in random directions."""
     gait = solver.gait
     generator = np.random.default_rng(1)
     d, e = generator.standard_normal((2, gait.layout.n))
@@ -301,7 +301,7 @@ def check_derivatives(solver, x):
 
 
 def check_golden(subject, letter):
-    """IPOPT stays at the golden gait."""
+    """Checks that IPOPT stays at the golden gait."""
     data = json.loads((FIXTURES / f"golden_s{subject}_{letter}.json").read_text())
     problem = {key: data["problem"][key] for key in ("subject", "bounds", "muscles", "intervals")}
     solver = Solver(problem)

@@ -8,7 +8,7 @@ REST_FORCE, REST_WEIGHT = 0.02, 0.03
 
 
 def nonnegative_least_squares(a, b):
-    """min |a x - b| over x >= 0 by the active-set method of Lawson and Hanson."""
+    """Minimises |a x - b| over x >= 0 by the active-set method of Lawson and Hanson."""
     n = a.shape[1]
     passive, x = np.zeros(n, dtype=bool), np.zeros(n)
     for _ in range(10 * n):
@@ -44,7 +44,7 @@ def forces(q, u):
 
 
 def guess(plain, full, x):
-    """Takes the scaled variables of `plain` (a Gait without muscles) into the layout of `full` (with muscles)."""
+    """Converts the scaled variables of `plain` (without muscles) to the layout of `full` (with muscles)."""
     result = np.zeros(full.layout.n)
     tail = plain.layout.vhip[0]
     result[full.layout.vhip[0] :] = x[tail:]

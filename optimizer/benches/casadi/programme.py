@@ -1,4 +1,4 @@
-"""The gait programme: variables, rows, bounds, objective (DEFAULTS holds every option)."""
+"""The gait problem: variables, rows, bounds and objective. DEFAULTS has all options."""
 
 from math import radians
 
@@ -91,7 +91,7 @@ class Layout:
 
 
 class Gait:
-    """The programme of one set of options (missing options are those of DEFAULTS)."""
+    """The gait problem of some options; missing ones are those of DEFAULTS."""
 
     def __init__(self, options, reference):
         self.options = merged(DEFAULTS, options)
@@ -146,7 +146,7 @@ class Gait:
         first, last = label == "first", label == "last"
         nc, ny = len(domain.contacts), len(domain.outputs)
 
-        # Local variables: the point, then the globals this domain's rows name.
+        # Local variables: those of the node, then the global ones in the rows of this domain.
         own = layout.globals[d]
         names = [("T", own["T"], 0.2), ("D", layout.stride, 1.0)]
         if any(contact[1] == 0 and contact[0] < 2 for contact in domain.contacts):
@@ -273,7 +273,7 @@ class Gait:
             self.touchdown_rows.append(len(self.tags) + sum(r.numel() for r in rows))
             add("guardvel", state.velocity(walker.foot_point(landing))[1], (-ca.inf, -limits["touchdown"]))
 
-        # Share of the objective.
+        # Part of the objective.
         w = ca.SX.sym("w", 2)
         power = u * qd[3:]
         eps = cost["power_smoothing"]
@@ -432,7 +432,7 @@ class Gait:
         torques += [(-limits[key], limits[key]) for key in ("u_prosthetic_knee", "u_prosthetic_ankle")]
         for d, domain in enumerate(self.domains):
             unloading = {"DS3": 4, "SS2": 1}.get(domain.kind)
-            # With the last vertical force of a foot its friction vanishes: the vertex of the cone.
+            # At lift-off the friction vanishes with the vertical force: the vertex of the cone.
             vanishing = {"DS3": (3, 4), "SS2": (1,)}.get(domain.kind, ())
             for k in range(domain.points):
                 p = layout.point_start[d][k]
@@ -472,7 +472,7 @@ class Gait:
 
 
 def merged(defaults, given):
-    """`given` over `defaults`, names checked."""
+    """`defaults` updated by `given`; unknown names are errors."""
     result = dict(defaults)
     for key, value in given.items():
         if key not in defaults:

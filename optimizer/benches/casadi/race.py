@@ -1,4 +1,4 @@
-"""Ours against CasADi + IPOPT, alternately, from the same starts: prints every run, medians and ratios.
+"""Alternate solves by Gaitwright and by CasADi with IPOPT from the same starts: prints runs, medians and ratios.
 
     python race.py [--subject 1 2] [--guess 1 2] [--muscles] [--runs 3] [--backend vm|c] [--phases same|own]
         [--threads 1] [--limit 900] [--json FILE]
@@ -22,7 +22,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 WORKSPACE = HERE.parent.parent.parent
-# One thread each: numerical libraries would otherwise start as many as there are cores.
+# One thread, because numerical libraries otherwise start one for each core.
 ENVIRONMENT = os.environ | {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -32,7 +32,7 @@ def cargo(*arguments):
 
 
 def example(name):
-    """Path of a built example, as cargo reports it."""
+    """Path of an example that cargo has built."""
     lines = cargo("build", "--example", name, "--message-format=json").splitlines()
     for message in map(json.loads, lines):
         if message.get("target", {}).get("name") == name and message.get("executable"):
@@ -41,7 +41,7 @@ def example(name):
 
 
 def timed(command, limit):
-    """Standard output, wall seconds, processor seconds and peak memory (MB) of a child."""
+    """Standard output, wall time (s), processor time (s) and peak memory (MB) of a child process."""
     started = time.perf_counter()
     child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
     alarm = threading.Timer(limit, child.kill)
@@ -135,7 +135,7 @@ def race(arguments, ours, dump, folder):
 
 
 def medians(runs):
-    """By side; and the ratios of wall and processor seconds."""
+    """Medians of each side, and ratios of wall and processor times."""
     median = {}
     for side in ("ours", "casadi"):
         mine = [run for run in runs if run["side"] == side]
@@ -150,12 +150,12 @@ def main():
     parser.add_argument("--subject", type=int, nargs="+", default=[1], choices=[1, 2])
     parser.add_argument("--muscles", action="store_true")
     parser.add_argument("--phases", default="same", choices=["same", "own"], help="settings of IPOPT in its phases")
-    parser.add_argument("--runs", type=int, default=3, help="from each start")
+    parser.add_argument("--runs", type=int, default=3, help="number of runs from each start")
     parser.add_argument("--backend", default="vm", choices=["vm", "c"])
-    parser.add_argument("--guess", type=int, nargs="+", default=[1], help="1 to 64; both sides start from it")
-    parser.add_argument("--threads", type=int, default=1, help="of ours; IPOPT's linear algebra has one")
-    parser.add_argument("--limit", type=float, default=900.0, help="seconds after which a single run is given up")
-    parser.add_argument("--json", help="file for all figures")
+    parser.add_argument("--guess", type=int, nargs="+", default=[1], help="numbers of the initial guesses of both sides, 1 to 64")
+    parser.add_argument("--threads", type=int, default=1, help="threads of Gaitwright; the linear algebra of IPOPT has one")
+    parser.add_argument("--limit", type=float, default=900.0, help="time limit of a run, s")
+    parser.add_argument("--json", help="file for all results")
     arguments = parser.parse_args()
     ours, dump = example("timed_solve"), example("dump_start")
     header = {

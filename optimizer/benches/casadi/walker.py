@@ -60,7 +60,7 @@ class Walker:
 
     @staticmethod
     def _right_thigh(height, mass, length):
-        """Human thigh, knee housing, adapter, and the user's own bent shank and foot, lumped."""
+        """Human thigh, knee housing, adapter, and the user's bent shank and foot, lumped into one body."""
         own = 0.245 * height
         limb = 0.061 * mass
         parts = [
@@ -88,7 +88,7 @@ class Walker:
 
 
 class State:
-    """Kinematics of one instant."""
+    """Kinematics at one instant."""
 
     def __init__(self, q, qd, qdd):
         self.q, self.qd, self.qdd = q, qd, qdd
@@ -181,7 +181,7 @@ def contact_target(walker, domain, contact, right_step, stride_length):
 
 
 def bezier(alpha, s):
-    """Values and first two derivatives by s of the curves in the rows of alpha (degree 5)."""
+    """Values and first two derivatives with respect to s of the curves in the rows of alpha (degree 5)."""
 
     def curve(a):
         n = a.shape[1] - 1
@@ -232,7 +232,7 @@ MUSCLES = _muscles()
 
 
 def joint_length_and_arm(joint, angle):
-    """Change of the unit's length, and torque on the model's joint per newton. Works on floats and on expressions."""
+    """Length change of the unit, and joint torque per newton; for floats and expressions."""
     coordinate, r0, largest, reference, rho, direction = joint
     phi = (pi / 2 if coordinate == 5 else pi) - angle
     if largest is None:

@@ -1,6 +1,6 @@
-//! Medians of what is measured.
+//! Medians of measurements.
 
-/// Median; not a number of nothing.
+/// The median; NaN for an empty list.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;

@@ -1,6 +1,6 @@
-//! Memory that this process has used.
+//! Peak memory of this process.
 
-/// Peak resident memory, MB, where the system says it (`VmHWM` of Linux).
+/// Peak resident memory in MB, if the system reports it (`VmHWM` of Linux).
 pub(crate) fn peak_resident_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

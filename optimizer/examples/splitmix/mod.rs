@@ -1,4 +1,4 @@
-//! Reproducible draws for the examples.
+//! Reproducible random numbers for the examples.
 
 /// splitmix64 (Steele, Lea & Flood 2014).
 pub(crate) struct SplitMix(pub u64);

@@ -1,4 +1,4 @@
-//! The values that are tuned.
+//! Levels of the tuned bounds.
 
 /// Levels of Table I (Li et al. 2022).
 pub(crate) const LEVELS: [&[f64]; 8] = [
@@ -12,7 +12,7 @@ pub(crate) const LEVELS: [&[f64]; 8] = [
     &[20.0, 30.0, 40.0],
 ];
 
-/// Values far beyond Table I, as those of `explanations`.
+/// Values far beyond Table I.
 #[allow(dead_code)] // each example takes what it needs
 pub(crate) const TIGHT: [&[f64]; 8] = [
     &[2.0, 3.0, 4.0],

@@ -1,4 +1,4 @@
-//! Bodies of a subject with a device: Winter's fractions for the human segments, the device file for the prosthesis.
+//! Segment parameters: Winter's fractions for the human segments, the device file for the prosthesis.
 //!
 //! Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009, tables 4.1 and figure 4.1 (masses and
 //! gyration radii as fractions of body mass and segment length, lengths as fractions of height).
@@ -19,40 +19,40 @@ const HIP_HEIGHT: f64 = 0.530;
 const HAT_LENGTH: f64 = 0.288;
 /// Ankle height / height.
 const ANKLE_HEIGHT: f64 = 0.039;
-/// Heel contact behind the ankle / height (gait2d's 0.060 m at 1.80 m).
+/// Distance of the heel contact behind the ankle / height (0.060 m at 1.80 m, as in the model gait2d).
 const HEEL_BEHIND: f64 = 0.0333;
-/// Toe contact ahead of the ankle / height (gait2d's 0.150 m at 1.80 m).
+/// Distance of the toe contact ahead of the ankle / height (0.150 m at 1.80 m, as in the model gait2d).
 const TOE_AHEAD: f64 = 0.0833;
 
-/// A rigid body: mass, inertia about its centre of mass, and the chain to its centre of mass.
+/// A rigid body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
-    /// For people.
+    /// Name of the link, and of the part if a link has several bodies.
     pub name: &'static str,
     /// kg.
     pub mass: f64,
-    /// About the centre of mass, kg m².
+    /// Moment of inertia about the centre of mass, kg m².
     pub inertia: f64,
-    /// From the hip to the centre of mass; the body turns with the chain's last link.
+    /// Chain from the hip to the centre of mass. The body rotates with the last link of the chain.
     pub com: Chain,
 }
 
 /// Lengths of one leg, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegGeometry {
-    /// Hip to knee.
+    /// Distance from hip to knee.
     pub thigh_length_m: f64,
-    /// Knee to ankle.
+    /// Distance from knee to ankle.
     pub shank_length_m: f64,
-    /// Ankle above the sole.
+    /// Height of the ankle above the sole.
     pub ankle_height_m: f64,
-    /// Heel behind the ankle.
+    /// Distance of the heel behind the ankle.
     pub heel_behind_m: f64,
-    /// Toe ahead of the ankle.
+    /// Distance of the toe ahead of the ankle.
     pub toe_ahead_m: f64,
 }
 
-/// The walker: bodies, legs, and the constant coefficients of its equations of motion.
+/// The walker: bodies, legs, and the constant coefficients of the equations of motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WalkerModel {
     /// The seven bodies, in link order.
@@ -61,15 +61,15 @@ pub struct WalkerModel {
     pub left: LegGeometry,
     /// Prosthetic leg.
     pub right: LegGeometry,
-    /// Hip to shoulder, m (for drawing).
+    /// Distance from hip to shoulder, m; for drawings only.
     pub torso_length_m: f64,
     /// kg.
     pub total_mass: f64,
-    /// First mass moment of everything that a link carries, in the link's frame, kg m: `sum m u_j`.
+    /// For each link, the first mass moment of all masses that it carries, in its frame, kg m: `sum m u_j`.
     pub first_moment: [[f64; 2]; LINKS],
-    /// Moment of inertia of everything that a link carries about the link's origin, kg m².
+    /// For each link, the moment of inertia of all masses that it carries about its origin, kg m².
     pub link_inertia: [f64; LINKS],
-    /// The pairs of links that share bodies, with their coupling coefficients.
+    /// Couplings of the pairs of links that carry a common mass.
     pub pairs: Vec<LinkPair>,
 }
 
@@ -91,7 +91,7 @@ impl WalkerModel {
     /// The walker of a subject with a device on the right leg.
     ///
     /// # Errors
-    /// [`ModelError`] when a number is out of range, or when the device is too tall for the subject.
+    /// [`ModelError`] if a number is out of range or the device is too tall for the subject.
     pub fn new(subject: &Subject, device: &Device) -> Result<Self, ModelError> {
         subject.validate()?;
         device.validate()?;
@@ -110,7 +110,7 @@ impl WalkerModel {
             heel_behind_m: device.heel_behind_m,
             toe_ahead_m: device.toe_ahead_m,
         };
-        // The prosthetic thigh link must reach at least to a bent human knee.
+        // The prosthetic thigh link must reach the human knee at least.
         ModelError::check_range("prosthetic thigh length (m)", right.thigh_length_m, 0.2, 1.0)?;
 
         let hat_length = HAT_LENGTH * height;
@@ -162,7 +162,7 @@ impl WalkerModel {
         }
     }
 
-    /// Heel or toe of a foot.
+    /// A contact point of a foot.
     pub fn contact_point(&self, point: FootPoint, side: Side) -> ContactPoint {
         ContactPoint::new(point, side, self.leg(side))
     }
@@ -195,14 +195,14 @@ fn human_leg(mass: f64, leg: &LegGeometry) -> [Body; 3] {
     ]
 }
 
-/// The right thigh link carries the human thigh, the knee housing, the adapter and (optionally) the user's own bent
-/// shank and foot, lumped into one body.
+/// The right thigh link: human thigh, knee housing, adapter and, if `carried_limb`, the user's bent shank and foot,
+/// lumped into one body.
 fn prosthetic_leg(subject: &Subject, device: &Device, leg: &LegGeometry) -> [Body; 3] {
     let (height, mass) = (subject.height_m, subject.body_mass_kg);
     let human_thigh = THIGH_LENGTH * height;
     let human_shank = SHANK_LENGTH * height;
     let thigh = leg.thigh_length_m;
-    // (mass, x, z in the thigh frame, inertia about own centre)
+    // Mass, x and z in the frame of the thigh, moment of inertia about its own centre.
     let mut parts = vec![
         (0.100 * mass, 0.0, -0.433 * human_thigh, 0.100 * mass * (0.323 * human_thigh).powi(2)),
         (device.knee_housing_mass_kg, 0.0, -thigh, device.knee_housing_inertia_kg_m2),

@@ -1,6 +1,6 @@
-//! Relative joint angles to absolute link angles and back: the constant matrix A and its transpose.
+//! Transformations between relative joint angles and absolute link angles: the constant matrix A and its transpose.
 
-/// Number of generalised coordinates: two of the hip point, seven angles.
+/// Number of generalised coordinates: two of the hip point and seven angles.
 pub const COORDINATES: usize = 9;
 /// Number of links and of absolute link angles.
 pub const LINKS: usize = 7;
@@ -14,9 +14,9 @@ pub const THIGH_L: usize = 1;
 /// First link (thigh) of the right leg; shank and foot follow.
 pub const THIGH_R: usize = 4;
 
-/// Absolute link quantities of relative angle quantities (angles, rates or accelerations): `A a`.
+/// Absolute link angles, rates or accelerations from relative ones: `A a`.
 ///
-/// Input (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R).
+/// The input has the order (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R).
 #[inline]
 pub fn link_angles(a: &[f64; LINKS]) -> [f64; LINKS] {
     let torso = -a[0];
@@ -29,7 +29,7 @@ pub fn link_angles(a: &[f64; LINKS]) -> [f64; LINKS] {
     [torso, thigh_l, shank_l, foot_l, thigh_r, shank_r, foot_r]
 }
 
-/// Generalised quantities of the seven angles from link quantities: `A^T p`.
+/// Generalised forces of the seven angles from those of the links: `A^T p`.
 #[inline]
 pub fn to_generalised(p: &[f64; LINKS]) -> [f64; LINKS] {
     let left_shank = p[2] + p[3];
@@ -45,10 +45,10 @@ pub fn relative_angles(psi: &[f64; LINKS]) -> [f64; LINKS] {
     [-psi[0], psi[1] - psi[0], psi[1] - psi[2], psi[3] - psi[2], psi[4] - psi[0], psi[4] - psi[5], psi[6] - psi[5]]
 }
 
-/// `A^T H A` for a link-space matrix H (not necessarily symmetric), both sides seven angles.
+/// `A^T H A` for a 7 x 7 matrix H in link space, symmetric or not.
 #[inline]
 pub fn congruence(h: &[[f64; LINKS]; LINKS]) -> [[f64; LINKS]; LINKS] {
-    // Rows of H transformed from the right: (A^T H_row^T)^T, then columns from the left.
+    // First the rows of H from the right, (A^T H_row^T)^T, then the columns from the left.
     let mut right = [[0.0; LINKS]; LINKS];
     for i in 0..LINKS {
         right[i] = to_generalised(&h[i]);
@@ -56,7 +56,7 @@ pub fn congruence(h: &[[f64; LINKS]; LINKS]) -> [[f64; LINKS]; LINKS] {
     transform_rows(&right)
 }
 
-/// `A^T X` for a matrix X with one row per link.
+/// `A^T X` for a matrix X with one row for each link.
 #[inline]
 pub fn transform_rows<const N: usize>(x: &[[f64; N]; LINKS]) -> [[f64; N]; LINKS] {
     let mut result = [[0.0; N]; LINKS];

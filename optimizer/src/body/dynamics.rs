@@ -1,15 +1,15 @@
 //! Inverse dynamics `M(q) qdd + h(q, qd)` with exact first and second derivatives, in link space.
 //!
-//! In absolute link angles the equations of motion fall into terms of one link and of one pair of links (the pair
-//! coefficients are constants of the model), so every derivative is a closed form of `cos` and `sin` of the link
-//! angles and of their differences. `A^T ( ) A` takes them to the generalised coordinates.
+//! In absolute link angles, each term of the equations of motion belongs to one link or to one pair of links with a
+//! constant coefficient. All derivatives are therefore closed forms in the sines and cosines of link angles and of
+//! their differences. `A^T ( ) A` transforms them to generalised coordinates.
 
 use super::GRAVITY;
 use super::anthropometry::WalkerModel;
 use super::coordinates::{LINKS, congruence, link_angles, to_generalised, transform_rows};
 use super::point::{ContactPoint, angles_of};
 
-/// Positions, velocities and accelerations of one instant in link space.
+/// Positions, velocities and accelerations at one instant, in link space.
 #[derive(Debug, Clone, Copy)]
 pub struct PointState {
     /// Cosine of each link angle.
@@ -22,9 +22,9 @@ pub struct PointState {
     pub acceleration: [f64; LINKS],
     /// Position of the hip point, m.
     pub base: [f64; 2],
-    /// Its velocity, m/s.
+    /// Velocity of the hip point, m/s.
     pub base_rate: [f64; 2],
-    /// Its acceleration, m/s², without gravity.
+    /// Acceleration of the hip point, m/s², without gravity.
     pub base_acceleration: [f64; 2],
 }
 
@@ -49,7 +49,7 @@ impl PointState {
         }
     }
 
-    /// `R(psi_link) u`.
+    /// A vector of a link in the world frame: `R(psi_link) u`.
     #[inline]
     pub fn rotated(&self, link: usize, u: &[f64; 2]) -> [f64; 2] {
         let (c, s) = (self.cos[link], self.sin[link]);
@@ -99,16 +99,16 @@ impl PointState {
 /// First derivatives of the inverse dynamics in generalised coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct DynamicsJacobian {
-    /// d(row)/d(angle): 9 rows, seven angles.
+    /// d(row)/d(angle): nine rows, seven angles.
     pub angle: [[f64; LINKS]; 9],
     /// d(row)/d(angle rate).
     pub rate: [[f64; LINKS]; 9],
-    /// d(row)/d(acceleration) = M(q), all nine accelerations.
+    /// d(row)/d(acceleration) = M(q), for all nine accelerations.
     pub mass: [[f64; 9]; 9],
 }
 
-/// Second derivatives of a multiplier-weighted sum of rows, in link space; elements add into it, and
-/// [`LinkHessian::generalised`] takes it to the generalised coordinates.
+/// Second derivatives of a sum of rows weighted by multipliers, in link space. Elements add to it;
+/// [`LinkHessian::generalised`] transforms it to generalised coordinates.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LinkHessian {
     /// Angle by angle.
@@ -117,7 +117,7 @@ pub struct LinkHessian {
     pub angle_rate: [[f64; LINKS]; LINKS],
     /// Rate by rate.
     pub rate_rate: [[f64; LINKS]; LINKS],
-    /// Angle (row) by base acceleration (column x, z).
+    /// Angle (row) by acceleration of the hip point (column x, z).
     pub angle_base: [[f64; 2]; LINKS],
     /// Angle (row) by link acceleration (column).
     pub angle_acceleration: [[f64; LINKS]; LINKS],
@@ -132,14 +132,14 @@ pub struct GeneralisedHessian {
     pub angle_rate: [[f64; LINKS]; LINKS],
     /// Rate by rate.
     pub rate_rate: [[f64; LINKS]; LINKS],
-    /// Angle by base acceleration.
+    /// Angle by acceleration of the hip point.
     pub angle_base: [[f64; 2]; LINKS],
     /// Angle by angular acceleration.
     pub angle_acceleration: [[f64; LINKS]; LINKS],
 }
 
 impl LinkHessian {
-    /// To generalised coordinates.
+    /// Transforms to generalised coordinates.
     #[inline]
     pub fn generalised(&self) -> GeneralisedHessian {
         GeneralisedHessian {
@@ -152,8 +152,8 @@ impl LinkHessian {
     }
 }
 
-/// The inverse dynamics of a model: `M(q) qdd + h(q, qd)`, or with `gravity = 0` and zero rates the momentum change
-/// `M(q) dv` of an impact.
+/// The inverse dynamics `M(q) qdd + h(q, qd)` of a walker. With zero gravity and zero rates it gives the change of
+/// momentum `M(q) dv` in an impact.
 #[derive(Debug, Clone, Copy)]
 pub struct InverseDynamics<'a> {
     /// The walker.
@@ -168,12 +168,12 @@ impl<'a> InverseDynamics<'a> {
         Self { model, gravity: GRAVITY }
     }
 
-    /// For momentum balances: no gravity.
+    /// Without gravity, for impacts.
     pub fn without_gravity(model: &'a WalkerModel) -> Self {
         Self { model, gravity: 0.0 }
     }
 
-    /// The nine rows, N and N m.
+    /// The nine generalised forces, N and N m.
     #[inline]
     pub fn rows(&self, state: &PointState) -> [f64; 9] {
         let model = self.model;
@@ -255,9 +255,7 @@ impl<'a> InverseDynamics<'a> {
         result
     }
 
-    /// Adds the second derivatives of `multipliers . rows` to `hessian`.
-    ///
-    /// `multipliers`: one per generalised row.
+    /// Adds the second derivatives of `multipliers . rows` to `hessian`; one multiplier for each row.
     #[inline]
     pub fn add_hessian(&self, state: &PointState, multipliers: &[f64; 9], hessian: &mut LinkHessian) {
         let model = self.model;
@@ -303,7 +301,7 @@ impl<'a> InverseDynamics<'a> {
         }
     }
 
-    /// Mass matrix M(q), kg, kg m, kg m².
+    /// Mass matrix M(q): kg, kg m and kg m².
     pub fn mass_matrix(&self, q: &[f64; 9]) -> [[f64; 9]; 9] {
         self.jacobian(&PointState::new(q, &[0.0; 9], &[0.0; 9])).mass
     }

@@ -1,4 +1,4 @@
-//! Points fixed to a link: position, velocity and acceleration, and the contact points of the feet.
+//! Points fixed to links, and the contact points of the feet: position, velocity and acceleration.
 
 use super::anthropometry::LegGeometry;
 use super::coordinates::{LINKS, THIGH_L, THIGH_R, link_angles};
@@ -7,7 +7,7 @@ use crate::gait::{FootPoint, Side};
 /// A point as a chain of vectors fixed to links: `p = (px, pz) + sum_j R(psi_j) (ux_j, uz_j)`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chain {
-    /// (link, ux, uz), metres in the link frame.
+    /// Link and its vector (ux, uz) in the frame of the link, m.
     pub segments: Vec<(usize, f64, f64)>,
 }
 
@@ -37,7 +37,7 @@ impl Chain {
         v
     }
 
-    /// Jacobian of the position with respect to q: rows x and z, m/rad for the angles.
+    /// Jacobian of the position with respect to q: rows x and z; m/rad for the angles.
     pub fn jacobian(&self, q: &[f64; 9]) -> [[f64; 9]; 2] {
         let psi = link_angles(&angles_of(q));
         let mut per_link = [[0.0; LINKS]; 2];
@@ -54,7 +54,7 @@ impl Chain {
         jacobian
     }
 
-    /// Velocity-dependent part of the acceleration, `Jdot qd`, m/s².
+    /// Part of the acceleration that depends on velocities, `Jdot qd`, m/s².
     pub fn jacobian_dot_qd(&self, q: &[f64; 9], qd: &[f64; 9]) -> [f64; 2] {
         let psi = link_angles(&angles_of(q));
         let rate = link_angles(&angles_of(qd));
@@ -75,7 +75,7 @@ pub fn angles_of(q: &[f64; 9]) -> [f64; LINKS] {
     [q[2], q[3], q[4], q[5], q[6], q[7], q[8]]
 }
 
-/// A heel or toe: its side and its vector on each link of that leg.
+/// A contact point: heel or toe of one leg, with its vector on each link of the leg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactPoint {
     /// Heel or toe.
@@ -103,7 +103,7 @@ impl ContactPoint {
         }
     }
 
-    /// As a chain.
+    /// The point as a chain.
     pub fn chain(&self) -> Chain {
         Chain { segments: (0..3).map(|k| (self.first_link + k, self.vectors[k][0], self.vectors[k][1])).collect() }
     }

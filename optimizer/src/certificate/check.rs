@@ -1,21 +1,21 @@
-//! One question that a certificate answers: the worst value found of a quantity, where, and what is allowed.
+//! A check of a certificate: the worst value of a quantity, its place, and its limit.
 
 use crate::gait::DomainTrajectory;
 use crate::in_words::figure;
 use serde::{Deserialize, Serialize};
 
-/// The worst value of a quantity.
+/// The worst value of a quantity, with its limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
-    /// What was measured, with the constraint's number where it has one.
+    /// Name of the quantity, with the number of its constraint if it has one.
     pub name: String,
-    /// Unit of value and limit; empty: dimensionless.
+    /// Unit of value and limit; empty if dimensionless.
     pub unit: String,
-    /// Worst value found; none where it could not be determined, which does not pass.
+    /// Worst value. `None` if it could not be determined, which fails the check.
     pub value: Option<f64>,
-    /// Largest allowed value; none: reported without a judgement.
+    /// Largest allowed value. `None` for a quantity without a limit.
     pub limit: Option<f64>,
-    /// Where the worst value is: domain and time of the stride.
+    /// Place of the worst value: domain and time of the stride.
     pub place: String,
 }
 
@@ -36,7 +36,7 @@ impl Check {
     }
 }
 
-/// Where a value was measured.
+/// The place of a value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) domain: &'a str,
@@ -44,14 +44,14 @@ pub(super) struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    /// In a trajectory, at a share of its duration.
+    /// At a fraction of the duration of a domain.
     pub(super) fn within(trajectory: &'a DomainTrajectory, share: f64) -> Self {
         let start = trajectory.time_s.first().copied().unwrap_or(0.0);
         Self { domain: &trajectory.name, time_s: start + share * trajectory.duration_s }
     }
 }
 
-/// A quantity that is measured in many places.
+/// A quantity that is measured at many places.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quantity {
     pub(super) name: &'static str,
@@ -60,20 +60,20 @@ pub(super) struct Quantity {
 }
 
 impl Quantity {
-    /// With a limit.
+    /// A quantity with a limit.
     pub(super) const fn judged(name: &'static str, unit: &'static str, limit: f64) -> Self {
         Self { name, unit, limit: Some(limit) }
     }
 }
 
-/// The worst value of every quantity so far.
+/// The worst values of quantities so far.
 #[derive(Debug, Default)]
 pub(super) struct Worst {
     checks: Vec<Check>,
 }
 
 impl Worst {
-    /// Takes a value into account; one that is not finite counts as not determined, the worst of all.
+    /// Adds a value. A value that is not finite counts as undetermined and is the worst.
     pub(super) fn note(&mut self, quantity: Quantity, value: f64, place: Place<'_>) {
         let value = value.is_finite().then_some(value);
         let words = || format!("{}, {:.4} s", place.domain, place.time_s);
@@ -99,7 +99,7 @@ impl Worst {
         }
     }
 
-    /// The checks, their names followed by `where_measured`.
+    /// The checks; `where_measured` is appended to their names.
     pub(super) fn into_checks(mut self, where_measured: &str) -> Vec<Check> {
         for check in &mut self.checks {
             check.name.push_str(where_measured);

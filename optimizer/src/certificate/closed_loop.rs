@@ -1,4 +1,4 @@
-//! The gait as the walker under control executes it: strides in a row, and what contacts and torques do meanwhile.
+//! The closed loop: consecutive strides, and contacts, friction and torques over the periodic stride.
 
 use super::check::{Check, Place, Quantity, Worst};
 use super::control::{State, split};
@@ -9,13 +9,13 @@ use crate::gait::Gait;
 use crate::gait::motion::instant;
 use crate::walking::CYCLE;
 
-/// Strides of the simulation.
+/// Number of simulated strides.
 pub const STRIDES: usize = 20;
 
 const ORBIT_ANGLE: Quantity = Quantity::judged("orbit error, angles", "rad", 5e-3);
 const ORBIT_RATE: Quantity = Quantity::judged("orbit error, rates", "rad/s", 0.05);
-// The optimum unloads the trailing foot wholly, at the edge of contact and friction: the simulated one crosses it by the
-// mesh error. It may, as far as nobody could tell that foot from one in the air.
+// An optimal gait unloads the trailing foot completely, on the boundary of contact and friction, and the simulation may
+// cross it by the mesh error. The limit is the force below which a gait laboratory does not register contact.
 const NORMAL_FORCE: Quantity = Quantity::judged("unilateral contact", "N", CONTACT_THRESHOLD_N);
 const FRICTION: Quantity = Quantity::judged("friction cone", "N", FRICTION_THRESHOLD_N);
 const TORQUE: Quantity = Quantity::judged("torques", "N m", 5.0);
@@ -24,7 +24,7 @@ const SPEED: Quantity = Quantity::judged("velocities", "rad/s", 0.2);
 const DEPTH: Quantity = Quantity::judged("feet above the ground", "m", 1e-3);
 const IMPULSE: Quantity = Quantity::judged("landing impulse pulls", "N s", 0.0);
 
-/// Walks [`STRIDES`] strides from the gait's own first state: largest distance to that state after each stride.
+/// Simulates [`STRIDES`] strides from the first state of the gait, and measures the distance to it after each stride.
 pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Check>, Fall> {
     let mut worst = Worst::default();
     let mut x = *start;
@@ -39,7 +39,7 @@ pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Chec
     Ok(worst.into_checks(": closed loop"))
 }
 
-/// One periodic stride, instant by instant.
+/// Measures the periodic stride at every step of the integration.
 pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: &State) -> Result<Vec<Check>, Fall> {
     let mut samples: Vec<(usize, f64, State)> = Vec::new();
     let passages = walker.stride(periodic, &mut |d, time, x| samples.push((d, time, *x)))?;
@@ -61,7 +61,7 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
         let plan = instant(&gait.domains[*d], phase.s).u;
         let qdd = control.acceleration(x).unwrap_or([f64::NAN; 9]);
         let rows = control.domain.contact_rows();
-        // No effort at all is not-a-number: the worst value of each.
+        // Without a solution, NaN marks every quantity as undetermined.
         let (pulling, sliding, torque) = match control.effort(x, &qdd, &plan, &limits) {
             Some(effort) => (
                 limits.normal_force(&rows, &effort.forces),

@@ -1,14 +1,15 @@
-//! A contact row's kinematics with first derivatives, in generalised coordinates.
+//! Kinematics of a contact row with first derivatives, in generalised coordinates.
 //!
-//! Written apart from the gait problem's own rows, which the certificate judges. With `a_k = R(psi_k) u_k` the vectors
-//! of the point on its three links, the row's gradient by psi_k is `-a_z` (x) or `a_x` (z).
+//! The gait problem has its own implementation, which the certificate checks and therefore does not use. With the
+//! vectors `a_k = R(psi_k) u_k` of the point on its three links, the gradient with respect to psi_k is `-a_z` (x) or
+//! `a_x` (z).
 
 use crate::body::coordinates::{LINKS, congruence, to_generalised};
 use crate::body::{ContactPoint, PointState, WalkerModel};
 use crate::gait::Axis;
 use crate::walking::{ContactRow, Domain};
 
-/// One component of a heel or a toe.
+/// A component of a heel or toe.
 #[derive(Debug, Clone)]
 pub(super) struct Contact {
     pub(super) row: ContactRow,
@@ -20,7 +21,7 @@ impl Contact {
         Self { row, point: model.contact_point(row.point, row.side) }
     }
 
-    /// The contacts of a domain, in the order of its forces.
+    /// The contact rows of a domain, in the order of the forces.
     pub(super) fn of_domain(model: &WalkerModel, domain: Domain) -> Vec<Self> {
         domain.contact_rows().into_iter().map(|row| Self::new(model, row)).collect()
     }
@@ -32,7 +33,7 @@ impl Contact {
         }
     }
 
-    /// A quantity of each link of the leg that the chain passes, as a link vector.
+    /// Expands a quantity of the links of the leg to a vector of all links.
     fn per_link(&self, state: &PointState, quantity: impl Fn(usize, [f64; 2]) -> [f64; 2]) -> [f64; LINKS] {
         let mut result = [0.0; LINKS];
         for (k, u) in self.point.vectors.iter().enumerate() {
@@ -52,12 +53,12 @@ impl Contact {
         self.along(state.contact_velocity(&self.point))
     }
 
-    /// Acceleration of the component, m/s²; with a state of zero accelerations, its part from the velocities.
+    /// Acceleration of the component, m/s². With zero accelerations in the state, its part due to velocities.
     pub(super) fn acceleration(&self, state: &PointState) -> f64 {
         self.along(state.contact_acceleration(&self.point))
     }
 
-    /// Gradient of the position: also d(velocity)/d(qd) and d(acceleration)/d(qdd).
+    /// Gradient of the position, which is also d(velocity)/d(qd) and d(acceleration)/d(qdd).
     pub(super) fn gradient(&self, state: &PointState) -> [f64; 9] {
         let angles = to_generalised(&self.per_link(state, |_, a| [-a[1], a[0]]));
         let mut gradient = [0.0; 9];
@@ -94,7 +95,7 @@ impl Contact {
     }
 }
 
-/// d(J^T f)/d(the seven angles) of the given forces; the rows of the hip point are zero.
+/// d(J^T f)/d(the seven angles) for given forces. The rows of the hip point are zero.
 pub(super) fn force_by_angle(contacts: &[Contact], forces: &[f64], state: &PointState) -> [[f64; LINKS]; LINKS] {
     let mut link = [[0.0; LINKS]; LINKS];
     for (contact, force) in contacts.iter().zip(forces) {

@@ -1,9 +1,10 @@
-//! The walker of one domain under feedback linearisation: accelerations, and their derivatives by the state.
+//! A domain under feedback linearisation: accelerations, and their derivatives with respect to the state.
 //!
-//! At a state the controller asks for `e'' = -2 eps e' - eps^2 e` of the outputs and, where the hip velocity is one, for
-//! `dp'' = -eps (dp' - v_hip)`, or leaves the hip velocity alone, `dp'' = 0`. Contacts and outputs fix all nine accelerations in the fully actuated domains, whatever
-//! the torques; with one foot on the ground the three equations of motion without a torque (hip point and torso) give
-//! the contact forces too, and in SS1 the ninth acceleration. The torques follow ([`super::torques`]).
+//! The controller imposes `e'' = -2 eps e' - eps^2 e` on the outputs and, if the hip velocity is an output, `dp'' =
+//! -eps (dp' - v_hip)`, or `dp'' = 0` for a free hip velocity. In the fully actuated domains, contacts and outputs
+//! determine all nine accelerations. In single support, the three equations of motion without a torque (hip point and
+//! torso) also determine the contact forces and, in SS1, the ninth acceleration. [`super::torques`] computes the
+//! torques.
 
 use super::contact::{Contact, force_by_angle};
 use super::dormand_prince::System;
@@ -16,24 +17,24 @@ use nalgebra::{SMatrix, SVector};
 
 /// Coordinates, then velocities.
 pub(super) type State = SVector<f64, 18>;
-/// Derivative of a state by a state.
+/// Derivative of a state with respect to a state.
 pub(super) type StateMatrix = SMatrix<f64, 18, 18>;
 
 /// Controller bandwidth, 1/s: output gains `eps^2` and `2 eps`, hip-velocity gain `eps` (FROST's form).
 pub(super) const BANDWIDTH: f64 = 20.0;
 
-/// A pull below this is rounding of an event at zero force, N.
+/// Largest pull that is rounding error of an event at zero force, N.
 const PULL_N: f64 = 1e-2;
 
-/// Accelerations and at most three contact forces.
+/// Number of unknowns: nine accelerations and at most three contact forces.
 const UNKNOWNS: usize = 12;
-/// Equations of motion without a torque: hip point and torso.
+/// Number of equations of motion without a torque: hip point and torso.
 const UNACTUATED: usize = 3;
 
-/// The unknowns solved at a state: the nine accelerations, then the contact forces with one foot on the ground.
+/// The unknowns at a state: nine accelerations, then the contact forces in single support.
 type Unknowns = SVector<f64, UNKNOWNS>;
 
-/// A domain under control.
+/// A domain under control of the feedback linearisation.
 #[derive(Debug, Clone)]
 pub(super) struct Control<'a> {
     pub(super) model: &'a WalkerModel,
@@ -41,9 +42,9 @@ pub(super) struct Control<'a> {
     pub(super) contacts: Vec<Contact>,
     pub(super) constraints: VirtualConstraints,
     pub(super) guard: Guard,
-    /// How fast the hip velocity is brought back where it is an output, 1/s; 0: left alone.
+    /// Gain of the hip velocity if it is an output, 1/s; 0 for a free hip velocity.
     pub(super) hip_gain: f64,
-    /// Duration in the gait, s.
+    /// Planned duration, s.
     pub(super) nominal_duration: f64,
 }
 
@@ -63,7 +64,7 @@ fn accelerations(unknowns: &Unknowns) -> [f64; 9] {
 }
 
 impl<'a> Control<'a> {
-    /// Of domain `d` of a well-formed gait.
+    /// Domain `d` of a well-formed gait.
     pub(super) fn new(model: &'a WalkerModel, gait: &Gait, d: usize) -> Self {
         let domain = CYCLE[d];
         Self {
@@ -77,7 +78,7 @@ impl<'a> Control<'a> {
         }
     }
 
-    /// How many contact forces the motion decides: all with one foot on the ground, else none.
+    /// Number of contact forces that the motion determines: all in single support, none in double support.
     fn decided_forces(&self) -> usize {
         match self.domain.kind {
             DomainKind::Ss2 | DomainKind::Ss1 => self.contacts.len(),
@@ -137,7 +138,7 @@ impl<'a> Control<'a> {
                 }
             }
         }
-        // Unknowns that the motion does not decide are zero.
+        // Unknowns that the motion does not determine are zero.
         for unused in 9 + forces..UNKNOWNS {
             a[(unused, unused)] = 1.0;
         }
@@ -149,24 +150,24 @@ impl<'a> Control<'a> {
         a.lu().solve(&b).filter(|y| y.iter().all(|v| v.is_finite()))
     }
 
-    /// Accelerations at a state; `None` where contacts and outputs do not determine them.
+    /// Accelerations at a state; `None` if contacts and outputs do not determine them.
     pub(super) fn acceleration(&self, x: &State) -> Option<[f64; 9]> {
         self.unknowns(x).map(|y| accelerations(&y))
     }
 
-    /// The contact force of a row, N, where the motion decides it.
+    /// The contact force of a row, N, if the motion determines it.
     pub(super) fn force(&self, x: &State, row: usize) -> Option<f64> {
         self.unknowns(x).map(|y| y[9 + row])
     }
 
-    /// Whether no normal force that the motion decides pulls.
+    /// Whether no normal force that the motion determines pulls on the ground.
     pub(super) fn stays_on_the_ground(&self, x: &State) -> bool {
         let Some(y) = self.unknowns(x) else { return false };
         let forces = &y.as_slice()[9..9 + self.decided_forces()];
         self.contacts.iter().zip(forces).all(|(contact, &force)| contact.row.axis == Axis::X || force >= -PULL_N)
     }
 
-    /// Derivatives of the unknowns by the state, by implicit differentiation: `A dy = -(dA y - db)`.
+    /// Derivatives of the unknowns with respect to the state, by implicit differentiation: `A dy = -(dA y - db)`.
     fn unknowns_by_state(&self, x: &State) -> Option<SMatrix<f64, UNKNOWNS, 18>> {
         let (a, b) = self.equations(x);
         let factors = a.lu();
@@ -174,7 +175,7 @@ impl<'a> Control<'a> {
         let (q, qd) = split(x);
         let qdd = accelerations(&y);
         let state = PointState::new(&q, &qd, &qdd);
-        // Residual of every equation, differentiated with y held.
+        // Derivative of each residual for constant y.
         let mut by_state = SMatrix::<f64, UNKNOWNS, 18>::zeros();
         let mut row = 0;
         for contact in &self.contacts {
@@ -237,7 +238,7 @@ impl<'a> Control<'a> {
         Some(result)
     }
 
-    /// d(contact force of a row)/d(state), where the motion decides it.
+    /// d(contact force of a row)/d(state), if the motion determines it.
     pub(super) fn force_by_state(&self, x: &State, row: usize) -> Option<State> {
         self.unknowns_by_state(x).map(|unknowns| unknowns.row(9 + row).transpose())
     }
@@ -249,18 +250,18 @@ impl System<18> for Control<'_> {
     }
 }
 
-/// A state and the derivative of the flow by the state it began from, column by column.
+/// A state, followed by the columns of the derivative of the flow with respect to the initial state.
 pub(super) const VARIATIONAL: usize = 18 + 18 * 18;
 
-/// The walker together with its variational equation `Phi' = df/dx Phi`.
+/// The walker with its variational equation `Phi' = df/dx Phi`.
 pub(super) struct Variational<'a, 'b>(pub(super) &'b Control<'a>);
 
-/// State and flow derivative of a variational state.
+/// Splits a variational state into state and flow derivative.
 pub(super) fn split_variational(z: &SVector<f64, VARIATIONAL>) -> (State, StateMatrix) {
     (State::from_column_slice(&z.as_slice()[..18]), StateMatrix::from_column_slice(&z.as_slice()[18..]))
 }
 
-/// The variational state of a state and a flow derivative.
+/// Joins a state and a flow derivative.
 pub(super) fn join_variational(x: &State, flow: &StateMatrix) -> SVector<f64, VARIATIONAL> {
     SVector::from_fn(|i, _| if i < 18 { x[i] } else { flow.as_slice()[i - 18] })
 }

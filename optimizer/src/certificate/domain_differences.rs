@@ -1,14 +1,13 @@
-//! A second opinion on the stride-to-stride map: differences of simulated domains, which use no derivative of motion,
+//! The derivative of the stride-to-stride map by differences of simulated domains, without derivatives of motion,
 //! guards or impacts.
 //!
-//! The map of a stride is that of its eight domains, one after the other. Each is differentiated for itself, and the
-//! derivatives are multiplied: a multiplier of 1e-7 is eight contractions to about a tenth, of which differences get every
-//! one to many digits. Differences of whole strides would have to find it below their own noise. Only states that a
-//! walker can be in are compared: contact points on the ground and at rest. The other directions have multiplier 0,
-//! several times, and noise in a multiple zero looks like a multiplier far larger than itself.
+//! The map of a stride is the composition of its eight domains, so its derivative is the product of theirs. Each domain
+//! contracts by about a factor of ten, which differences resolve to many digits. The product, such as 1e-7, would be
+//! below the noise of differences over a whole stride. States are restricted to those with contact points on the ground
+//! and at rest. The other directions have a multiple multiplier 0, and noise in a multiple eigenvalue is amplified.
 //!
-//! Differences of three steps are extrapolated to step zero (Richardson 1911; Romberg's table); what the last extrapolation
-//! changes is what they resolve.
+//! Richardson extrapolation of central differences with three steps (Romberg's table) gives the limit. The change by
+//! the last extrapolation estimates the resolution.
 
 use super::control::{Control, State, split};
 use super::hybrid_walker::{Fall, HybridWalker};
@@ -17,26 +16,26 @@ use crate::body::PointState;
 use crate::gait::Axis;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Largest step of the differences, rad and rad/s; the others are its halves.
+/// Largest step of the differences, rad and rad/s. Each further step is half the previous one.
 const STEP: f64 = 1e-3;
-/// Steps that are extrapolated: errors of order 2, 4, 6.
+/// Number of steps: the extrapolation removes errors of order 2 and 4.
 const STEPS: usize = 3;
-/// A walker that falls within a step is tried again with a tenth of it, so often.
+/// Number of retries with a tenth of the step after a fall.
 const SMALLER_STEPS: usize = 2;
-/// Squared constraint gradients are of order 1 where they constrain, and rounding where they do not.
+/// Threshold between eigenvalues of constrained directions, which are of order 1, and rounding error.
 const UNCONSTRAINED: f64 = 1e-9;
 
-/// Derivative of the map on what a walker can do, in the basis of its directions.
+/// Derivative of the map on the admissible states, in an orthonormal basis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ByDifferences {
     /// Extrapolated from all steps.
     pub(super) finest: DMatrix<f64>,
-    /// Extrapolated from all but the finest extrapolation.
+    /// Without the last extrapolation.
     pub(super) coarser: DMatrix<f64>,
 }
 
-/// Directions of the section in which a walker can be moved at the start of a domain: an orthonormal basis of the states
-/// whose contact points stay on the ground and at rest.
+/// Admissible directions of the section at the start of a domain: an orthonormal basis of the changes of state that
+/// keep contact points on the ground and at rest.
 pub(super) fn possible_directions(control: &Control<'_>, x: &State) -> DMatrix<f64> {
     let (q, qd) = split(x);
     let state = PointState::new(&q, &qd, &[0.0; 9]);
@@ -106,7 +105,7 @@ fn extrapolated(difference: impl Fn(f64) -> Result<DMatrix<f64>, Fall>) -> Resul
     found
 }
 
-/// Derivative of a domain with its reset, from its basis into that of the next one.
+/// Derivative of a domain with its reset, from its basis to that of the next domain.
 fn passage_by_differences(
     walker: &HybridWalker<'_>,
     d: usize,

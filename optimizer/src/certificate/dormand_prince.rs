@@ -1,34 +1,33 @@
-//! Dormand and Prince's Runge-Kutta pair of orders 5 and 4 with step-size control and dense output.
-//!
-//! Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19; dense output and error control after Hairer, Norsett & Wanner,
-//! Solving Ordinary Differential Equations I, II.4-II.6.
+//! The Runge-Kutta pair of orders 5 and 4 of Dormand and Prince (J. Comput. Appl. Math. 6 (1980) 19), with step-size
+//! control and dense output (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, sections II.4 to
+//! II.6).
 
 use nalgebra::SVector;
 use thiserror::Error;
 
-/// Relative and absolute tolerance of one step, in the units of the state.
+/// Relative and absolute tolerance of a step, in the units of the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tolerance {
     pub(super) relative: f64,
     pub(super) absolute: f64,
 }
 
-/// Why an integration could not go on.
+/// The reason why an integration stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub(super) enum StepError {
-    /// The right-hand side cannot be evaluated.
-    #[error("contacts, virtual constraints and hip phase determine no motion there")]
+    /// The right-hand side does not exist.
+    #[error("contacts, virtual constraints and hip phase do not determine the motion")]
     Singular,
-    /// The error cannot be kept below the tolerance.
+    /// The step size fell below its minimum.
     #[error(
-        "the integration step became too small: contacts, virtual constraints and hip phase hardly determine a motion there"
+        "the integration step became too small, because contacts, virtual constraints and hip phase are nearly singular"
     )]
     TooSmall,
 }
 
-/// The time derivative of an autonomous system; `None` where it does not exist.
+/// An autonomous system of differential equations.
 pub(super) trait System<const N: usize> {
-    /// dx/dt at x.
+    /// dx/dt at x; `None` if it does not exist.
     fn derivative(&self, x: &SVector<f64, N>) -> Option<SVector<f64, N>>;
 }
 
@@ -41,7 +40,7 @@ const A: [[f64; 6]; 6] = [
     [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
-/// Difference of the two embedded solutions.
+/// Coefficients of the difference of the embedded solutions.
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 /// Highest coefficient of the dense output.
@@ -55,13 +54,13 @@ const D: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// Safety factor, and the range in which a step may change.
+/// Safety factor, and limits of the change of the step size.
 const SAFETY: f64 = 0.9;
 const CHANGE: (f64, f64) = (0.2, 5.0);
-/// Smallest step, s: far below the shortest domain (5 ms) and far above rounding.
+/// Smallest step, s: far below the shortest domain (5 ms) and far above the rounding error.
 const SMALLEST_STEP_S: f64 = 1e-11;
 
-/// One accepted step, with its continuous extension.
+/// A step with its dense output.
 pub(super) struct Step<const N: usize> {
     /// Length, s.
     pub(super) length: f64,
@@ -73,7 +72,7 @@ pub(super) struct Step<const N: usize> {
 }
 
 impl<const N: usize> Step<N> {
-    /// A step of the given length from `start`, whose derivative is `first`.
+    /// A step of a given length from `start`, where the derivative is `first`.
     pub(super) fn take(
         system: &impl System<N>,
         start: &SVector<f64, N>,
@@ -102,7 +101,7 @@ impl<const N: usize> Step<N> {
         &self.stages[6]
     }
 
-    /// Error estimate over tolerance; the step is accurate enough when this is at most 1.
+    /// Error estimate relative to the tolerance; at most 1 for an accurate step.
     fn error(&self, tolerance: Tolerance) -> f64 {
         let mut sum = 0.0;
         for i in 0..N {
@@ -113,7 +112,7 @@ impl<const N: usize> Step<N> {
         (sum / N as f64).sqrt()
     }
 
-    /// State at a share of the step, 0 to 1 (fourth order).
+    /// State at a fraction of the step, 0 to 1, by dense output of order four.
     pub(super) fn at(&self, share: f64) -> SVector<f64, N> {
         let rest = 1.0 - share;
         let difference = self.end - self.start;
@@ -138,7 +137,7 @@ pub(super) struct Integrator<'a, const N: usize, S> {
 }
 
 impl<'a, const N: usize, S: System<N>> Integrator<'a, N, S> {
-    /// From a state, with a longest step (s): events are looked for within steps.
+    /// Starts from a state with a largest step in s, which bounds the search for events in a step.
     pub(super) fn new(
         system: &'a S,
         state: &SVector<f64, N>,
@@ -159,7 +158,7 @@ impl<'a, const N: usize, S: System<N>> Integrator<'a, N, S> {
             let error = step.error(self.tolerance);
             let factor = if error > 0.0 { SAFETY * error.powf(-0.2) } else { CHANGE.1 };
             let accepted = error <= 1.0;
-            // NaN is not accepted, and shortens the step.
+            // A NaN error rejects the step and shortens it.
             let change = if factor.is_nan() { CHANGE.0 } else { factor.clamp(CHANGE.0, CHANGE.1) };
             self.next_length = (self.next_length * if accepted { change } else { change.min(1.0) }).min(self.longest);
             if accepted {
@@ -190,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pendulum_keeps_its_energy() {
+    fn pendulum_conserves_its_energy() {
         let start = SVector::from([1.2, 0.0]);
         let tolerance = Tolerance { relative: 1e-11, absolute: 1e-12 };
         let mut integrator = Integrator::new(&Pendulum, &start, tolerance, 0.1).unwrap();
@@ -199,7 +198,7 @@ mod tests {
             let step = integrator.step().unwrap();
             elapsed += step.length;
             assert!((energy(&step.end) - energy(&start)).abs() < 1e-9);
-            // The continuous extension meets both ends, and is of fourth order in between.
+            // The dense output interpolates both ends and has order four between them.
             assert_eq!(step.at(0.0), step.start);
             assert!((step.at(1.0) - step.end).amax() < 1e-15);
             assert!((energy(&step.at(0.4)) - energy(&start)).abs() < 1e-7);
@@ -207,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn halving_the_step_divides_the_error_by_two_to_the_fifth() {
+    fn error_has_order_five() {
         let start = SVector::from([1.0, 0.3]);
         let run = |steps: usize| {
             let mut x = start;

@@ -1,4 +1,4 @@
-//! What ends a domain: a function of the state that is positive within the domain and falls to zero at its end.
+//! Guards: functions of the state that are positive in a domain and vanish at its end.
 
 use super::contact::Contact;
 use super::control::{Control, State, split};
@@ -6,15 +6,15 @@ use crate::body::{PointState, WalkerModel};
 use crate::gait::{Axis, FootPoint};
 use crate::walking::{ContactRow, Domain, DomainKind};
 
-/// The end of a domain.
+/// The guard of a domain.
 #[derive(Debug, Clone)]
 pub(super) enum Guard {
-    /// A heel or toe reaches the ground: its height, m.
+    /// Height of a heel or toe that lands, m.
     Landing(Contact),
-    /// A contact force that the motion decides vanishes: the force of this row, N.
+    /// Contact force of a row that the motion determines, N.
     Unloading(usize),
-    /// The plan is over: `1 - s`. In DS3 the controller has two spare torques and takes the load off the trailing toe
-    /// itself, so the plan, not the physics, says when the toe leaves.
+    /// Rest of the phase, `1 - s`. In DS3 the controller has two redundant torques and unloads the trailing toe itself,
+    /// so the phase ends the domain.
     Plan,
 }
 
@@ -29,7 +29,7 @@ impl Guard {
         }
     }
 
-    /// Value at a state; `None` where the motion is not determined.
+    /// Value at a state; `None` if the motion is not determined.
     pub(super) fn value(&self, control: &Control<'_>, x: &State) -> Option<f64> {
         let (q, qd) = split(x);
         match self {
@@ -39,7 +39,7 @@ impl Guard {
         }
     }
 
-    /// Derivative by the state.
+    /// Derivative with respect to the state.
     pub(super) fn gradient(&self, control: &Control<'_>, x: &State) -> Option<State> {
         let (q, qd) = split(x);
         match self {

@@ -1,4 +1,4 @@
-//! The hybrid system under control: eight domains integrated one after the other, each to its guard, with its reset.
+//! The closed-loop hybrid system: each of the eight domains is integrated to its guard, followed by its reset.
 
 use super::control::{Control, State, StateMatrix, Variational, join_variational, split_variational};
 use super::dormand_prince::{Integrator, Step, StepError, System, Tolerance};
@@ -9,12 +9,12 @@ use crate::walking::{CYCLE, Impact};
 use nalgebra::SVector;
 use thiserror::Error;
 
-/// Why a simulated walker did not complete a domain.
+/// The reason why the simulated walker did not complete a domain.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Fall {
-    /// The event that ends the domain did not come within twice the domain's planned duration.
+    /// The guard was not reached within a multiple of the planned duration.
     #[error(
-        "the simulated walker falls: {domain}: the event that ends it has not come {elapsed_s:.3} s after its start (planned: {planned_s:.3} s)"
+        "the simulated walker falls in {domain}: after {elapsed_s:.3} s the event that ends the domain has not occurred (planned: {planned_s:.3} s)"
     )]
     GuardMissed {
         /// `DS2_R`, ...
@@ -24,50 +24,50 @@ pub enum Fall {
         /// Planned duration, s.
         planned_s: f64,
     },
-    /// The domain begins where its end already is.
-    #[error("the simulated walker falls: {domain}: begins beyond the event that ends it (by {amount:.2e})")]
+    /// The domain begins beyond its guard.
+    #[error("the simulated walker falls: {domain} begins beyond the event that ends it (by {amount:.2e})")]
     BeginsBeyondGuard {
         /// `DS2_R`, ...
         domain: &'static str,
-        /// Value of the guard, m, N or phase.
+        /// Value of the guard, in m, N or phase.
         amount: f64,
     },
-    /// The state cannot be integrated further.
-    #[error("the simulation cannot go on: {domain}: {reason}")]
+    /// The integration cannot continue.
+    #[error("the simulation stops in {domain}: {reason}")]
     NotIntegrable {
         /// `DS2_R`, ...
         domain: &'static str,
-        /// In words.
+        /// The reason, as text.
         reason: String,
     },
 }
 
-/// One completed domain.
+/// A completed domain.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
-    /// s.
+    /// Duration, s.
     pub(super) duration: f64,
-    /// State that the next domain begins with.
+    /// Initial state of the next domain.
     pub(super) after: State,
-    /// The impact that opens the next domain.
+    /// The impact at the start of the next domain.
     pub(super) impact: Option<Impact>,
 }
 
-/// A domain may last this many times its planned duration.
+/// Longest duration of a domain, as a multiple of the planned one.
 const LONGEST: f64 = 2.0;
-/// Longest integration step, planned durations.
+/// Longest integration step, as a fraction of the planned duration.
 const LONGEST_STEP: f64 = 0.1;
-/// Places within a step where the guard is looked at.
+/// Number of evaluations of the guard within a step.
 const GUARD_LOOKS: usize = 8;
-/// Refinements of an event by a step to it; each squares the error of the one before.
+/// Number of refinements of an event; each squares the error.
 const EVENT_REFINEMENTS: usize = 4;
 
-/// Tolerance of certified figures: three digits better than any of them is reported.
+/// Tolerance for reported numbers: three digits more than are reported.
 pub(super) const FINE: Tolerance = Tolerance { relative: 1e-10, absolute: 1e-11 };
-/// Tolerance of questions with a yes or no.
+/// Tolerance for decisions.
 pub(super) const COARSE: Tolerance = Tolerance { relative: 1e-6, absolute: 1e-7 };
 
-/// Watches a simulation: domain, time in it (s), state.
+/// Observer of a simulation: domain, time in it (s), state.
 pub(super) type Watch<'a> = &'a mut dyn FnMut(usize, f64, &State);
 
 /// The closed loop of a gait.
@@ -83,17 +83,17 @@ fn walker_part<const N: usize>(z: &SVector<f64, N>) -> State {
 }
 
 impl<'a> HybridWalker<'a> {
-    /// Of a well-formed gait.
+    /// The closed loop of a well-formed gait.
     pub(super) fn new(model: &'a WalkerModel, gait: &Gait) -> Self {
         Self { model, controls: (0..CYCLE.len()).map(|d| Control::new(model, gait, d)).collect(), tolerance: FINE }
     }
 
-    /// The same with another tolerance.
+    /// The same walker with another tolerance.
     pub(super) fn with_tolerance(&self, tolerance: Tolerance) -> Self {
         Self { tolerance, ..self.clone() }
     }
 
-    /// The same whose hip velocity nobody brings back: where it is an output, the controller keeps whatever it is.
+    /// The same walker with a free hip velocity: if it is an output, the controller keeps its present value.
     pub(super) fn with_free_hip_velocity(&self) -> Self {
         let mut walker = self.clone();
         for control in &mut walker.controls {
@@ -102,7 +102,7 @@ impl<'a> HybridWalker<'a> {
         walker
     }
 
-    /// One domain from a state to its event and through the reset.
+    /// Simulates a domain from a state to its guard and through the reset.
     pub(super) fn passage(&self, d: usize, start: &State, watch: Watch<'_>) -> Result<Passage, Fall> {
         let control = &self.controls[d];
         let (duration, before) = self.to_event(d, control, start, watch)?;
@@ -111,12 +111,12 @@ impl<'a> HybridWalker<'a> {
 
     fn after_event(&self, d: usize, duration: f64, before: State) -> Result<Passage, Fall> {
         let opens = CYCLE[(d + 1) % CYCLE.len()];
-        let (after, impact) =
-            reset(self.model, opens, &before).ok_or_else(|| not_integrable(opens.name(), "dependent contacts"))?;
+        let (after, impact) = reset(self.model, opens, &before)
+            .ok_or_else(|| not_integrable(opens.name(), "the contact rows are linearly dependent"))?;
         Ok(Passage { duration, after, impact })
     }
 
-    /// A stride from the start of DS2_R.
+    /// Simulates a stride from the start of DS2_R.
     pub(super) fn stride(&self, start: &State, watch: Watch<'_>) -> Result<Vec<Passage>, Fall> {
         let mut passages: Vec<Passage> = Vec::with_capacity(CYCLE.len());
         for d in 0..CYCLE.len() {
@@ -132,16 +132,16 @@ impl<'a> HybridWalker<'a> {
         Ok(passages.last().map_or(*start, |p| p.after))
     }
 
-    /// The state a stride later, and its derivative by the state at the start.
+    /// The state a stride later, and its derivative with respect to the initial state.
     ///
-    /// Per domain: the variational flow, then the projection along the motion onto the guard (a state that begins
-    /// elsewhere gets there at another time), then the derivative of the reset. This is the saltation matrix read on
+    /// In each domain the derivative is the variational flow, then the projection along the motion onto the guard (a
+    /// changed state reaches it at another time), then the derivative of the reset: the saltation matrix, restricted to
     /// the sections.
     pub(super) fn stride_with_derivative(&self, start: &State) -> Result<(State, StateMatrix), Fall> {
         let (mut x, mut derivative) = (*start, StateMatrix::identity());
         for (d, control) in self.controls.iter().enumerate() {
             let name = control.domain.name();
-            let singular = || not_integrable(name, "the motion is not determined at its end");
+            let singular = || not_integrable(name, "the motion is not determined at the end of the domain");
             let system = Variational(control);
             let begin = join_variational(&x, &StateMatrix::identity());
             let (duration, end) = self.to_event(d, &system, &begin, &mut |_, _, _| {})?;
@@ -157,7 +157,7 @@ impl<'a> HybridWalker<'a> {
         Ok((x, derivative))
     }
 
-    /// Integrates to the guard of domain `d`: time and state there.
+    /// Integrates domain `d` to its guard. Returns time and state there.
     fn to_event<const N: usize, S: System<N>>(
         &self,
         d: usize,
@@ -200,7 +200,7 @@ impl<'a> HybridWalker<'a> {
     }
 }
 
-/// A step from the same start that ends on the guard, by Newton's method on its length.
+/// Shortens a step such that it ends on the guard, by Newton's method for its length.
 fn refine<const N: usize, S: System<N>>(
     control: &Control<'_>,
     system: &S,
@@ -217,7 +217,7 @@ fn refine<const N: usize, S: System<N>>(
         let gradient = control.guard.gradient(control, &x).ok_or_else(singular)?;
         let rate = gradient.dot(&control.derivative(&x).ok_or_else(singular)?);
         if rate >= 0.0 {
-            return Err(not_integrable(name, "the event that ends it is only grazed"));
+            return Err(not_integrable(name, "the trajectory only grazes the event that ends the domain"));
         }
         length = (length - value / rate).clamp(0.0, step.length);
     }

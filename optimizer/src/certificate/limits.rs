@@ -1,16 +1,16 @@
-//! C3, C4 at one instant: by how much a motion with its torques and forces exceeds what walker, device, settings and
-//! tuned bounds allow. Zero or negative: within.
+//! Violations of C3 and C4 at one instant: how much motion, torques and forces exceed the limits of walker, device,
+//! settings and tuned bounds. Zero or negative values satisfy the limit.
 
 use crate::body::{PointState, WalkerModel};
 use crate::gait::{Axis, FootPoint, Gait, Side};
 use crate::walking::{ContactRow, Domain};
 
-/// A gait laboratory takes a foot to be on the ground from this vertical force on; less decides nothing, N.
+/// Vertical force from which a gait laboratory registers contact, N. Smaller violations are irrelevant in practice.
 pub(super) const CONTACT_THRESHOLD_N: f64 = 20.0;
-/// What that force carries by friction (coefficient 0.6), N.
+/// Friction of that force at a coefficient of 0.6, N.
 pub(super) const FRICTION_THRESHOLD_N: f64 = 12.0;
 
-/// Ranges of the walker's coordinates, velocities and torques.
+/// Ranges of coordinates, velocities and torques.
 #[derive(Debug, Clone)]
 pub(super) struct Limits {
     angle: [(f64, f64); 7],
@@ -21,7 +21,7 @@ pub(super) struct Limits {
     contact_force: f64,
 }
 
-/// Excesses of one instant, in SI units.
+/// Violations at one instant, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Excess {
     /// Joint and trunk angles, rad.
@@ -41,7 +41,7 @@ fn worst(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Limits {
-    /// Of a gait.
+    /// The limits of a gait.
     pub(super) fn new(gait: &Gait) -> Self {
         let (bounds, limits, device) = (&gait.bounds, &gait.settings.limits, &gait.device);
         let torso = bounds.a6.max(limits.torso_tolerance_rad);
@@ -58,7 +58,7 @@ impl Limits {
             angle: [both(torso), both(hip), knee, both(ankle), both(hip), knee, prosthetic_ankle],
             speed,
             acceleration: bounds.a2,
-            // Written out again, as everything here: the certificate must not agree with the optimiser by construction.
+            // Repeated here on purpose: the certificate must be independent of the gait problem.
             torque: [
                 both(limits.hip_torque_n_m),
                 both(limits.knee_torque_n_m),
@@ -72,7 +72,7 @@ impl Limits {
         }
     }
 
-    /// Excesses of the motion.
+    /// Violations of the motion.
     pub(super) fn motion(&self, q: &[f64; 9], qd: &[f64; 9], qdd: &[f64; 9]) -> Excess {
         Excess {
             angle: worst(q[2..].iter().zip(self.angle).map(|(&value, range)| beyond(value, range))),
@@ -86,12 +86,12 @@ impl Limits {
         &self.torque
     }
 
-    /// Excess of the torques, N m.
+    /// Violation of the torque limits, N m.
     pub(super) fn torque(&self, u: &[f64; 6]) -> f64 {
         worst(u.iter().zip(self.torque).map(|(&value, range)| beyond(value, range)))
     }
 
-    /// How much the ground would have to pull, or exceed the largest force, N.
+    /// Violation of unilateral contact or of the largest force, N.
     pub(super) fn normal_force(&self, rows: &[ContactRow], forces: &[f64]) -> f64 {
         worst(rows.iter().zip(forces).map(|(row, &force)| match row.axis {
             Axis::Z => beyond(force, (0.0, self.contact_force)),
@@ -104,7 +104,7 @@ impl Limits {
         self.friction
     }
 
-    /// Tangential force of a foot beyond its friction cone, N.
+    /// Violation of the friction cone of a foot, N.
     pub(super) fn friction(&self, rows: &[ContactRow], forces: &[f64]) -> f64 {
         worst([Side::Left, Side::Right].into_iter().filter(|&side| rows.iter().any(|r| r.side == side)).map(|side| {
             let sum = |axis: Axis| -> f64 {
@@ -115,7 +115,7 @@ impl Limits {
     }
 }
 
-/// How deep the heels and toes that are not in contact are below the ground, m.
+/// Depth below the ground of the heels and toes that are not in contact, m.
 pub(super) fn depth_below_ground(model: &WalkerModel, domain: Domain, state: &PointState) -> f64 {
     let contacts = domain.contact_rows();
     let free = |point: FootPoint, side: Side| !contacts.iter().any(|c| c.point == point && c.side == side);

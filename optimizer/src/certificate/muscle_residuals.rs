@@ -1,4 +1,4 @@
-//! C5-C12 of the gait as it stands.
+//! Residuals of C5 to C12.
 
 use super::check::{Place, Quantity, Worst};
 use super::residuals::{Findings, GridPoint, Measured};
@@ -7,14 +7,14 @@ use crate::gait::motion::MuscleInstant;
 use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
 use crate::settings::GaitLimits;
 
-const FORCE: Measured = Measured::new("C5-C7 fibre and tendon in equilibrium", "F_max", 1e-6, None);
+const FORCE: Measured = Measured::new("C5-C7 equilibrium of fibre and tendon", "F_max", 1e-6, None);
 const VELOCITY: Measured = Measured::new("C8 fibre velocity", "l_opt/s", 1e-4, Some(0.5));
-const LENGTH: Measured = Measured::new("C8 fibre lengths follow their velocities", "l_opt", 1e-6, None);
-const TORQUE: Measured = Measured::new("C9-C12 joint torques are the muscles'", "N m", 1e-4, None);
+const LENGTH: Measured = Measured::new("C8 fibre lengths from their velocities", "l_opt", 1e-6, None);
+const TORQUE: Measured = Measured::new("C9-C12 joint torques of the muscles", "N m", 1e-4, None);
 const RANGE: Measured = Measured::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
 const RESET: Quantity = Quantity::judged("C8 continuity of fibre lengths", "l_opt", 1e-6);
 
-/// Measures one grid point.
+/// Measures a grid point.
 pub(super) fn note(
     point: &GridPoint<'_>,
     table: &[Muscle; MUSCLE_COUNT],
@@ -47,7 +47,7 @@ pub(super) fn note(
     worst.note(point, &RANGE, excess);
 }
 
-/// How far the fibre lengths that are written at a node are from those of the cubic through the interval's ends.
+/// Distance of the fibre lengths at a node from the cubic through the ends of its interval.
 pub(super) fn note_written(
     point: &GridPoint<'_>,
     written: &[f64; MUSCLE_COUNT],
@@ -58,7 +58,7 @@ pub(super) fn note_written(
     worst.note(point, &LENGTH, apart);
 }
 
-/// Fibre lengths from a domain's end to the next one's start.
+/// Continuity of the fibre lengths from one domain to the next.
 pub(super) fn note_reset(before: &MuscleTrajectory, after: &MuscleTrajectory, place: Place<'_>, worst: &mut Worst) {
     if let (Some(last), Some(first)) = (before.fibre_length.last(), after.fibre_length.first()) {
         let jump = last.iter().zip(first).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

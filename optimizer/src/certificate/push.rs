@@ -1,9 +1,9 @@
 //! The largest push from which the closed loop recovers.
 //!
-//! A push changes the hip's forward velocity at the start of SS2_R, the first instant with one foot on the ground: an
-//! impulse at the hip with the contact impulses that keep the foot where it is. Recovered means: no domain misses its
-//! end, the one foot on the ground is never pulled, and after some strides the motion is the periodic one again. Torques
-//! are those of the ideal controller; their limits are not imposed here.
+//! A push changes the forward velocity of the hip at the start of SS2_R, the first instant of single support: an
+//! impulse at the hip, with the contact impulses that keep the foot in place. The walker recovers if every domain
+//! reaches its guard, the ground never pulls on the foot in single support, and the motion is periodic again after some
+//! strides. The torques are those of the ideal controller without limits.
 
 use super::control::{State, join, split};
 use super::hybrid_walker::{COARSE, Fall, HybridWalker};
@@ -14,16 +14,16 @@ use serde::{Deserialize, Serialize};
 
 /// Domain of the push: SS2_R.
 const PUSHED_DOMAIN: usize = 2;
-/// Largest push that is tried, m/s.
+/// Largest push in the search, m/s.
 pub const LARGEST_PUSH_M_S: f64 = 1.0;
-/// Resolution of the answer, m/s.
+/// Resolution of the search, m/s.
 const RESOLUTION_M_S: f64 = 0.01;
-/// Strides in which the walker must be back.
+/// Number of strides within which the walker must recover.
 pub const RECOVERY_STRIDES: usize = 10;
-/// Being back: largest difference to the periodic motion, rad and rad/s.
+/// Largest distance from the periodic motion after a recovery, rad and rad/s.
 const RECOVERED: f64 = 1e-3;
 
-/// Largest changes of the hip's forward velocity that are recovered, m/s; they end at [`LARGEST_PUSH_M_S`].
+/// Largest changes of the forward hip velocity from which the walker recovers, m/s; at most [`LARGEST_PUSH_M_S`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pushes {
     /// Forwards.
@@ -32,7 +32,7 @@ pub struct Pushes {
     pub backwards_m_s: f64,
 }
 
-/// The state with the hip `change` faster (m/s) and the contacts of the pushed domain kept.
+/// The state after a push of `change` m/s that keeps the contacts of the domain.
 fn pushed(walker: &HybridWalker<'_>, x: &State, change: f64) -> Option<State> {
     let (q, qd) = split(x);
     let control = &walker.controls[PUSHED_DOMAIN];
@@ -59,7 +59,7 @@ fn pushed(walker: &HybridWalker<'_>, x: &State, change: f64) -> Option<State> {
     Some(join(&q, &velocity))
 }
 
-/// Whether the walker comes back to the periodic motion after a push.
+/// Whether the walker recovers from a push.
 fn recovers(walker: &HybridWalker<'_>, periodic: &State, at_push: &State, change: f64) -> Result<bool, Fall> {
     let Some(mut x) = pushed(walker, at_push, change) else { return Ok(false) };
     let mut grounded = true;
@@ -76,14 +76,14 @@ fn recovers(walker: &HybridWalker<'_>, periodic: &State, at_push: &State, change
     Ok(false)
 }
 
-/// Bisects in both directions from the periodic motion.
+/// The largest pushes in both directions, by bisection.
 pub(super) fn pushes(walker: &HybridWalker<'_>, periodic: &State) -> Result<Pushes, Fall> {
     let walker = walker.with_tolerance(COARSE);
     let mut at_push = *periodic;
     for d in 0..PUSHED_DOMAIN {
         at_push = walker.passage(d, &at_push, &mut |_, _, _| {})?.after;
     }
-    // A fall is an answer here.
+    // A fall means that the walker does not recover.
     let survives = |change: f64| recovers(&walker, periodic, &at_push, change).unwrap_or(false);
     let largest = |direction: f64| {
         let (mut good, mut bad) = (0.0, LARGEST_PUSH_M_S);

@@ -1,4 +1,4 @@
-//! The reset at the end of a domain: a plastic impact into DS2 and DS3, else nothing; with its derivative.
+//! The reset between domains, with its derivative: a plastic impact before DS2 and DS3, otherwise the identity.
 
 use super::contact::{Contact, force_by_angle};
 use super::control::{State, StateMatrix, join, split};
@@ -6,8 +6,7 @@ use crate::body::{InverseDynamics, PointState, WalkerModel};
 use crate::walking::{Domain, Impact, impact};
 use nalgebra::DMatrix;
 
-/// The state after the reset into a domain, and the impulses where there is an impact; `None` where the contact rows are
-/// dependent.
+/// The state after the reset, and the impulses of an impact. `None` if the contact rows are linearly dependent.
 pub(super) fn reset(model: &WalkerModel, opens: Domain, x: &State) -> Option<(State, Option<Impact>)> {
     if !opens.opens_with_impact() {
         return Some((*x, None));
@@ -17,14 +16,14 @@ pub(super) fn reset(model: &WalkerModel, opens: Domain, x: &State) -> Option<(St
     Some((join(&q, &impact.velocity_after), Some(impact)))
 }
 
-/// d(state after)/d(state before): the impact equations `M (v+ - v-) = J^T L`, `J v+ = 0` differentiated.
+/// d(state after)/d(state before), by differentiation of the impact equations `M (v+ - v-) = J^T L`, `J v+ = 0`.
 pub(super) fn reset_by_state(model: &WalkerModel, opens: Domain, x: &State) -> Option<StateMatrix> {
     let (_, Some(impact)) = reset(model, opens, x)? else { return Some(StateMatrix::identity()) };
     let (q, before) = split(x);
     let after = impact.velocity_after;
     let contacts = Contact::of_domain(model, opens);
     let dynamics = InverseDynamics::without_gravity(model);
-    // The momentum change is the inverse dynamics of the velocity jump at rest.
+    // The change of momentum is the inverse dynamics of the velocity jump at rest.
     let jump: [f64; 9] = std::array::from_fn(|i| after[i] - before[i]);
     let momentum = dynamics.jacobian(&PointState::new(&q, &[0.0; 9], &jump));
     let moving = PointState::new(&q, &after, &[0.0; 9]);
@@ -77,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn the_derivative_is_that_of_the_impact() {
+    fn derivative_matches_differences_of_the_impact() {
         let model = WalkerModel::new(&Subject::builtin(1).unwrap(), &Device::ampro3().unwrap()).unwrap();
         for domain in CYCLE.into_iter().filter(|d| d.opens_with_impact()) {
             let exact = reset_by_state(&model, domain, &state()).unwrap();
@@ -94,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impact_stops_the_contacts_and_makes_no_energy() {
+    fn impact_stops_the_contacts_and_dissipates_energy() {
         let model = WalkerModel::new(&Subject::builtin(2).unwrap(), &Device::ampro3().unwrap()).unwrap();
         let (q, before) = split(&state());
         for domain in CYCLE.into_iter().filter(|d| d.opens_with_impact()) {

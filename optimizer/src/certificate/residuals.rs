@@ -1,4 +1,4 @@
-//! C1-C4 of the gait as it stands, at its nodes and on a grid ten times finer.
+//! Residuals of C1 to C4 at the nodes and on a grid ten times finer.
 
 use super::check::{Check, Place, Quantity, Worst};
 use super::contact::Contact;
@@ -10,13 +10,12 @@ use crate::gait::motion::{Instant, instant};
 use crate::gait::{Axis, FootPoint, Gait, Side};
 use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
-/// Grid points per gap between nodes.
+/// Number of grid points between adjacent nodes.
 pub(super) const REFINEMENT: usize = 10;
 
-/// A quantity with what is allowed at the nodes, where the gait problem imposed it, and between them, where it
-/// follows from them as far as the mesh is fine enough. `None`: reported only. Those are the quantities in which the
-/// torques and muscle states between the points occur, a parabola that nobody executes: what a controller applies
-/// there, the closed loop says.
+/// A quantity with two limits: at the nodes, where the gait problem imposes the constraint, and between them, where the
+/// error depends on the mesh. Quantities of torques and muscle states have no limit between nodes (`None`), because no
+/// device executes these parabolas; the closed loop checks the torques of the controller.
 pub(super) struct Measured {
     name: &'static str,
     unit: &'static str,
@@ -30,7 +29,7 @@ impl Measured {
     }
 }
 
-// At the points: a millionth (the tolerance of a converged gait) of the unit in which the gait problem measures.
+// At nodes: 1e-6, the tolerance of a converged gait, times the scale of the row in the gait problem.
 const FORCE: Measured = Measured::new("C1 equations of motion, forces", "N", 1e-4, None);
 const MOMENT: Measured = Measured::new("C1 equations of motion, moments", "N m", 1e-4, None);
 const CONTACT_POSITION: Measured = Measured::new("C1 contact position", "m", 1e-6, Some(1e-3));
@@ -58,14 +57,14 @@ const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3
 const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
 const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "m, s", 1e-6);
 
-/// One grid point.
+/// A grid point.
 pub(super) struct GridPoint<'a> {
     pub(super) instant: &'a Instant,
     place: Place<'a>,
     on_mesh: bool,
 }
 
-/// The worst values at the nodes, between them, and of everything else.
+/// The worst values at the nodes, between them, and of quantities of the whole stride.
 #[derive(Default)]
 pub(super) struct Findings {
     at_points: Worst,
@@ -96,7 +95,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.map(f64::abs).fold(0.0, f64::max)
 }
 
-/// Everything measured on a well-formed gait without simulating it.
+/// Measures a well-formed gait without simulation.
 pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
     let limits = Limits::new(gait);
     let table = gait.settings.muscles.muscles(&gait.subject);
@@ -150,10 +149,10 @@ struct DomainResiduals<'a> {
 }
 
 impl DomainResiduals<'_> {
-    /// Where a contact row's point stands on the ground, m.
+    /// Position on the ground of the point of a contact row, m.
     fn foothold(&self, contact: &Contact) -> f64 {
         let gait = self.gait;
-        // Right toe at 0; left toe one step ahead, or (trailing, right stance) that step less a stride.
+        // The right toe is at 0. The left toe is one step ahead or, trailing in right stance, that step minus a stride.
         let toe = match (contact.row.side, self.domain.stance) {
             (Side::Right, _) => 0.0,
             (Side::Left, Side::Left) => gait.right_step_length_m,
@@ -239,13 +238,13 @@ impl DomainResiduals<'_> {
         worst.note(point, &TORQUE, self.limits.torque(u));
     }
 
-    /// Least force of contact row `c`: what gradual weight transfer leaves on the trailing foot, and what a
-    /// contact has until it lifts off, N.
+    /// Smallest allowed force of contact row `c`, N: the load of the trailing foot in gradual weight transfer, and the
+    /// load of a contact before it lifts off.
     fn kept_load(&self, c: usize, row: ContactRow, share: f64) -> Option<f64> {
         let settings = &self.gait.settings;
         let at_heel_strike = settings.naturalness.trailing_load_share * self.model.total_mass * GRAVITY;
         let trails = row.axis == Axis::Z && row.side != self.domain.stance;
-        // Linear from heel strike to toe-off, half of it in each domain of double support.
+        // Linear from heel strike to toe-off; half of the decrease in each domain of double support.
         let transferred = match self.domain.kind {
             DomainKind::Ds2 if trails => Some(at_heel_strike * (1.0 - share / 2.0)),
             DomainKind::Ds3 if trails => Some(at_heel_strike * (1.0 - share) / 2.0),
@@ -256,7 +255,7 @@ impl DomainResiduals<'_> {
         transferred.into_iter().chain(until_lift_off).reduce(f64::max)
     }
 
-    /// The impulses of the impact that opens a domain, N s: none too large, and at heel strike within the friction cone.
+    /// Checks the impulses of an impact: their limit, and the friction cone at heel strike.
     fn impulses(&self, kind: DomainKind, impulse: &[f64], place: Place<'_>, worst: &mut Worst) {
         let limits = &self.gait.settings.limits;
         worst.note(IMPULSE_SIZE, largest(impulse.iter().copied()) - limits.impulse_max_n_s, place);
@@ -265,7 +264,7 @@ impl DomainResiduals<'_> {
         }
     }
 
-    /// Height `c (4 w (1 - w))^2` that the swing foot keeps, w the share of the swing, m.
+    /// Required height of the swing foot, `c (4 w (1 - w))^2` at the fraction w of the swing, m.
     fn wanted_clearance(&self, share: f64) -> Option<f64> {
         let duration = |d: usize| self.gait.domains[d].duration_s;
         let (before, swing) = match self.domain.kind {
@@ -278,7 +277,7 @@ impl DomainResiduals<'_> {
         Some(clearance * (4.0 * w * (1.0 - w)).powi(2))
     }
 
-    /// The jump from this domain's last point to the next one's first.
+    /// The discontinuity between the last node of the domain and the first node of the next one.
     fn reset(&self, worst: &mut Findings) {
         let next = (self.d + 1) % CYCLE.len();
         let (from, to) = (&self.gait.domains[self.d], &self.gait.domains[next]);

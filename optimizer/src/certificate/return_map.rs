@@ -1,7 +1,7 @@
-//! The stride-to-stride map at right heel strike: its fixed point, its multipliers, and a second opinion on them.
+//! The stride-to-stride map at right heel strike: its fixed point, and its multipliers by two methods.
 //!
-//! The section is the state after right heel strike without px, on which nothing depends: 17 numbers. Contacts make
-//! many of its directions impossible; those have multiplier 0 and are left out.
+//! The section is the state after right heel strike without px, on which nothing depends: 17 numbers. Directions that
+//! violate the contacts have multiplier 0 and are omitted.
 
 use super::control::{State, StateMatrix, split};
 use super::domain_differences::{ByDifferences, by_differences, possible_directions};
@@ -10,22 +10,22 @@ use nalgebra::linalg::Schur;
 use nalgebra::{DMatrix, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// Numbers of the section.
+/// Dimension of the section.
 pub(super) const SECTION: usize = 17;
-/// State without px.
+/// A state without px.
 pub(super) type Section = SVector<f64, SECTION>;
 /// Derivative of the map.
 type SectionMatrix = SMatrix<f64, SECTION, SECTION>;
 
-/// Newton steps to the fixed point, and the change (rad, rad/s) at which it is reached.
+/// Largest number of Newton steps to the fixed point, and the residual (rad, rad/s) at convergence.
 const NEWTON_STEPS: usize = 8;
 const FIXED_POINT: f64 = 1e-8;
-/// Both methods must agree on the largest multiplier to this, relative.
+/// Largest relative difference of the largest multiplier between both methods.
 const AGREEMENT: f64 = 1e-3;
-/// Most iterations of the eigenvalue iteration.
+/// Largest number of iterations for the eigenvalues.
 const SCHUR_ITERATIONS: usize = 10_000;
 
-/// One Poincare multiplier.
+/// A multiplier: an eigenvalue of the derivative of the Poincare map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Multiplier {
     /// Real part.
@@ -41,30 +41,30 @@ impl Multiplier {
     }
 }
 
-/// What the stride-to-stride map says of a gait.
+/// Fixed point and multipliers of the stride-to-stride map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReturnMap {
-    /// Largest change of the section's state over one stride from the gait's own first state, rad and rad/s.
+    /// Largest change of the state over one stride from the first state of the gait, rad and rad/s.
     pub gait_residual: f64,
-    /// The same at the fixed point of the closed loop near it.
+    /// The same from the fixed point of the closed loop.
     pub fixed_point_residual: f64,
-    /// Largest distance from the gait's first state to the fixed point, rad and rad/s.
+    /// Largest distance between the first state of the gait and the fixed point, rad and rad/s.
     pub fixed_point_distance: f64,
-    /// Multipliers from variational equations and saltation, largest first.
+    /// Multipliers by variational equations and saltation, largest modulus first.
     pub multipliers: Vec<Multiplier>,
-    /// Largest modulus of them.
+    /// Largest modulus of these multipliers.
     pub largest: f64,
-    /// Largest modulus of the multipliers from differences of simulated domains.
+    /// Largest modulus of the multipliers by differences of simulated domains.
     pub largest_by_differences: f64,
-    /// What the last extrapolation of the differences changed in it: what they resolve.
+    /// Change of that modulus by the last extrapolation: the resolution of the differences.
     pub differences_resolve: f64,
-    /// What a stride leaves of a change of all velocities in proportion, which keeps contacts and virtual constraints: its
-    /// share in that very direction. A multiplier only as far as the direction is carried into itself, which the switch from
-    /// SS2 to SS1 by force prevents; the multiplier of the zero dynamics is [`Self::largest`] of the map whose hip velocity is
-    /// left alone.
+    /// Response of the map to a proportional change of all velocities, which preserves contacts and virtual
+    /// constraints: the component of the result in that direction. It is a multiplier only if the direction is
+    /// invariant, which the transition from SS2 to SS1 by force prevents. The multiplier of the zero dynamics is
+    /// [`Self::largest`] of the map with a free hip velocity.
     #[serde(alias = "zero_dynamics")]
     pub speed_kept: f64,
-    /// What the stride turns such a change into in other directions, over its size.
+    /// Norm of the response in the other directions, relative to the change.
     #[serde(alias = "zero_dynamics_leak")]
     pub speed_leak: f64,
 }
@@ -75,8 +75,8 @@ impl ReturnMap {
         (self.largest - self.largest_by_differences).abs() / self.largest.max(f64::MIN_POSITIVE)
     }
 
-    /// Whether both methods agree: to a thousandth, or as far as differences resolve where that is more, and they resolve
-    /// what matters.
+    /// Whether both methods agree within the relative limit or the resolution of the differences, and the resolution is
+    /// sufficient.
     pub fn methods_agree(&self) -> bool {
         let difference = (self.largest - self.largest_by_differences).abs();
         difference <= (AGREEMENT * self.largest).max(self.differences_resolve)
@@ -101,8 +101,8 @@ fn section_matrix(derivative: &StateMatrix) -> SectionMatrix {
     derivative.fixed_view::<SECTION, SECTION>(1, 1).into_owned()
 }
 
-/// Fixed point of the map near a state, by Newton's method (so that an unstable one is found too); the state itself
-/// where Newton's method does not get closer.
+/// Fixed point of the map near a state, by Newton's method, which also finds unstable ones. The state itself if
+/// Newton's method makes no progress.
 fn fixed_point(walker: &HybridWalker<'_>, start: &State) -> Result<State, Fall> {
     let mut best = *start;
     let mut smallest = f64::INFINITY;
@@ -121,11 +121,11 @@ fn fixed_point(walker: &HybridWalker<'_>, start: &State) -> Result<State, Fall> 
         let Some(step) = (SectionMatrix::identity() - section_matrix(&derivative)).lu().solve(&change) else { break };
         x = with_section(&x, &(section(&x) + step));
     }
-    // A walker that falls in its very first stride says why.
+    // A fall in the first stride is an error with a reason.
     if smallest.is_finite() { Ok(best) } else { walker.after_stride(start).map(|_| best) }
 }
 
-/// Eigenvalues, largest modulus first; `None` when the iteration does not end.
+/// Eigenvalues, largest modulus first; `None` if the iteration does not converge.
 fn multipliers(matrix: DMatrix<f64>) -> Option<Vec<Multiplier>> {
     let schur = Schur::try_new(matrix, f64::EPSILON, SCHUR_ITERATIONS)?;
     let mut values: Vec<Multiplier> =
@@ -134,7 +134,7 @@ fn multipliers(matrix: DMatrix<f64>) -> Option<Vec<Multiplier>> {
     Some(values)
 }
 
-/// Checks the map near the gait's first state.
+/// The map near the first state of the gait.
 pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(State, ReturnMap), Fall> {
     let residual = |x: &State| walker.after_stride(x).map(|after| (section(&after) - section(x)).amax());
     let fixed = fixed_point(walker, start)?;
@@ -142,7 +142,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
     let derivative = section_matrix(&derivative);
     let no_eigenvalues = || Fall::NotIntegrable {
         domain: "stride",
-        reason: "the eigenvalues of the stride-to-stride map cannot be found".to_owned(),
+        reason: "the eigenvalues of the stride-to-stride map did not converge".to_owned(),
     };
     let possible = possible_directions(&walker.controls[0], &fixed);
     let on_possible = possible.transpose() * derivative * &possible;
@@ -151,7 +151,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
     let largest = |matrix| multipliers(matrix).map(|found| found.first().map_or(0.0, Multiplier::modulus));
     let by_differences = largest(finest).ok_or_else(no_eigenvalues)?;
     let less_fine = largest(coarser).ok_or_else(no_eigenvalues)?;
-    // Velocities in proportion keep contacts and virtual constraints.
+    // A proportional change of velocities preserves contacts and virtual constraints.
     let (_, qd) = split(&fixed);
     let faster = Section::from_fn(|i, _| if i < 8 { 0.0 } else { qd[i - 8] });
     let carried = derivative * faster;

@@ -1,4 +1,4 @@
-//! The simulated walker against mechanics and against differences, on a gait of a coarse mesh.
+//! Tests of the simulation against mechanics and finite differences, on a gait of a coarse mesh.
 
 use super::control::{BANDWIDTH, Control, State, join, split};
 use super::dormand_prince::System;
@@ -27,7 +27,7 @@ fn model() -> WalkerModel {
     WalkerModel::new(&gait().subject, &gait().device).unwrap()
 }
 
-/// A state of every domain: its middle point, a little off the virtual constraints.
+/// A state of each domain: its middle node, slightly off the virtual constraints.
 fn states() -> Vec<State> {
     gait()
         .domains
@@ -60,7 +60,7 @@ fn assert_derivative(exact: &State, value: impl Fn(&State) -> f64, x: &State) {
 }
 
 #[test]
-fn derivatives_of_motion_and_guards_match_differences() {
+fn derivatives_of_motion_and_guards_match_finite_differences() {
     let model = model();
     for (control, x) in controls(&model).iter().zip(states()) {
         let exact = control.derivative_by_state(&x).unwrap();
@@ -73,7 +73,7 @@ fn derivatives_of_motion_and_guards_match_differences() {
 }
 
 #[test]
-fn contacts_hold_and_outputs_are_driven_as_asked() {
+fn accelerations_satisfy_contacts_and_output_dynamics() {
     let model = model();
     let limits = Limits::new(gait());
     for (d, (control, x)) in controls(&model).iter().zip(states()).enumerate() {
@@ -91,7 +91,7 @@ fn contacts_hold_and_outputs_are_driven_as_asked() {
             let asked = -2.0 * BANDWIDTH * rate - BANDWIDTH * BANDWIDTH * error;
             assert!((acceleration - asked).abs() < 1e-8, "{} {output}", control.domain.name());
         }
-        // Torques and forces make this acceleration: all nine equations of motion.
+        // Torques and forces satisfy all nine equations of motion.
         let plan = instant(&gait().domains[d], phase.s).u;
         let effort = control.effort(&x, &qdd, &plan, &limits).unwrap();
         let mut rest = crate::body::InverseDynamics::new(&model).rows(&state);
@@ -108,14 +108,14 @@ fn contacts_hold_and_outputs_are_driven_as_asked() {
 }
 
 #[test]
-fn a_change_of_speed_alone_becomes_what_the_map_says() {
+fn map_predicts_the_response_to_a_change_of_speed() {
     let model = model();
     let walker = HybridWalker::new(&model, gait());
     let start = join(&gait().domains[0].q[0], &gait().domains[0].qd[0]);
     let (periodic, regulated) = return_map(&walker, &start).unwrap();
     let free_walker = walker.with_free_hip_velocity();
     let (periodic, free) = return_map(&free_walker, &periodic).unwrap();
-    // Faster by a thousandth in every velocity: contacts and virtual constraints hold as before.
+    // A proportional change of all velocities by 0.1 % preserves contacts and virtual constraints.
     let changed = |share: f64| {
         let x = State::from_fn(|i, _| if i < 9 { periodic[i] } else { periodic[i] * (1.0 + share) });
         free_walker.after_stride(&x).unwrap()
@@ -124,7 +124,7 @@ fn a_change_of_speed_alone_becomes_what_the_map_says() {
     let carried = (changed(1e-3) - changed(-1e-3)).rows(9, 9) / 2e-3;
     let multiplier = carried.dot(&rates) / rates.norm_squared();
     assert!((multiplier - free.speed_kept).abs() < 1e-3 * free.speed_kept.abs());
-    // The hip velocity is brought back in six of the eight domains: next to nothing of a change is left.
+    // The controller regulates the hip velocity in six of the eight domains, so almost nothing of the change remains.
     assert!(regulated.speed_kept.abs() < 1e-2 * multiplier);
 }
 
@@ -137,7 +137,7 @@ fn energy(model: &WalkerModel, x: &State) -> f64 {
 }
 
 #[test]
-fn energy_changes_by_the_work_of_the_joints_alone() {
+fn energy_changes_by_the_work_of_the_joints() {
     let model = model();
     let limits = Limits::new(gait());
     let walker = HybridWalker::new(&model, gait());
@@ -154,7 +154,7 @@ fn energy_changes_by_the_work_of_the_joints_alone() {
         walker.passage(d, &join(&domain.q[0], &domain.qd[0]), &mut watch).unwrap();
         let work: f64 = samples.windows(2).map(|w| 0.5 * (w[1].0 - w[0].0) * (w[0].1 + w[1].1)).sum();
         let gained = samples.last().unwrap().2 - samples[0].2;
-        // The trapezoidal rule over the integrator's steps.
+        // The trapezoidal rule over the steps of the integrator.
         assert!((work - gained).abs() < 2e-3 * (1.0 + gained.abs()), "{}: {work} {gained}", domain.name);
     }
 }

@@ -1,10 +1,10 @@
-//! The torques and ground forces that make a wanted acceleration.
+//! Torques and ground reaction forces for a given acceleration: `M qdd + h = B u + J^T f`.
 //!
-//! `M qdd + h = B u + J^T f`. With one foot on the ground they are unique. In double support they are not (one spare
-//! direction in DS2, two in DS3): a convex quadratic programme picks the torques nearest to the gait's own at the same
-//! phase, subject to unilateral contact, friction and torque limits. These give way, all by the same share, at a
-//! price that is only paid when they must. Optimal gaits leave the trailing foot almost without load, at the edge of all
-//! three: the periodic motion may cross it by a little, and how much is the answer.
+//! In single support the solution is unique. In double support it is redundant, by one dimension in DS2 and two in DS3:
+//! a convex quadratic programme chooses the torques nearest to those of the gait at the same phase, subject to
+//! unilateral contact, friction and torque limits. One slack variable with a large penalty relaxes these limits
+//! together. Optimal gaits leave the trailing foot almost unloaded, on the boundary of the limits, and the periodic
+//! motion may cross it slightly; the slack measures by how much.
 
 use super::control::{Control, State, split};
 use super::limits::Limits;
@@ -14,31 +14,31 @@ use crate::walking::DomainKind;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
-/// Torques are compared in units of this, N m.
+/// Unit of the torques in the programme, N m.
 const TORQUE_UNIT_N_M: f64 = 100.0;
-/// Forces are counted in units of this, N.
+/// Unit of the forces in the programme, N.
 const FORCE_UNIT_N: f64 = 500.0;
-/// Equations of motion without a torque.
+/// Number of equations of motion without a torque.
 const UNACTUATED: usize = 3;
 
-/// What the controller applies, and what the ground answers.
+/// Torques of the controller and ground reaction forces.
 #[derive(Debug, Clone)]
 pub(super) struct Effort {
     pub(super) u: [f64; 6],
     pub(super) forces: Vec<f64>,
 }
 
-/// Price of a unit of excess over all limits; far above any gain in torque, so that it is paid only when it must.
+/// Penalty on the slack: far above any gain in torque, so that the slack is positive only if the limits are infeasible.
 const EXCESS_PRICE: f64 = 1e4;
 
-/// Rows `a . (f, excess) <= bound` of the programme, dense; equations come first.
+/// Dense rows `a . (f, excess) <= bound` of the programme; equations come first.
 struct Rows {
     coefficients: Vec<Vec<f64>>,
     bounds: Vec<f64>,
 }
 
 impl Control<'_> {
-    /// Torques and forces of an acceleration; `None` when no forces make it. The caller judges their limits.
+    /// Torques and forces of an acceleration; `None` if no forces produce it. The caller checks the limits.
     pub(super) fn effort(&self, x: &State, qdd: &[f64; 9], plan: &[f64; 6], limits: &Limits) -> Option<Effort> {
         let (q, qd) = split(x);
         let state = PointState::new(&q, &qd, qdd);
@@ -58,7 +58,7 @@ impl Control<'_> {
         Some(Effort { u, forces })
     }
 
-    /// `min |u(f) - plan|^2 / 2 + price * excess` over the contact forces f.
+    /// Minimises `|u(f) - plan|^2 / 2 + penalty * excess` over the contact forces f.
     fn distribute(
         &self,
         wanted: &[f64; 9],
@@ -67,7 +67,7 @@ impl Control<'_> {
         limits: &Limits,
     ) -> Option<Vec<f64>> {
         let count = gradients.len();
-        // u = offset + slope f, in their units.
+        // u = offset + slope f, in the units of the programme.
         let slope = |i: usize, c: usize| -gradients[c][3 + i] * FORCE_UNIT_N / TORQUE_UNIT_N_M;
         let offset = |i: usize| wanted[3 + i] / TORQUE_UNIT_N_M;
         let mut quadratic = vec![vec![0.0; count + 1]; count + 1];

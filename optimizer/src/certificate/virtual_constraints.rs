@@ -1,24 +1,24 @@
-//! The gait's own virtual constraints of one domain, as a controller uses them.
+//! The virtual constraints of a domain of the gait, as its controller uses them.
 
 use crate::body::WalkerModel;
 use crate::gait::{DomainTrajectory, Gait};
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, basis, phase_gradient};
 
-/// Outputs `q_o - y(s)` with `s = (dp - start) / width`, and the hip velocity where it is an output.
+/// Outputs `q_o - y(s)` with `s = (dp - start) / width`, and the hip velocity if it is an output.
 #[derive(Debug, Clone)]
 pub(super) struct VirtualConstraints {
-    /// Driven coordinates (indices into q).
+    /// Driven coordinates, as indices into q.
     pub(super) outputs: Vec<usize>,
     bezier: Vec<[f64; BEZIER_COEFFICIENTS]>,
     /// d(dp)/d(the seven angles), m/rad.
     pub(super) gradient: [f64; 7],
     start: f64,
     width: f64,
-    /// Wanted rate of dp, m/s.
+    /// Set point of the rate of dp, m/s.
     pub(super) hip_velocity: Option<f64>,
 }
 
-/// s with its first two time derivatives.
+/// The phase s with its first two time derivatives.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Phase {
     pub(super) s: f64,
@@ -26,11 +26,11 @@ pub(super) struct Phase {
     pub(super) acceleration: f64,
 }
 
-/// A desired output with its derivatives by s.
+/// A desired output with its derivatives with respect to s.
 pub(super) type Desired = [f64; 4];
 
 impl VirtualConstraints {
-    /// Of domain `d` of a well-formed gait.
+    /// The virtual constraints of domain `d` of a well-formed gait.
     pub(super) fn new(model: &WalkerModel, gait: &Gait, d: usize) -> Self {
         let trajectory: &DomainTrajectory = &gait.domains[d];
         Self {
@@ -52,7 +52,7 @@ impl VirtualConstraints {
         [self.along(q), self.along(qd), self.along(qdd)]
     }
 
-    /// The phase.
+    /// Phase with its time derivatives.
     pub(super) fn phase(&self, q: &[f64; 9], qd: &[f64; 9], qdd: &[f64; 9]) -> Phase {
         let [position, velocity, acceleration] = self.hip(q, qd, qdd);
         Phase {
@@ -62,7 +62,7 @@ impl VirtualConstraints {
         }
     }
 
-    /// ds/d(the seven angles), which is also d(rate)/d(angle rates).
+    /// ds/d(the seven angles), which equals d(rate)/d(angle rates).
     pub(super) fn phase_gradient(&self) -> [f64; 7] {
         self.gradient.map(|g| g / self.width)
     }

@@ -1,4 +1,5 @@
-//! From postures to a motion: Bezier fits per domain, their derivatives, and contact-consistent torques and forces.
+//! The motion of the initial guess: Bezier fits of the postures in each domain, their derivatives, and torques and
+//! forces consistent with the contacts.
 
 use super::GuessSettings;
 use crate::body::{InverseDynamics, PointState};
@@ -7,13 +8,13 @@ use crate::muscle::MUSCLE_COUNT;
 use crate::walking::{BEZIER_COEFFICIENTS, basis};
 use nalgebra::{DMatrix, DVector};
 
-/// Largest velocities and accelerations of the guess, rad/s and rad/s².
+/// Largest velocity (rad/s) and acceleration (rad/s²) of the initial guess.
 const RATE_LIMIT: f64 = 8.0;
 const ACCELERATION_LIMIT: f64 = 40.0;
 /// Damping of the least-squares torques and forces.
 const DAMPING: f64 = 1e-3;
 
-/// Writes a motion through the postures `q[d][k]` into a scaled variable vector.
+/// Writes a motion through the postures `q[domain][node]` to a scaled vector of variables.
 pub fn guess(programme: &GaitProgramme, postures: &[Vec<[f64; 9]>], settings: &GuessSettings) -> Vec<f64> {
     let layout = &programme.layout;
     let mut x = vec![0.0; layout.variables];
@@ -65,11 +66,11 @@ pub fn guess(programme: &GaitProgramme, postures: &[Vec<[f64; 9]>], settings: &G
     x
 }
 
-/// Least-squares Bezier coefficients of each coordinate over equidistant points.
+/// Least-squares Bezier coefficients of each coordinate at equidistant nodes.
 fn fit(postures: &[[f64; 9]]) -> [[f64; BEZIER_COEFFICIENTS]; 9] {
     let points = postures.len();
     let matrix = DMatrix::from_fn(points, BEZIER_COEFFICIENTS, |k, i| basis(k as f64 / (points - 1) as f64)[0][i]);
-    // Slight damping towards the neighbouring coefficients keeps coarse meshes determined.
+    // Slight damping towards the adjacent coefficients makes the fit unique on coarse meshes.
     let mut normal = matrix.transpose() * &matrix;
     for i in 1..BEZIER_COEFFICIENTS {
         for (a, b, sign) in [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)] {
@@ -87,13 +88,13 @@ fn fit(postures: &[[f64; 9]]) -> [[f64; BEZIER_COEFFICIENTS]; 9] {
     result
 }
 
-/// Damped least squares of `M qdd + h = B u + J^T lambda`, clipped.
+/// Torques and forces at a node by damped least squares of `M qdd + h = B u + J^T lambda`, clipped to their bounds.
 fn torques_and_forces(programme: &GaitProgramme, d: usize, point: &mut PointVariables) {
     let state = PointState::new(&point.q, &point.qd, &point.qdd);
     let motion = InverseDynamics::new(&programme.model).rows(&state);
     let contacts = programme.layout.domains[d].contacts;
     let columns = 6 + contacts;
-    // Unknowns in units of 100 N m and 500 N.
+    // Unknowns are in units of 100 N m and 500 N.
     let mut matrix = DMatrix::<f64>::zeros(9, columns);
     for i in 0..6 {
         matrix[(3 + i, i)] = 100.0;

@@ -1,21 +1,21 @@
-//! From a motion with torques to muscle states: forces by non-negative least squares, then tendon, fibre, activation.
+//! The muscle states of the initial guess: forces by non-negative least squares, then tendon, fibre and activation.
 
 use crate::gait_problem::{GaitProgramme, PointVariables};
 use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
-/// Force towards which the redundancy is resolved, F_max.
+/// Force to which the redundancy is resolved, F_max.
 const REST_FORCE: f64 = 0.02;
-/// Its weight against torque errors of 100 N m.
+/// Weight of the distance from that force, relative to torque errors of 100 N m.
 const REST_WEIGHT: f64 = 0.03 * 0.03;
-/// Range of the force guess, F_max.
+/// Range of the forces, F_max.
 const FORCE_RANGE: (f64, f64) = (1e-3, 1.2);
 /// Tendon strain at F_max.
 const REFERENCE_STRAIN: f64 = 0.04;
 
-/// Takes a point without muscles (`x_plain` of `plain`) into the layout of `programme` and fills the muscle states.
-/// Where no force distribution is found, the muscles rest.
+/// Converts a point without muscles (`x_plain` of `plain`) to the layout of `programme` and adds the muscle states. If
+/// no force distribution is found, the muscles are at rest.
 pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) -> Vec<f64> {
     let mut x = programme.adopt_globals(plain, x_plain);
     for (d, domain) in programme.layout.domains.iter().enumerate() {
@@ -52,7 +52,7 @@ pub fn guess(programme: &GaitProgramme, plain: &GaitProgramme, x_plain: &[f64]) 
     x
 }
 
-/// `min |(A F - u)/100|^2 + w |F - rest|^2` over F >= 0 in units of F_max, u the four muscle-driven torques.
+/// Minimises `|(A F - u)/100|^2 + w |F - rest|^2` over F >= 0 in units of F_max; u are the four torques of the muscles.
 fn distribute(muscles: &[Muscle; MUSCLE_COUNT], point: &PointVariables) -> Option<[f64; MUSCLE_COUNT]> {
     let mut a = [[0.0; MUSCLE_COUNT]; 4];
     for (m, muscle) in muscles.iter().enumerate() {

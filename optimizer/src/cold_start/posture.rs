@@ -1,9 +1,9 @@
-//! Inverse kinematics over the whole stride: angles near the reference, contacts exact, feet above the ground, smooth.
+//! The postures of the initial guess: inverse kinematics over the whole stride.
 //!
-//! minimise `|q[2..] - q_ref|^2 + 0.3 (px - px0)^2 + w |second differences|^2` over all points of the stride, subject
-//! to the contact positions, non-negative heights of the other foot points, and joint ranges. Solved as a short
-//! sequence of convex QPs with linearised kinematics. Where bounds leave no such posture, every row may give way at a
-//! price: this is a guess, and whether there is a gait is for the gait problem to say.
+//! Minimises `|q[2..] - q_ref|^2 + 0.3 (px - px0)^2 + w |second differences|^2` over all nodes of the stride, subject
+//! to contact positions, non-negative heights of the other foot points, and joint ranges, by a short sequence of convex
+//! QPs with linearised kinematics. If a QP is infeasible, slack variables with a penalty relax every row, because an
+//! initial guess need not be feasible.
 
 use super::GuessSettings;
 use crate::body::PointState;
@@ -16,25 +16,25 @@ use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverSt
 const HIP_WEIGHT: f64 = 0.3;
 /// Weight of second differences, relative to the tracking weight 1.
 const SMOOTHNESS: f64 = 30.0;
-/// Price of what a row gives way, m^2 or rad^2, once there is no posture that meets all of them.
+/// Penalty on the squared slack of a row (m or rad) if the QP is infeasible.
 const ROW_PRICE: f64 = 1e4;
-/// Linearisations.
+/// Largest number of linearisations.
 const PASSES: usize = 8;
-/// Stop when no coordinate moves more than this, m or rad: what the contacts are then off by, a few millimetres, is the
-/// solver's to close, and another pass takes as long as two of its iterations.
+/// Largest change of a coordinate at convergence, m or rad. The contacts are then off by a few millimetres, which the
+/// solver removes faster than another linearisation would.
 const STEP_TOLERANCE: f64 = 0.05;
 
-/// Gap and residual of a QP's solution: a five-hundredth of the step that ends the passes.
+/// Tolerances of duality gap and residuals of a QP: 1/500 of the step at convergence.
 const GUESS_TOLERANCE: f64 = 1e-4;
 
-/// One instant of the stride: the points of the domains that share it.
+/// An instant of the stride: the nodes that share it.
 struct Instant {
-    /// (domain, point).
+    /// Domain and node.
     members: Vec<(usize, usize)>,
     fraction: f64,
 }
 
-/// The instants of the stride: ends of adjacent domains are one instant.
+/// The instants of the stride. The last node of a domain and the first node of the next one share an instant.
 fn instants(programme: &GaitProgramme) -> Vec<Instant> {
     let mut result: Vec<Instant> = Vec::new();
     for (d, domain) in programme.layout.domains.iter().enumerate() {
@@ -49,7 +49,7 @@ fn instants(programme: &GaitProgramme) -> Vec<Instant> {
     result
 }
 
-/// Rows of a sparse matrix being written, as triplets.
+/// A sparse matrix under construction, as triplets.
 #[derive(Default)]
 struct Triplets {
     rows: Vec<usize>,
@@ -69,17 +69,17 @@ impl Triplets {
     }
 }
 
-/// Whether the rows of a step must be met.
+/// Treatment of the rows of a QP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Rows {
-    /// Each of them.
+    /// Every row must hold.
     Hard,
-    /// Each may give way at [`ROW_PRICE`]: there is always a step.
+    /// Slack variables with the penalty [`ROW_PRICE`] relax every row, so that the QP is feasible.
     Soft,
 }
 
-/// Coordinates of every point of every domain: `result[d][k]`. As near to the contacts and ranges as the bounds allow, and
-/// as the passes before `cancel` says that nobody waits for it.
+/// Coordinates of each node, `result[domain][node]`. They satisfy contacts and ranges as well as the bounds, and the
+/// linearisations before a cancellation, allow.
 pub fn solve(programme: &GaitProgramme, guess: &GuessSettings, cancel: &dyn Fn() -> bool) -> Vec<Vec<[f64; 9]>> {
     let instants = instants(programme);
     let stride = guess.stride_length_m;
@@ -138,7 +138,7 @@ pub fn solve(programme: &GaitProgramme, guess: &GuessSettings, cancel: &dyn Fn()
     result
 }
 
-/// Joint ranges of the guess, inside the ranges of the programme.
+/// Joint ranges of the initial guess, within those of the problem.
 fn joint_range(coordinate: usize, torso: (f64, f64), hip_ankle: [(f64, f64); 9]) -> Option<(f64, f64)> {
     let (low, high) = match coordinate {
         0 | 1 => return None,
@@ -150,7 +150,7 @@ fn joint_range(coordinate: usize, torso: (f64, f64), hip_ankle: [(f64, f64); 9])
     Some((low.max(own.0), high.min(own.1)))
 }
 
-/// The step over all points; `None` when there is none with such rows.
+/// The step of all nodes; `None` if the QP has no solution.
 #[allow(clippy::too_many_arguments)] // one call
 fn linearised_step(
     programme: &GaitProgramme,
@@ -164,7 +164,7 @@ fn linearised_step(
 ) -> Option<Vec<f64>> {
     let count = instants.len();
     let coordinates = 9 * count;
-    // Objective 1/2 x'Px + c'x over the step x.
+    // Objective 1/2 x'Px + c'x of the step x.
     let mut p = Triplets::default();
     let mut c = vec![0.0; coordinates];
     for i in 0..count {
@@ -178,12 +178,13 @@ fn linearised_step(
             c[9 * i + coordinate] += 2.0 * weight * (q[i][coordinate] - targets[i][coordinate]);
         }
     }
-    // The last instant is the first of the next stride: smoothness within the stride only, periodicity by equality.
+    // The last instant is the first one of the next stride: equality rows impose periodicity, and second differences
+    // stay within the stride.
     for i in 1..count - 1 {
         let (before, after) =
             (instants[i].fraction - instants[i - 1].fraction, instants[i + 1].fraction - instants[i].fraction);
         let scale = 2.0 / (before + after);
-        // Divided second difference over 1/80 of a stride.
+        // Divided second difference, scaled to steps of 1/80 of a stride.
         let h = (1.0_f64 / 80.0).powi(2);
         let stencil = [h * scale / before, -h * scale * (1.0 / before + 1.0 / after), h * scale / after];
         for coordinate in 0..9 {
@@ -276,7 +277,7 @@ fn linearised_step(
     rhs.extend(inequality_rhs);
     let mut n = coordinates;
     if rows_are == Rows::Soft {
-        // One more unknown for each row: by how much it gives way.
+        // One slack variable for each row.
         for row in 0..ne + ni {
             rows.push(row, n, -1.0);
             p.push(n, n, 2.0 * ROW_PRICE);
@@ -284,7 +285,7 @@ fn linearised_step(
         }
         c.resize(n, 0.0);
     }
-    // Neither equilibration nor refinement: metres and radians are of one size, and a guess needs no more digits than it has.
+    // Neither equilibration nor refinement: metres and radians have similar magnitudes, and the tolerance is loose.
     let settings = DefaultSettingsBuilder::default()
         .verbose(false)
         .equilibrate_enable(false)

@@ -1,22 +1,22 @@
-//! Muscle activity of a gait in shares of normal walking: curves, averages, distance.
+//! Muscle activity of a gait relative to normal walking: curves, averages and EMG RMSE.
 
 use super::{CycleActivity, EmgRmse, emg_rmse};
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// Muscle activity over the gait cycle, in shares of the peaks of normal walking.
+/// Muscle activity over the gait cycle, relative to the peaks of normal walking.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Activity {
-    /// Each channel of normal walking, in its order.
+    /// The channels, in the order of normal walking.
     pub channels: Vec<CycleActivity>,
     /// Mean over the cycle of each channel.
     pub averages: Vec<f64>,
-    /// Distance from normal walking; none for normal walking itself.
+    /// Distance from normal walking; `None` for normal walking itself.
     pub emg_rmse: Option<EmgRmse>,
 }
 
 impl Activity {
-    /// Of normal walking, whose peaks are 1.
+    /// Activity of normal walking; its peaks are 1.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] for a channel without activity.
@@ -24,11 +24,11 @@ impl Activity {
         Ok(Self::new(normalised(normal, normal)?, None))
     }
 
-    /// Of another gait.
+    /// Activity of another gait.
     ///
     /// # Errors
-    /// [`ModelError::Unknown`] for a channel that the gait lacks, [`ModelError::Malformed`] for one without activity in
-    /// normal walking.
+    /// [`ModelError::Unknown`] for a channel that is missing in the gait, [`ModelError::Malformed`] for one without
+    /// activity in normal walking.
     pub fn of_gait(gait: &[CycleActivity], normal: &[CycleActivity]) -> Result<Self, ModelError> {
         let channels = normalised(gait, normal)?;
         let distance = emg_rmse(&channels, &normalised(normal, normal)?)?;
@@ -40,7 +40,7 @@ impl Activity {
     }
 }
 
-/// The channels of normal walking, in its order, in shares of its peaks.
+/// Normalises the channels by the peaks of normal walking, in the order of normal walking.
 fn normalised(gait: &[CycleActivity], normal: &[CycleActivity]) -> Result<Vec<CycleActivity>, ModelError> {
     normal.iter().map(|normal| normal.same_channel(gait)?.normalised_by(normal)).collect()
 }

@@ -1,29 +1,29 @@
-//! The mean activity of a muscle over the gait cycle, and how far two of them are apart.
+//! Mean activity of a muscle over the gait cycle, and EMG RMSE.
 
 use super::{CYCLE_POINTS, Envelope};
 use crate::reference::STRIDE_RANGE_S;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// Activity of one channel over the gait cycle at 0, 1, ..., 100 %, mean over strides.
+/// Activity of one channel at 0, 1, ..., 100 % of the gait cycle, as mean over strides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CycleActivity {
     /// Name of the channel.
     pub channel: String,
-    /// Mean; in the unit of the recording, or in shares of the peak that it was divided by.
+    /// Mean, in the unit of the recording or, after normalisation, relative to a peak.
     pub mean: Vec<f64>,
-    /// Standard deviation over strides; zero for one stride.
+    /// Standard deviation over strides; 0 for one stride.
     pub standard_deviation: Vec<f64>,
-    /// How many strides.
+    /// Number of strides.
     pub strides: usize,
 }
 
 impl CycleActivity {
-    /// Cuts an envelope at heel strikes (s, in order). Strides that are too short or too long to be walking, or not
-    /// wholly recorded, are left out.
+    /// Segments an envelope at heel strikes, in s and increasing. Drops strides of implausible duration and strides
+    /// that the recording covers in part only.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] when no stride is left.
+    /// [`ModelError::Malformed`] if no stride is left.
     pub fn cut(envelope: &Envelope, heel_strikes_s: &[f64]) -> Result<Self, ModelError> {
         let strides: Vec<(f64, f64)> = heel_strikes_s
             .windows(2)
@@ -33,7 +33,7 @@ impl CycleActivity {
             .collect();
         if strides.is_empty() {
             let reason = format!(
-                "none of the {} strides lasts {} to {} s within the recording",
+                "none of the {} strides is within the recording and lasts {} to {} s",
                 heel_strikes_s.len().saturating_sub(1),
                 STRIDE_RANGE_S.0,
                 STRIDE_RANGE_S.1
@@ -53,19 +53,19 @@ impl CycleActivity {
         Ok(Self { channel: envelope.channel.clone(), mean, standard_deviation, strides: strides.len() })
     }
 
-    /// Largest mean activity.
+    /// Largest mean activity over the cycle.
     pub fn peak(&self) -> f64 {
         self.mean.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// In shares of the peak of normal walking, so that another gait may exceed 1.
+    /// Activity relative to the peak of normal walking. It may exceed 1.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] when normal walking shows no activity.
+    /// [`ModelError::Malformed`] if normal walking has no activity.
     pub fn normalised_by(&self, normal_walking: &Self) -> Result<Self, ModelError> {
         let peak = normal_walking.peak();
         if peak.is_nan() || peak <= 0.0 {
-            let reason = format!("normal walking peaks at {peak}: nothing to normalise by");
+            let reason = format!("the peak of normal walking is {peak}; normalisation needs a positive peak");
             return Err(ModelError::Malformed { what: format!("channel {}", self.channel), reason });
         }
         let divided = |values: &[f64]| values.iter().map(|value| value / peak).collect();
@@ -88,35 +88,35 @@ impl CycleActivity {
     }
 }
 
-/// EMG RMSE of a gait and its parts, in shares of the peak of normal walking.
+/// EMG RMSE of a gait and its parts, relative to the peaks of normal walking.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EmgRmse {
     /// Sum of the parts.
     pub total: f64,
-    /// RMS difference of each channel of normal walking, in its order.
+    /// RMS difference of each channel, in the order of normal walking.
     pub parts: Vec<f64>,
-    /// What makes the comparison doubtful, for people.
+    /// Warnings about doubtful channels.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
-/// No gait is so many times as active as normal walking.
+/// Ratio of peaks above which a channel is doubtful.
 const LARGEST_PEAK: f64 = 10.0;
 
-/// What is said of a channel that is far more active than in normal walking.
+/// The warning for a channel that is implausibly more active than in normal walking.
 fn doubt(activity: &CycleActivity, normal: &CycleActivity) -> Option<String> {
     let times = activity.peak() / normal.peak();
     (times > LARGEST_PEAK).then(|| {
         let name = &activity.channel;
-        format!("{name} peaks at {times:.1} times the peak of normal walking: are both recorded in one unit?")
+        format!("the peak of {name} is {times:.1} times that of normal walking; check that both recordings have the same unit")
     })
 }
 
 /// EMG RMSE of a gait against normal walking: `sum_i sqrt(mean((s_i - n_i)^2))` over the channels of normal walking.
-/// (The paper prints the square only on the outside; without one inside, the mean may be negative.)
+/// The paper omits the square inside the mean, without which the mean could be negative.
 ///
 /// # Errors
-/// [`ModelError::Unknown`] for a channel that the gait lacks.
+/// [`ModelError::Unknown`] for a channel that is missing in the gait.
 pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<EmgRmse, ModelError> {
     let (mut parts, mut remarks) = (Vec::new(), Vec::new());
     for normal in normal_walking {

@@ -1,4 +1,4 @@
-//! Measured activity beside the activations of the model, where the model has the muscle.
+//! Comparison of measured muscle activity with the activations of the model.
 
 use super::{CYCLE_POINTS, CycleActivity};
 use crate::gait::Gait;
@@ -6,11 +6,10 @@ use crate::muscle::MUSCLES;
 use crate::reference::ReferenceGait;
 use serde::{Deserialize, Serialize};
 
-/// Channel and muscle that belong together. Rectus femoris has no muscle of its own in the model: it is part of hip
-/// flexors and vasti.
+/// Channels and the corresponding muscles. The model has no rectus femoris; it is part of hip flexors and vasti.
 const COUNTERPARTS: [(&str, &str); 4] = [("TA_L", "TA_L"), ("BF_L", "HAM_L"), ("GAS_L", "GAS_L"), ("BF_R", "HAM_R")];
 
-/// The activation of the muscle of a channel over the gait cycle, and how near the measured activity is to it.
+/// Activation of the muscle of a channel over the gait cycle, and its agreement with the measured activity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelActivity {
     /// Name of the channel.
@@ -19,13 +18,13 @@ pub struct ModelActivity {
     pub muscle: String,
     /// Activation at 0, 1, ..., 100 % of the cycle, 0 to 1.
     pub activation: Vec<f64>,
-    /// RMS difference of activation and measured activity, which is in shares of the peak of normal walking.
+    /// RMS difference of activation and measured activity relative to the peak of normal walking.
     pub rms_difference: f64,
-    /// Correlation over the cycle, which does not depend on scales; none where one of them is constant.
+    /// Correlation over the cycle; `None` if one of the curves is constant.
     pub correlation: Option<f64>,
 }
 
-/// The activation of the muscle that a channel measures; none without muscles, or where the model lacks it.
+/// Activation of the muscle that a channel measures. `None` without muscles, or if the model does not have the muscle.
 pub fn model_activity(gait: &Gait, measured: &CycleActivity) -> Option<ModelActivity> {
     let (_, muscle) = COUNTERPARTS.into_iter().find(|(channel, _)| *channel == measured.channel)?;
     let index = MUSCLES.iter().position(|known| known.name == muscle)?;

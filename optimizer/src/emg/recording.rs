@@ -1,4 +1,4 @@
-//! Raw signals as recorded.
+//! Raw EMG signals, and the checks that they are raw.
 
 use super::{CycleActivity, EmgSettings, Envelope};
 use crate::filter::{self, band_pass, low_pass};
@@ -7,20 +7,21 @@ use crate::reference::{contacts, given};
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table, lines_of};
 
-/// Sampling rates that are accepted where a file has no time, Hz.
+/// Allowed sampling rates of a file without a time column, Hz.
 const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
-/// A sample farther from the median than so many times what 99 of 100 samples keep within is no muscle's: those of bursts
-/// of activity reach about 10.
+/// Largest plausible distance of a sample from the median, as a multiple of the 99th percentile of these distances.
+/// Bursts of activity reach about 10.
 const FARTHEST_SAMPLE: f64 = 100.0;
-/// A rectified signal is within this share of its RMS of zero ...
+/// Distance from zero, as a share of the RMS, within which a sample counts as zero ...
 const NEAR_ZERO: f64 = 0.1;
-/// ... for this share of its samples or more: 8 of 100 for noise. One that an offset lifts above zero is hardly there.
+/// ... and the share of such samples from which a non-negative signal counts as rectified. For noise it is 8 %; a raw
+/// signal with an offset has almost none.
 const OFTEN: f64 = 0.02;
-/// Of a raw signal more than this share of its RMS about the mean is within the band: nine tenths of white noise, some
-/// hundredths of an envelope of 6 to 10 Hz.
+/// Smallest share of the RMS of a raw signal within the band of the filter. White noise has about 90 %, an envelope of
+/// 6 to 10 Hz a few per cent.
 const LEAST_IN_BAND: f64 = 0.1;
 
-/// Raw signals of several channels over the same time.
+/// Raw signals of several channels with common times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EmgRecording {
     /// Time of the first sample, s.
@@ -32,8 +33,8 @@ pub struct EmgRecording {
 }
 
 impl EmgRecording {
-    /// A table with one column per channel, evenly sampled. Its first column is `time_s`, unless `rate_hz` says how many
-    /// rows a second has. Lines that begin with `#` before the names are left out.
+    /// Parses an evenly sampled table with one column for each channel. The first column is `time_s`, unless `rate_hz`
+    /// gives the rows per second. Skips lines that begin with `#` before the names.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column, [`ModelError::OutOfRange`] for a rate out of range.
@@ -48,13 +49,13 @@ impl EmgRecording {
         if rate_hz.is_some()
             && let Some(time) = table.names().iter().find(|name| name.to_ascii_lowercase().starts_with("time"))
         {
-            let reason = format!("the column {time:?} has the time: rate_hz is for files without one");
+            let reason = format!("the file has a time column, {time:?}; rate_hz is for files without one");
             return Err(table.malformed_names(reason));
         }
         Self::from_table(&table)
     }
 
-    /// Columns of an OpenSim motion or storage file (.mot, .sto), evenly sampled.
+    /// Parses an evenly sampled OpenSim motion or storage file (.mot, .sto).
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -67,7 +68,7 @@ impl EmgRecording {
         let channels: Vec<(String, Vec<f64>)> =
             table.names().iter().filter_map(|name| Some((name.clone(), table.find(name)?))).collect();
         if channels.is_empty() {
-            return Err(table.malformed_names("there is no channel beside the time".to_owned()));
+            return Err(table.malformed_names("the file has no channel, only the time".to_owned()));
         }
         Ok(Self { start_s: table.times()[0], rate_hz, channels })
     }
@@ -86,14 +87,14 @@ impl EmgRecording {
         let found = self.channels.iter().find(|(known, _)| known == name);
         found.map(|(_, samples)| &samples[..]).ok_or_else(|| ModelError::Malformed {
             what: what.to_owned(),
-            reason: format!("column {name:?} is missing; there are {}", known()),
+            reason: format!("column {name:?} is missing; the columns are {}", known()),
         })
     }
 
-    /// The channels under the names that are wanted, each from a column of its own.
+    /// Selects columns and renames them to channels.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] for a column that is missing or wanted twice.
+    /// [`ModelError::Malformed`] for a column that is missing or selected twice.
     pub fn select<'a>(
         &self,
         what: &str,
@@ -103,8 +104,9 @@ impl EmgRecording {
         let mut taken: Vec<(&str, &str)> = Vec::new();
         for (channel, column) in wanted {
             if let Some((other, _)) = taken.iter().find(|(_, known)| *known == column) {
-                let reason =
-                    format!("column {column:?} is wanted for {other} and for {channel}: each muscle has its own");
+                let reason = format!(
+                    "column {column:?} is selected for both {other} and {channel}; each channel needs its own column"
+                );
                 return Err(ModelError::Malformed { what: what.to_owned(), reason });
             }
             channels.push((channel.to_owned(), self.column(what, column)?.to_vec()));
@@ -113,35 +115,36 @@ impl EmgRecording {
         Ok(Self { start_s: self.start_s, rate_hz: self.rate_hz, channels })
     }
 
-    /// Heel strikes, s: where the column of a foot switch or of a vertical force rises above the threshold.
+    /// Heel strikes, s: the times at which a foot switch or a vertical force rises above a threshold.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] for a column that is missing or tells of fewer than two.
+    /// [`ModelError::Malformed`] if the column is missing or has fewer than two heel strikes.
     pub fn strikes_of_column(&self, what: &str, column: &str, threshold: f64) -> Result<Vec<f64>, ModelError> {
         let signal = self.column(what, column)?;
         let times: Vec<f64> = (0..signal.len()).map(|k| self.start_s + k as f64 / self.rate_hz).collect();
         let strikes = contacts(&times, signal, threshold);
         if strikes.len() < 2 {
-            let reason =
-                format!("column {column:?} rises {} times above {threshold}, two make a stride", strikes.len());
+            let reason = format!(
+                "column {column:?} rises {} times above {threshold}; a stride needs two heel strikes",
+                strikes.len()
+            );
             return Err(ModelError::Malformed { what: what.to_owned(), reason });
         }
         Ok(strikes)
     }
 
-    /// Checks heel strikes that were told, s.
+    /// Checks given heel strikes, s.
     ///
     /// # Errors
-    /// [`ModelError`] when they are not in order or not within the recording.
+    /// [`ModelError`] if they do not increase or are outside the recording.
     pub fn check_strikes(&self, what: &str, heel_strikes_s: &[f64]) -> Result<(), ModelError> {
         given(what, heel_strikes_s, self.start_s, self.end_s())
     }
 
-    /// Checks that every channel is the raw signal of a muscle: it changes, no sample stands far out of all others, and
-    /// it was neither rectified nor smoothed.
+    /// Checks that each channel is a raw muscle signal: not constant, without outliers, neither rectified nor smoothed.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] naming the channel and the reason.
+    /// [`ModelError::Malformed`] with the channel and the reason.
     pub fn check_channels(&self) -> Result<(), ModelError> {
         for (channel, samples) in &self.channels {
             if let Some(reason) = self.no_muscle(samples) {
@@ -151,35 +154,35 @@ impl EmgRecording {
         Ok(())
     }
 
-    /// Why this is no raw signal of a muscle.
+    /// The reason why a channel is not a raw muscle signal, if any.
     fn no_muscle(&self, samples: &[f64]) -> Option<String> {
         let first = samples.first()?;
         if samples.iter().all(|sample| sample == first) {
-            return Some(format!("every sample is {first}: nothing was connected"));
+            return Some(format!("every sample is {first}; check that the electrode was connected"));
         }
         self.artefact(samples).or_else(|| self.smoothed(samples)).or_else(|| rectified(samples))
     }
 
-    /// Why a channel would pass for active: one sample stands out of all others.
+    /// Finds an outlier, which would inflate the activity.
     fn artefact(&self, samples: &[f64]) -> Option<String> {
         let median = quantile(samples.to_vec(), 0.5);
         let kept_within = quantile(samples.iter().map(|sample| (sample - median).abs()).collect(), 0.99);
         let place = samples.iter().position(|sample| (sample - median).abs() > FARTHEST_SAMPLE * kept_within)?;
         let time_s = self.start_s + place as f64 / self.rate_hz;
         Some(format!(
-            "{} at {time_s:.4} s is more than {FARTHEST_SAMPLE} times as far from the median as 99 of 100 samples are \
-             ({kept_within:.3e}): an artefact that would pass for activity",
+            "the sample {} at {time_s:.4} s is an artefact: it is more than {FARTHEST_SAMPLE} times as far from the median as 99 % of \
+             the samples ({kept_within:.3e})",
             samples[place]
         ))
     }
 
-    /// Why a channel is an envelope: hardly anything of it is where the signals of muscles are.
+    /// Detects an envelope, which has little signal in the frequency band of muscles.
     fn smoothed(&self, samples: &[f64]) -> Option<String> {
         let EmgSettings { band_low_hz, band_high_hz, order, .. } = EmgSettings::default();
         let half = 0.5 * self.rate_hz;
         let band_high_hz = band_high_hz.min(0.9 * half);
         if band_low_hz >= 0.9 * band_high_hz {
-            return None; // too slow for this band: the settings of the filters are refused then
+            return None; // The check of the settings rejects such a sampling rate.
         }
         let band = band_pass(order, band_low_hz / half, band_high_hz / half);
         if samples.len() <= filter::extension(&band) {
@@ -198,7 +201,7 @@ impl EmgRecording {
         })
     }
 
-    /// The mean cycle of every channel, cut at heel strikes (s).
+    /// The mean gait cycle of each channel, segmented at heel strikes in s.
     ///
     /// # Errors
     /// As [`Self::envelopes`] and [`CycleActivity::cut`].
@@ -206,10 +209,10 @@ impl EmgRecording {
         self.envelopes(settings)?.iter().map(|envelope| CycleActivity::cut(envelope, heel_strikes_s)).collect()
     }
 
-    /// The envelope of every channel.
+    /// The envelope of each channel.
     ///
     /// # Errors
-    /// [`ModelError`] naming a setting out of range, or when the recording is too short to be filtered.
+    /// [`ModelError`] if a setting is out of range or the recording is too short for the filters.
     pub fn envelopes(&self, settings: &EmgSettings) -> Result<Vec<Envelope>, ModelError> {
         settings.validate(self.rate_hz)?;
         let share = |hz: f64| hz / (0.5 * self.rate_hz);
@@ -220,7 +223,8 @@ impl EmgRecording {
             .iter()
             .map(|(channel, samples)| {
                 if samples.len() < fewest {
-                    let reason = format!("{} samples, the filters need {fewest}", samples.len());
+                    let reason =
+                        format!("the recording has {} samples; the filters need at least {fewest}", samples.len());
                     return Err(ModelError::Malformed { what: format!("channel {channel}"), reason });
                 }
                 let rectified: Vec<f64> = filter::filter(&band, samples).into_iter().map(f64::abs).collect();
@@ -231,7 +235,7 @@ impl EmgRecording {
     }
 }
 
-/// Why a channel is no raw signal: it was rectified.
+/// Detects a rectified signal.
 fn rectified(samples: &[f64]) -> Option<String> {
     if samples.iter().any(|sample| *sample < 0.0) {
         return None;
@@ -251,7 +255,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value.powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// The value below which a share of the values lies.
+/// The quantile of a share.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 <= place < length

@@ -1,4 +1,4 @@
-//! Which tuned bounds the last iterate of a solve runs into, and where.
+//! The tuned bounds that the last iterate of a solve reaches.
 
 use super::bound::{Level, loosened};
 use super::conflict::BoundSet;
@@ -6,10 +6,10 @@ use crate::gait_problem::GaitProgramme;
 use crate::nlp::NonlinearProgram;
 use crate::solve::{GaitProblem, SolveError};
 
-/// A variable or row nearer to a limit than this, in scaled units, is at it.
+/// Largest distance from a limit, in scaled units, at which it counts as reached.
 const AT_LIMIT: f64 = 1e-4;
 
-/// Names of the domains in which `x` is at a limit that `bound` sets.
+/// Names of the domains in which `x` reaches a limit that `bound` sets.
 pub(super) fn domains_at_limit(
     problem: &GaitProblem,
     programme: &GaitProgramme,

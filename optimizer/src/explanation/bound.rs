@@ -1,33 +1,33 @@
-//! Tuned bounds as they are loosened: which way, how far, and in which steps.
+//! Relaxation of tuned bounds: direction, range and steps.
 
 use super::conflict::BoundSet;
 use crate::bounds::TunedBounds;
 use crate::subject::ModelError;
 
-/// Digits of the values tried.
+/// Number of significant digits of relaxed values.
 const DIGITS: i32 = 3;
 
-/// Whether the bound is a lower one: a3 and a5.
+/// Whether the bound is a lower bound: a3 and a5.
 fn is_lower(bound: usize) -> bool {
     matches!(bound, 2 | 4)
 }
 
-/// The loosest value of a bound.
+/// Loosest value of a bound.
 pub(super) fn loosest(bound: usize) -> f64 {
     let (lowest, highest) = TunedBounds::RANGES[bound];
     if is_lower(bound) { lowest } else { highest }
 }
 
-/// How far bounds are loosened.
+/// The extent of a relaxation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
-    /// To their usual values, where those are looser. Gaits are found more easily than with the loosest.
+    /// To the default values, if they are looser. Solves converge more easily than with the loosest values.
     Usual,
-    /// As far as they go.
+    /// To the loosest values.
     Loosest,
 }
 
-/// With the bounds of a set loosened.
+/// Relaxes the bounds of a set.
 pub(super) fn loosened(bounds: &TunedBounds, set: BoundSet, level: Level) -> Result<TunedBounds, ModelError> {
     let (mut values, usual) = (bounds.to_array(), TunedBounds::default().to_array());
     for bound in set.bounds() {
@@ -41,7 +41,7 @@ pub(super) fn loosened(bounds: &TunedBounds, set: BoundSet, level: Level) -> Res
     TunedBounds::from_array(values)
 }
 
-/// A share of the way from some bounds to looser ones, by ratio where that is possible, with few digits.
+/// Bounds at a fraction of the way to looser ones, geometrically if possible, rounded to few digits.
 fn moved(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds, ModelError> {
     let (mut values, ends) = (from.to_array(), to.to_array());
     for (value, end) in values.iter_mut().zip(ends).filter(|(value, end)| **value != *end) {
@@ -50,7 +50,7 @@ fn moved(from: &TunedBounds, to: &TunedBounds, share: f64) -> Result<TunedBounds
     TunedBounds::from_array(values)
 }
 
-/// Halfway between two sets of bounds.
+/// Bounds halfway between two sets of bounds.
 pub(super) fn halfway(a: &TunedBounds, b: &TunedBounds) -> Result<TunedBounds, ModelError> {
     moved(a, b, 0.5)
 }
@@ -62,19 +62,19 @@ fn between(from: f64, to: f64, share: f64) -> f64 {
 }
 
 fn round(value: f64) -> f64 {
-    #[allow(clippy::cast_possible_truncation)] // the exponent of a double
+    #[allow(clippy::cast_possible_truncation)] // The exponent of a double.
     let place = DIGITS - 1 - value.abs().log10().floor() as i32;
     let unit = 10f64.powi(place);
     (value * unit).round() / unit
 }
 
-/// Whether every bound of `a` is as loose as that of `b`, or looser.
+/// Whether every bound of `a` is at least as loose as that of `b`.
 pub(super) fn is_as_loose(a: &TunedBounds, b: &TunedBounds) -> bool {
     let (a, b) = (a.to_array(), b.to_array());
     (0..a.len()).all(|bound| if is_lower(bound) { a[bound] <= b[bound] } else { a[bound] >= b[bound] })
 }
 
-/// How far a bound moves: by ratio, or as a share of its range.
+/// Distance between two values of a bound: logarithm of the ratio, or share of the range.
 pub(super) fn step(bound: usize, from: f64, to: f64) -> f64 {
     if from > 0.0 && to > 0.0 {
         return (to / from).ln().abs();
@@ -83,22 +83,20 @@ pub(super) fn step(bound: usize, from: f64, to: f64) -> f64 {
     (to - from).abs() / (highest - lowest)
 }
 
-/// How far all bounds move together.
+/// Distance between two sets of bounds.
 pub(super) fn way(from: &TunedBounds, to: &TunedBounds) -> f64 {
     let (from, to) = (from.to_array(), to.to_array());
     (0..from.len()).map(|bound| step(bound, from[bound], to[bound])).sum()
 }
 
-/// How near the bounds are brought to where no gait is found any more: part of the way that is searched, or logarithm of
-/// the ratio.
+/// Resolution of the search for the smallest relaxation: as a fraction of the way, or as logarithm of the ratio.
 const RESOLUTION: f64 = 1.0 / 128.0;
 const SMALL_STEP: f64 = 0.025;
-/// Which part of what is left to search is stepped over at a time. Steps back towards gaits are short because a search that
-/// ends without a gait takes ten times as long as one that finds it.
+/// Fraction of the remaining interval for each step of the search. Steps towards tighter bounds are short, because a solve
+/// without a gait takes ten times as long as one with a gait.
 const STEP: f64 = 0.25;
 
-/// How far bounds have to move towards looser ones, with which there is a gait, so that there is one: the least of what was
-/// tried, and the furthest tried with which there was none.
+/// The smallest fraction of the way to looser bounds with which a gait was found, and the largest one without a gait.
 pub(super) fn least_move<E: From<ModelError>>(
     from: &TunedBounds,
     to: &TunedBounds,
@@ -117,7 +115,7 @@ pub(super) fn least_move<E: From<ModelError>>(
     Ok((gait.1, none.1))
 }
 
-/// Whether no bound differs by a ratio of any size.
+/// Whether all bounds agree up to the resolution.
 fn are_close(a: &TunedBounds, b: &TunedBounds) -> bool {
     let mut pairs = a.to_array().into_iter().zip(b.to_array());
     pairs.all(|(a, b)| a == b || a > 0.0 && b > 0.0 && (a / b).ln().abs() <= SMALL_STEP)
@@ -134,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn values_in_between_have_few_digits_and_lie_between() {
+    fn intermediate_values_have_few_digits() {
         assert_eq!(between(40.0, 1000.0, 0.5), 200.0);
         assert_eq!(between(0.1, 0.0, 0.5), 0.05);
         assert_eq!(between(15.0, 16.123, 0.5), 15.6);
@@ -143,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn lower_bounds_are_loosest_where_they_are_lowest() {
+    fn lower_bounds_are_loosest_at_their_minimum() {
         let bounds = TunedBounds { a3: 0.5, a5: 0.1, a6: 0.0, a7: 60.0, ..TunedBounds::default() };
         let with = |level| loosened(&bounds, BoundSet::ALL, level).unwrap().to_array();
         assert_eq!(with(Level::Loosest), [100.0, 1000.0, 0.05, 3.0, 0.0, 1.0, 68.0, 60.0]);
@@ -152,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_compared_by_the_way_they_loosen() {
+    fn bounds_are_compared_in_the_direction_of_relaxation() {
         let usual = TunedBounds::default();
         assert!(is_as_loose(&usual, &usual));
         assert!(is_as_loose(&usual, &TunedBounds { a3: 0.4, a5: 0.1, a8: 20.0, ..usual }));
@@ -162,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn ways_are_measured_by_ratio_or_by_share_of_the_range() {
+    fn distances_are_ratios_or_shares_of_the_range() {
         assert!((step(1, 40.0, 80.0) - 2f64.ln()).abs() < 1e-15);
         assert!((step(4, 0.0, 0.03) - 0.1).abs() < 1e-15);
         let usual = TunedBounds::default();
@@ -170,16 +168,14 @@ mod tests {
     }
 
     #[test]
-    fn halfway_is_by_ratio_and_leaves_what_agrees() {
+    fn halfway_is_geometric_and_keeps_equal_bounds() {
         let a = TunedBounds { a2: 12.345, a7: 5.0, ..TunedBounds::default() };
         assert_eq!(halfway(&a, &TunedBounds { a7: 20.0, ..a }).unwrap(), TunedBounds { a7: 10.0, ..a });
     }
 
     proptest! {
-        /// Wherever gaits begin on the way: they begin between what is named and what is said to have none, which are near
-        /// one another.
         #[test]
-        fn the_least_move_ends_where_gaits_begin(begin in 1e-3f64..1.0, both in any::<bool>()) {
+        fn smallest_relaxation_encloses_the_boundary_of_feasibility(begin in 1e-3f64..1.0, both in any::<bool>()) {
             let bounds = TunedBounds { a7: 5.0, a5: 0.3, ..TunedBounds::default() };
             let loose = loosened(&bounds, if both { set(&[4, 6]) } else { set(&[6]) }, Level::Loosest).unwrap();
             let share = |bounds: &TunedBounds| (bounds.a7 / 5.0).ln() / (68.0f64 / 5.0).ln();

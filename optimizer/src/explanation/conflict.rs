@@ -1,12 +1,12 @@
-//! Which tuned bounds are in conflict, and which have to give way: a search over sets of bounds that knows nothing of gaits.
+//! Search for irreducible conflicts and minimal relaxations over sets of tuned bounds.
 //!
-//! A set is met when there is a gait with its bounds as they are given and all others at their loosest. Whoever answers must
-//! be consistent: what is met stays so when bounds are left out, what is not when others are added.
+//! A set is feasible if there is a gait with its bounds at their given values and all others at their loosest values. The
+//! predicate must be monotonic: subsets of a feasible set are feasible.
 
-/// How many tuned bounds there are.
+/// Number of tuned bounds.
 const COUNT: usize = 8;
 
-/// Some of the tuned bounds.
+/// A set of tuned bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) struct BoundSet(u8);
 
@@ -30,18 +30,18 @@ impl BoundSet {
         self.0 & other.0 == 0
     }
 
-    /// Its bounds in action order.
+    /// The bounds in the order of an action.
     pub(super) fn bounds(self) -> impl Iterator<Item = usize> {
         (0..COUNT).filter(move |bound| self.contains(*bound))
     }
 }
 
-/// An irreducible conflict among bounds: together they are not met, and are when any one is left out. `None`: all together
-/// are met.
+/// An irreducible conflict: an infeasible set of bounds whose proper subsets are feasible. `None` if all bounds together are
+/// feasible.
 ///
-/// Bounds are added in the given order until they are not met any more: the last one belongs to the conflict; then, from it,
-/// in the same order again. Sets that are not met take far longer than the others: at most one is asked about for each bound of
-/// the conflict beside itself, and only itself where its bounds come first in the order.
+/// Bounds are added in the given order until the set is infeasible; the last one belongs to the conflict. The search restarts
+/// with the bounds found so far. Infeasible sets take far longer to test, so the search tests at most one for each bound of the
+/// conflict besides the conflict itself.
 pub(super) fn conflict<E>(
     order: &[usize],
     mut is_met: impl FnMut(BoundSet) -> Result<bool, E>,
@@ -64,19 +64,19 @@ pub(super) fn conflict<E>(
     Ok(Some(members))
 }
 
-/// What was found out about giving way.
+/// Result of the search for relaxations.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Remedies {
-    /// The sets that give a gait when they are as loose as possible: of the smallest number of bounds that does.
+    /// The smallest sets of bounds whose relaxation gives a gait.
     pub(super) help: Vec<BoundSet>,
-    /// Those that do not, smaller ones first.
+    /// Sets whose relaxation gives no gait, smaller ones first.
     pub(super) do_not_help: Vec<BoundSet>,
-    /// Further conflicts, each with what was loosened when it was left.
+    /// Further conflicts, each with the set that was relaxed when it remained.
     pub(super) conflicts: Vec<(BoundSet, BoundSet)>,
 }
 
-/// Sets of at most `largest` bounds to loosen, all others as they are given, so that there is a gait; `first` is a
-/// conflict. Of every conflict one bound has to give way (Reiter 1987, hitting sets breadth first), so nothing else is asked about.
+/// Minimal sets of at most `largest` bounds whose relaxation gives a gait; `first` is a conflict. A relaxation must contain a bound
+/// of each conflict, so the search is breadth-first over hitting sets (Reiter 1987).
 pub(super) fn remedies<E>(
     first: BoundSet,
     largest: usize,
@@ -123,7 +123,7 @@ mod tests {
     use proptest::prelude::*;
     use std::convert::Infallible;
 
-    /// Met when no conflict lies within.
+    /// Feasible if it contains no conflict.
     fn met(conflicts: &[u8], set: BoundSet) -> bool {
         conflicts.iter().all(|conflict| conflict & !set.0 != 0)
     }
@@ -147,25 +147,27 @@ mod tests {
     const IN_ORDER: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 
     #[test]
-    fn one_set_that_is_not_met_is_asked_about_for_each_bound_beside_the_conflict_itself() {
+    fn one_infeasible_set_is_tested_for_each_bound_besides_the_conflict() {
         let (pair, not_met) = found(&[0b0100_1000], &IN_ORDER);
         assert_eq!(pair, Some(BoundSet(0b0100_1000)));
         assert_eq!(not_met, [0b0111_1111, 0b0100_1111, 0b0100_1000].map(BoundSet));
         let (pair, not_met) = found(&[0b0100_1000], &[6, 3, 0, 1, 2, 4, 5, 7]);
-        assert_eq!((pair, not_met.len()), (Some(BoundSet(0b0100_1000)), 1), "suspects first: its own alone");
+        assert_eq!(
+            (pair, not_met.len()),
+            (Some(BoundSet(0b0100_1000)), 1),
+            "with suspects first, only the conflict itself"
+        );
     }
 
     #[test]
-    fn nothing_in_conflict_and_a_conflict_of_nothing_differ() {
+    fn no_conflict_differs_from_an_empty_conflict() {
         assert_eq!(found(&[], &IN_ORDER).0, None);
         assert_eq!(found(&[0], &IN_ORDER).0, Some(BoundSet::EMPTY));
     }
 
     proptest! {
-        /// Whatever the conflicts and the order: the one that is found is among them and holds no smaller one; and the
-        /// remedies are all the smallest sets that hit every conflict, and only they.
         #[test]
-        fn conflicts_are_irreducible_and_remedies_hit_them_all(
+        fn conflicts_are_irreducible_and_relaxations_are_minimal_hitting_sets(
             conflicts in prop::collection::vec(1u8..=255, 1..5),
             order in Just(IN_ORDER.to_vec()).prop_shuffle(),
         ) {
@@ -191,7 +193,7 @@ mod tests {
         }
 
         #[test]
-        fn no_larger_remedies_are_tried_than_asked_for(conflicts in prop::collection::vec(1u8..=255, 1..8)) {
+        fn relaxations_have_at_most_the_requested_size(conflicts in prop::collection::vec(1u8..=255, 1..8)) {
             let first = found(&conflicts, &IN_ORDER).0.unwrap();
             let mut largest = 0;
             let remedies = answer(remedies(first, 2, |loosened| {

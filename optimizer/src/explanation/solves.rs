@@ -1,4 +1,4 @@
-//! The solves of an explanation: whether a gait is found with these bounds or those, and what is remembered of it.
+//! The solves of an explanation: tests whether bounds have a gait, with a memory of earlier results.
 
 use super::bound::{halfway, is_as_loose, way};
 use crate::bounds::TunedBounds;
@@ -8,21 +8,19 @@ use crate::solve::{
 };
 use std::cmp::Ordering;
 
-/// Cold guesses that are tried side by side where the nearest gait leads to none, before it is said that none was found: of the
-/// catalogue, those without which gaits were missed close to where there are none any more.
+/// Initial guesses that are tried if the nearest gait leads to none: those that find gaits near the boundary of feasibility.
 const COLD: [ColdGuess; 3] = [ColdGuess::NATURAL, ColdGuess::EARLY_RISE, ColdGuess::CATALOGUE[2]];
-/// Iterations of a phase of one of these solves, cold and warm: gaits that converge take fewer, and most that do not would
-/// go on for many more.
+/// Iteration limits of a phase in cold and warm solves. Solves that converge need fewer iterations.
 const MAX_ITERATIONS: usize = 400;
 const MAX_ITERATIONS_WARM: usize = 250;
-/// Bounds that are further from those of the nearest gait are approached in two steps.
+/// Distance from the bounds of the nearest gait above which a solve takes two steps.
 const FAR: f64 = 0.5;
 
-/// Why the search ends early.
+/// The reason for an early end of the search.
 pub(super) enum Stop {
-    /// Somebody cancelled it.
+    /// The explanation was cancelled.
     Cancelled,
-    /// A solve could not be tried.
+    /// A solve could not start.
     Failed(SolveError),
 }
 
@@ -32,25 +30,25 @@ impl<E: Into<SolveError>> From<E> for Stop {
     }
 }
 
-/// What a gait is looked for from.
+/// The starts of a search for a gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Starts {
-    /// The nearest gait that is known, then cold.
+    /// The nearest known gait, then initial guesses.
     All,
-    /// The nearest gait that is known, where one is.
+    /// The nearest known gait only, if there is one.
     Nearest,
 }
 
-/// Bounds with which no gait was found, and where the search for one ended.
+/// A failed search: bounds without a gait, and the nearest motion.
 #[derive(Debug, Clone)]
 pub(super) struct Unmet {
     bounds: TunedBounds,
-    /// What is violated where the search came nearest, worst first; a stationary point of the violation before others.
+    /// Violations of the nearest motion, worst first. Stationary points of the violation are preferred.
     pub(super) violations: Vec<Violation>,
     rank: (bool, f64),
-    /// Solves, each from another start.
+    /// Number of solves, each from another start.
     pub(super) starts: usize,
-    /// Whether one of them gave up, at a limit or stalled.
+    /// Whether a solve ended at a limit or stalled.
     pub(super) undecided: bool,
 }
 
@@ -60,7 +58,7 @@ impl Unmet {
         Self { bounds: *bounds, violations: Vec::new(), rank, starts: 0, undecided: false }
     }
 
-    /// Less: it came nearer to a gait, a stationary point of the violation before others.
+    /// Rank of the result: smaller is nearer to a gait; stationary points of the violation come first.
     pub(super) fn nearness(&self, other: &Self) -> Ordering {
         compared(self.rank, other.rank)
     }
@@ -87,7 +85,7 @@ pub(super) struct Solves<'a> {
     cancel: &'a CancelToken,
     met: Vec<(TunedBounds, WarmStart)>,
     unmet: Vec<Unmet>,
-    /// How many there were.
+    /// Number of solves so far.
     pub(super) count: usize,
 }
 
@@ -95,15 +93,15 @@ impl<'a> Solves<'a> {
     pub(super) fn new(problem: &'a GaitProblem, options: &SolveOptions, cancel: &'a CancelToken) -> Self {
         let options = SolveOptions {
             max_iterations: options.max_iterations.min(MAX_ITERATIONS),
-            // Whether a gait converges does not depend on it.
+            // Convergence does not depend on it.
             tightening_rounds: 0,
             ..*options
         };
         Self { problem, options, cancel, met: Vec::new(), unmet: Vec::new(), count: 0 }
     }
 
-    /// Whether a gait is known or found with these bounds. What was found once is remembered: with looser bounds than
-    /// those of a gait there is one, with tighter ones than those with which none was found none is looked for.
+    /// Whether these bounds have a gait. Earlier results answer without a solve: looser bounds than those of a gait have one, and
+    /// tighter bounds than those of a failed search count as having none.
     pub(super) fn is_met(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<bool, Stop> {
         if self.met.iter().any(|(known, _)| is_as_loose(bounds, known)) {
             return Ok(true);
@@ -127,7 +125,7 @@ impl<'a> Solves<'a> {
         GaitProblem { bounds: *bounds, ..self.problem.clone() }
     }
 
-    /// A gait with these bounds: from the nearest that is known, at once or in two steps, then cold.
+    /// Searches a gait with these bounds: from the nearest known gait, in one or two steps, then from initial guesses.
     pub(super) fn solve(&mut self, bounds: &TunedBounds, starts: Starts) -> Result<Option<WarmStart>, Stop> {
         let mut unmet = Unmet::new(bounds);
         let nearest = self.met.iter().min_by(|a, b| way(&a.0, bounds).total_cmp(&way(&b.0, bounds))).cloned();
@@ -162,7 +160,7 @@ impl<'a> Solves<'a> {
         self.is_gait(bounds, outcome, unmet)
     }
 
-    /// Takes in how a search for a gait ended.
+    /// Adds the result of a solve to a failed search.
     fn is_gait(&mut self, bounds: &TunedBounds, outcome: SolveOutcome, unmet: &mut Unmet) -> Result<bool, Stop> {
         self.count += outcome.report.attempts.len();
         if self.cancel.is_cancelled() {
@@ -176,12 +174,12 @@ impl<'a> Solves<'a> {
         Ok(false)
     }
 
-    /// The gait that was found last.
+    /// The last gait that was found.
     fn latest(&self) -> Option<WarmStart> {
         self.met.last().map(|(_, gait)| gait.clone())
     }
 
-    /// A gait with bounds that are met, solved for where that converges.
+    /// A gait with feasible bounds, by a solve if that converges.
     pub(super) fn gait(&mut self, bounds: &TunedBounds) -> Result<Option<WarmStart>, Stop> {
         if let Some((_, gait)) = self.met.iter().find(|(known, _)| known == bounds) {
             return Ok(Some(gait.clone()));
@@ -192,7 +190,7 @@ impl<'a> Solves<'a> {
         Ok(self.met.iter().find(|(known, _)| is_as_loose(bounds, known)).map(|(_, gait)| gait.clone()))
     }
 
-    /// What is known of bounds with which no gait was found, or of looser ones.
+    /// The failed search with these bounds or looser ones.
     pub(super) fn unmet(&self, bounds: &TunedBounds) -> Option<&Unmet> {
         self.unmet.iter().find(|known| is_as_loose(&known.bounds, bounds))
     }

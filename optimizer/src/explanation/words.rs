@@ -1,36 +1,36 @@
-//! An explanation in sentences: the same at the command line, on pages and for programs.
+//! Infeasibility explanations as sentences, for the command line, pages and programs.
 
 use super::{BoundAtLimit, Conflict, Explanation, GivenBound, JointRelaxation, Relaxation};
 use crate::in_words::figure;
 use crate::solve::{SolveStatus, Violation};
 use crate::walking::CYCLE;
 
-/// What the end of a solve says of its bounds; none where there is a gait.
+/// The meaning of the status of a solve for its bounds; `None` if there is a gait.
 pub fn verdict(status: SolveStatus) -> Option<&'static str> {
     match status {
         SolveStatus::Converged => None,
         SolveStatus::Infeasible => Some(
-            "No motion near the last one keeps every constraint: the bounds contradict each other, or another constraint.",
+            "No motion near the last one satisfies every constraint: tuned bounds conflict with each other or with another constraint.",
         ),
-        SolveStatus::Cancelled => Some("Somebody ended the solve before it was done."),
+        SolveStatus::Cancelled => Some("The solve was cancelled."),
         SolveStatus::Stalled | SolveStatus::IterationLimit | SolveStatus::TimeLimit => Some(
-            "The optimiser ended before every constraint was met. That is no proof that these bounds have no gait.",
+            "The optimiser stopped before every constraint was satisfied. This does not prove that these bounds have no gait.",
         ),
     }
 }
 
-/// `a7 = 5 ° (hip angle)`, the meaning being `hip angle, °`.
+/// A bound with its value: `a7 = 5 ° (hip angle)` for the meaning `hip angle, °`.
 fn quantity(bound: &str, meaning: &str, value: f64) -> String {
     let (limited, unit) = parts(meaning);
     format!("{bound} = {value}{unit} ({limited})")
 }
 
-/// What a bound limits, and its unit after a space.
+/// The quantity of a bound, and its unit after a space.
 fn parts(meaning: &str) -> (&str, String) {
     meaning.rsplit_once(", ").map_or_else(|| (meaning, String::new()), |(limited, unit)| (limited, format!(" {unit}")))
 }
 
-/// `a, b and c`.
+/// A list: `a, b and c`.
 fn list(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -40,14 +40,14 @@ fn list(items: &[String]) -> String {
 }
 
 impl Violation {
-    /// The constraint without place and component: `C3 forward hip velocity`.
+    /// The constraint without place and component, such as `C3 forward hip velocity`.
     pub fn constraint(&self) -> &str {
         self.row.split(", ").nth(1).unwrap_or(&self.row)
     }
 }
 
 impl BoundAtLimit {
-    /// Where it is reached.
+    /// The domains in which the bound is reached, as a sentence.
     pub fn in_words(&self) -> String {
         let quantity = quantity(&self.bound, &self.meaning, self.value);
         if self.domains.len() == CYCLE.len() {
@@ -62,7 +62,7 @@ impl BoundAtLimit {
     }
 }
 
-/// `from 5 starts`.
+/// The number of starts: ` from 5 starts`.
 fn from_starts(starts: usize) -> String {
     match starts {
         0 => String::new(),
@@ -71,51 +71,53 @@ fn from_starts(starts: usize) -> String {
     }
 }
 
-/// What it means that a solve gave up.
+/// The caveat if a solve ended without a stationary point.
 fn caveat(undecided: bool) -> &'static str {
-    if undecided { " (not all of them ended where nothing nearby is better, so there may be one)" } else { "" }
+    if undecided { " (not all solves ended at a local minimum of the violation, so a gait may exist)" } else { "" }
 }
 
 impl Conflict {
-    /// Which bounds contradict each other, and over what.
+    /// The conflicting bounds and the violated constraint, as sentences.
     pub fn in_words(&self) -> String {
         let quantities: Vec<String> = self.bounds.iter().map(GivenBound::in_words).collect();
         let without = match self.without.len() {
             0 => String::new(),
-            1 => format!("With {} at its loosest another conflict remains. ", list(&self.without)),
-            _ => format!("With {} at their loosest another conflict remains. ", list(&self.without)),
+            1 => format!("With {} at its loosest value, another conflict remains. ", list(&self.without)),
+            _ => format!("With {} at their loosest values, another conflict remains. ", list(&self.without)),
         };
         let (claim, tried, relief) = match quantities.as_slice() {
             [] => {
                 let wishes = if self.wishes.is_empty() {
                     String::new()
                 } else {
-                    format!(", this wish among it: {}", list(&self.wishes))
+                    format!(", among them: {}", list(&self.wishes))
                 };
                 (
-                    format!("No tuned bound is to blame: what is fixed contradicts itself{wishes}"),
-                    "with every tuned bound at its loosest".to_owned(),
+                    format!(
+                        "The conflict does not depend on tuned bounds: fixed constraints conflict with each other{wishes}"
+                    ),
+                    "with every tuned bound at its loosest value".to_owned(),
                     "",
                 )
             }
             [one] => (
-                format!("{one} cannot be met, whatever the other tuned bounds are"),
-                "with it, all others at their loosest".to_owned(),
-                " With it at its loosest as well there is one.",
+                format!("{one} cannot be satisfied, whatever the values of the other tuned bounds"),
+                "with it, and the others at their loosest values".to_owned(),
+                " With it at its loosest value as well, there is a gait.",
             ),
             [_, _] => (
-                format!("{} contradict each other", list(&quantities)),
-                "with both, all other tuned bounds at their loosest".to_owned(),
-                " With either of them at its loosest as well there is one.",
+                format!("{} conflict with each other", list(&quantities)),
+                "with both, and the other tuned bounds at their loosest values".to_owned(),
+                " With either of them at its loosest value as well, there is a gait.",
             ),
             _ => (
-                format!("{} contradict each other", list(&quantities)),
-                "with all of them, the other tuned bounds at their loosest".to_owned(),
-                " With any one of them at its loosest as well there is one.",
+                format!("{} conflict with each other", list(&quantities)),
+                "with all of them, and the other tuned bounds at their loosest values".to_owned(),
+                " With any one of them at its loosest value as well, there is a gait.",
             ),
         };
         let missed = self.violations.first().map_or(String::new(), |worst| {
-            format!("; the nearest motion misses {} by {} {}", worst.row, figure(worst.amount), worst.unit)
+            format!("; the nearest motion violates {} by {} {}", worst.row, figure(worst.amount), worst.unit)
         });
         let (from, caveat) = (from_starts(self.starts), caveat(self.undecided));
         format!("{without}{claim}: {tried}, no gait was found{from}{caveat}{missed}.{relief}")
@@ -130,7 +132,7 @@ impl GivenBound {
 }
 
 impl Relaxation {
-    /// What it achieves.
+    /// The effect of the relaxation, as a sentence.
     pub fn in_words(&self) -> String {
         let Self { bound, meaning, from, to, not_with, .. } = self;
         let (limited, unit) = parts(meaning);
@@ -138,18 +140,18 @@ impl Relaxation {
         if let Some(to) = to {
             let with = quantity(bound, meaning, *to);
             return format!(
-                "With {with} in place of {from}{unit} alone, a gait converges; with {not_with}{unit} none was found{starts}{caveat}."
+                "With {with} instead of {from}{unit} alone, a gait converges; with {not_with}{unit}, no gait was found{starts}{caveat}."
             );
         }
         let direction = if not_with < from { "down" } else { "up" };
         format!(
-            "{bound} ({limited}) alone, {direction} to its loosest, {not_with}{unit}, does not suffice: no gait was found{starts}{caveat}."
+            "{bound} ({limited}) alone, {direction} to its loosest value, {not_with}{unit}, is not sufficient: no gait was found{starts}{caveat}."
         )
     }
 }
 
 impl JointRelaxation {
-    /// What it achieves.
+    /// The effect of the relaxation, as a sentence.
     pub fn in_words(&self) -> String {
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         let named =
@@ -158,25 +160,24 @@ impl JointRelaxation {
         let not_with = named(&|one| format!("{} = {}", one.bound, in_unit(&one.meaning, one.not_with)));
         if self.bounds.iter().any(|one| one.to.is_none()) {
             return format!(
-                "{not_with}, the loosest of them together, do not suffice: no gait was found{starts}{caveat}."
+                "{not_with}, the loosest values together, are not sufficient: no gait was found{starts}{caveat}."
             );
         }
         let with = named(&|one| {
             let to = one.to.unwrap_or(one.not_with);
             let from = in_unit(&one.meaning, one.from);
-            format!("{} in place of {from}", quantity(&one.bound, &one.meaning, to))
+            format!("{} instead of {from}", quantity(&one.bound, &one.meaning, to))
         });
-        format!("With {with} together, a gait converges; with {not_with} none was found{starts}{caveat}.")
+        format!("With {with} together, a gait converges; with {not_with}, no gait was found{starts}{caveat}.")
     }
 }
 
 impl Explanation {
-    /// Which bounds contradict each other, further conflicts after the first; where that is not known (by earlier versions),
-    /// what is missed most.
+    /// The conflicts as sentences, the first one first. If they are unknown, the largest violation.
     pub fn conflicts_in_words(&self) -> Vec<String> {
         if self.gait_found {
-            let found = "While a conflict was looked for, a gait was found with these very bounds: they do not contradict \
-                         each other, the solve missed it.";
+            let found = "The search for a conflict found a gait with exactly these bounds. They do not conflict; the solve missed \
+                         this gait.";
             return vec![found.to_owned()];
         }
         if self.conflicts.is_empty() {
@@ -185,10 +186,10 @@ impl Explanation {
         self.conflicts.iter().map(Conflict::in_words).collect()
     }
 
-    /// What is missed most; none where nothing is missed.
+    /// The largest violation, as a sentence; `None` if there is none.
     fn missed_most(&self) -> Option<String> {
         let worst = self.violations.first()?;
-        Some(format!("Missed most: {}, by {} {}.", worst.row, figure(worst.amount), worst.unit))
+        Some(format!("Largest violation: {}, by {} {}.", worst.row, figure(worst.amount), worst.unit))
     }
 
     /// The smallest relaxation of one bound that gives a gait.
@@ -196,7 +197,7 @@ impl Explanation {
         self.relaxations.iter().find(|relaxation| relaxation.to.is_some())
     }
 
-    /// What has to give way, alone or together, and what does not suffice.
+    /// The relaxations as sentences: single ones, joint ones, and those that are not sufficient.
     pub fn remedies_in_words(&self) -> Vec<String> {
         let helps = |joint: &&JointRelaxation| joint.bounds.iter().all(|one| one.to.is_some());
         let alone = self.relaxations.iter().map(Relaxation::in_words);
@@ -205,7 +206,7 @@ impl Explanation {
         alone.chain(together).chain(in_vain).collect()
     }
 
-    /// All of it, sentence by sentence.
+    /// The explanation as sentences.
     pub fn sentences(&self) -> Vec<String> {
         let verdict = verdict(self.status).map(str::to_owned);
         let at_limit = self.at_limit.iter().map(BoundAtLimit::in_words);
@@ -282,18 +283,19 @@ mod tests {
     }
 
     #[test]
-    fn every_sentence_of_an_explanation_comes_in_order() {
+    fn sentences_of_an_explanation_come_in_order() {
         let sentences = explanation().sentences();
         assert!(sentences[0].starts_with("No motion near the last one"));
         assert_eq!(
             sentences[1..],
             [
-                "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5 ° (hip angle) contradict each other: with both, all \
-                 other tuned bounds at their loosest, no gait was found from 5 starts; the nearest motion misses SS1_R \
-                 point 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest as well there is one.",
-                "With a7 = 15 ° (hip angle) in place of 5 ° alone, a gait converges; with 14.6 ° none was found from 3 \
+                "a4 = 0.5 m/s (hip velocity upper bound) and a7 = 5 ° (hip angle) conflict with each other: with both, and \
+                 the other tuned bounds at their loosest values, no gait was found from 5 starts; the nearest motion violates \
+                 SS1_R point 12, C3 forward hip velocity by 0.107 m/s. With either of them at its loosest value as well, \
+                 there is a gait.",
+                "With a7 = 15 ° (hip angle) instead of 5 ° alone, a gait converges; with 14.6 °, no gait was found from 3 \
                  starts.",
-                "a4 (hip velocity upper bound) alone, up to its loosest, 3 m/s, does not suffice: no gait was found from \
+                "a4 (hip velocity upper bound) alone, up to its loosest value, 3 m/s, is not sufficient: no gait was found from \
                  3 starts.",
                 "a2 = 20 rad/s² (coordinate acceleration) is reached in DS2_L and SS1_L.",
                 "a4 = 0.5 m/s (hip velocity upper bound) is reached in the whole stride.",
@@ -302,60 +304,62 @@ mod tests {
     }
 
     #[test]
-    fn conflicts_of_any_number_of_bounds_are_put_into_words() {
+    fn conflicts_of_any_number_of_bounds_have_sentences() {
         let alone = conflict(&[(1, 10.0)]).in_words();
         assert!(
-            alone.starts_with("a2 = 10 rad/s² (coordinate acceleration) cannot be met, whatever the other"),
+            alone.starts_with(
+                "a2 = 10 rad/s² (coordinate acceleration) cannot be satisfied, whatever the values of the other"
+            ),
             "{alone}"
         );
-        assert!(alone.ends_with("With it at its loosest as well there is one."), "{alone}");
+        assert!(alone.ends_with("With it at its loosest value as well, there is a gait."), "{alone}");
         let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words();
         assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5 °"), "{three}");
-        assert!(three.ends_with("With any one of them at its loosest as well there is one."), "{three}");
+        assert!(three.ends_with("With any one of them at its loosest value as well, there is a gait."), "{three}");
         let fixed = Conflict { wishes: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
         assert_eq!(
             fixed,
-            "No tuned bound is to blame: what is fixed contradicts itself, this wish among it: a slow start: with every \
-             tuned bound at its loosest, no gait was found from 5 starts; the nearest motion misses SS1_R point 12, C3 \
-             forward hip velocity by 0.107 m/s."
+            "The conflict does not depend on tuned bounds: fixed constraints conflict with each other, among them: a slow start: \
+             with every tuned bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
+             point 12, C3 forward hip velocity by 0.107 m/s."
         );
         let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
-        assert!(further.starts_with("With a4 at its loosest another conflict remains. a8 = 5 °"), "{further}");
+        assert!(further.starts_with("With a4 at its loosest value, another conflict remains. a8 = 5 °"), "{further}");
     }
 
     #[test]
-    fn bounds_that_give_way_together_are_named_together() {
+    fn joint_relaxations_name_their_bounds_together() {
         assert_eq!(
             together(Some([0.65, 9.1])).in_words(),
-            "With a4 = 0.65 m/s (hip velocity upper bound) in place of 0.5 m/s and a8 = 9.1 ° (ankle angle) in place of \
-             5 ° together, a gait converges; with a4 = 0.61 m/s and a8 = 8.6 ° none was found from 3 starts."
+            "With a4 = 0.65 m/s (hip velocity upper bound) instead of 0.5 m/s and a8 = 9.1 ° (ankle angle) instead of \
+             5 ° together, a gait converges; with a4 = 0.61 m/s and a8 = 8.6 °, no gait was found from 3 starts."
         );
         let in_vain = together(None).in_words();
-        assert!(in_vain.contains("do not suffice: no gait was found from 3 starts"), "{in_vain}");
+        assert!(in_vain.contains("are not sufficient: no gait was found from 3 starts"), "{in_vain}");
         let both = Explanation { together: vec![together(None), together(Some([0.65, 9.1]))], ..explanation() };
         let remedies = both.remedies_in_words();
-        assert!(remedies[2].contains("a gait converges") && remedies[3].contains("do not suffice"), "{remedies:?}");
+        assert!(remedies[2].contains("a gait converges") && remedies[3].contains("are not sufficient"), "{remedies:?}");
     }
 
     #[test]
-    fn a_gait_that_the_solve_missed_is_no_conflict() {
+    fn missed_gait_is_not_a_conflict() {
         let found = Explanation { gait_found: true, conflicts: Vec::new(), ..explanation() };
         let words = found.conflicts_in_words();
-        assert!(words.len() == 1 && words[0].contains("the solve missed it"), "{words:?}");
+        assert!(words.len() == 1 && words[0].contains("the solve missed this gait"), "{words:?}");
     }
 
     #[test]
-    fn explanations_of_earlier_versions_say_what_is_missed_most() {
+    fn explanation_without_conflicts_names_the_largest_violation() {
         let earlier = Explanation { conflicts: Vec::new(), ..explanation() };
-        assert_eq!(earlier.conflicts_in_words(), ["Missed most: stride, C4 walking speed, by 0.107 m/s."]);
+        assert_eq!(earlier.conflicts_in_words(), ["Largest violation: stride, C4 walking speed, by 0.107 m/s."]);
         let nothing = Explanation { violations: Vec::new(), ..earlier };
         assert!(nothing.conflicts_in_words().is_empty());
         let unknown = Relaxation { starts: 0, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words();
-        assert!(unknown.ends_with("with 14.6 ° none was found."), "{unknown}");
+        assert!(unknown.ends_with("with 14.6 °, no gait was found."), "{unknown}");
     }
 
     #[test]
-    fn eight_domains_are_not_listed() {
+    fn bound_at_limit_in_all_domains_is_summarised() {
         let everywhere = CYCLE.map(crate::walking::Domain::name);
         assert_eq!(
             at_limit(1, 20.0, &everywhere).in_words(),
@@ -364,14 +368,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_decided_is_not_said_to_be() {
+    fn undecided_solves_get_a_caveat() {
         for words in [
             Relaxation { undecided: true, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words(),
             Relaxation { undecided: true, ..relaxation(3, (0.5, None, 3.0)) }.in_words(),
             JointRelaxation { undecided: true, ..together(None) }.in_words(),
             Conflict { undecided: true, ..conflict(&[(1, 10.0)]) }.in_words(),
         ] {
-            assert!(words.contains("so there may be one"), "{words}");
+            assert!(words.contains("so a gait may exist"), "{words}");
         }
         for status in [SolveStatus::Stalled, SolveStatus::IterationLimit, SolveStatus::TimeLimit] {
             assert!(verdict(status).unwrap().contains("no proof"), "{status:?}");
@@ -380,14 +384,14 @@ mod tests {
     }
 
     #[test]
-    fn a_violation_is_named_by_its_constraint() {
+    fn violation_gives_the_name_of_its_constraint() {
         let constraint = |row: &str| missed(row)[0].constraint().to_owned();
         assert_eq!(constraint("SS2_R to SS1_R, C2 continuity of velocity, hip_R"), "C2 continuity of velocity");
         assert_eq!(constraint("stride length"), "stride length");
     }
 
     #[test]
-    fn the_relief_is_the_smallest_relaxation_that_helps() {
+    fn relief_is_the_smallest_sufficient_relaxation() {
         let mut found = explanation();
         assert_eq!(found.relief().map(|relaxation| relaxation.bound.as_str()), Some("a7"));
         found.relaxations.remove(0);

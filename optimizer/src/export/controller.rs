@@ -1,4 +1,4 @@
-//! The controller file: what the device needs to walk a gait, with every field explained in the file itself.
+//! The controller file: the data that the device needs to execute a gait. The file explains its own fields.
 
 use super::{RATE_RANGE_HZ, samples};
 use crate::body::WalkerModel;
@@ -8,18 +8,18 @@ use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, DomainKind, basis, phase_gradie
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What the file says it is.
+/// Value of the field `format`.
 const FORMAT: &str = "gaitwright controller";
 /// Version of the layout.
 const FORMAT_VERSION: u32 = 1;
-/// Names of the walker's angles, in the order of the phase gradient.
+/// Names of the angles of the walker, in the order of the phase gradient.
 const ANGLES: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
 
-/// Every field in words; it travels with the file.
+/// Description of each field; part of the file.
 const FIELDS: [(&str, &str); 29] = [
-    ("format", "what this file is"),
-    ("format_version", "version of its layout"),
-    ("fields", "this explanation"),
+    ("format", "type of this file"),
+    ("format_version", "version of the layout"),
+    ("fields", "descriptions of the fields"),
     (
         "signs",
         "forward lean, hip flexion, knee flexion and ankle dorsiflexion are positive; R is the prosthesis, L the intact leg",
@@ -27,49 +27,43 @@ const FIELDS: [(&str, &str); 29] = [
     ("device", "name of the prosthesis"),
     (
         "certificate_passed",
-        "whether the gait passed its certificate: false means that an independent check found a limit exceeded",
+        "whether the gait passed its certificate; false means that an independent check found a limit exceeded",
     ),
     ("stride_time_s", "time from right heel strike to the next, s"),
-    ("stride_length_m", "distance between these heel strikes, m"),
-    ("domains", "the eight contact situations of a stride, in order from right heel strike"),
+    ("stride_length_m", "distance between right heel strikes, m"),
+    ("domains", "the eight domains of a stride (contact configurations), in order from right heel strike"),
     (
         "domains.name",
-        "DS2, DS3: double support; SS2, SS1: single support on the flat foot, on the toe; and the stance leg",
+        "DS2 and DS3: double support; SS2 and SS1: single support on the flat foot and on the toe; R or L: the stance leg",
     ),
-    ("domains.stance", "the leg that is, or becomes, the stance leg"),
+    ("domains.stance", "the stance leg; in double support, the leg that becomes it"),
     ("domains.duration_s", "planned duration, s"),
     ("domains.ends", "the event that ends the domain"),
     (
         "domains.phase_gradient_m_per_rad",
-        "the hip position is p = sum of these times the angles: the hip over the stance toe, linearised, m",
+        "coefficients c of the linearised hip position over the stance toe, p = sum of c times angle, m/rad",
     ),
     (
         "domains.phase_start_m",
         "p at the start of the domain; the phase is s = (p - phase_start_m) / (phase_end_m - phase_start_m)",
     ),
     ("domains.phase_end_m", "p at the end of the domain"),
-    (
-        "domains.hip_velocity_m_s",
-        "rate of p to be regulated, m/s; null where the walker is underactuated and p is free",
-    ),
-    ("domains.outputs", "joints that follow their curve y(s)"),
-    ("domains.outputs.joint", "name of the joint; torso: the trunk's lean"),
+    ("domains.hip_velocity_m_s", "set point of the rate of p, m/s; null in underactuated domains, in which p is free"),
+    ("domains.outputs", "joints that the controller drives along a curve y(s)"),
+    ("domains.outputs.joint", "name of the joint; torso is the lean of the trunk"),
     ("domains.outputs.bezier_rad", "coefficients a_0..a_5 of y(s) = sum of a_i C(5,i) s^i (1-s)^(5-i), rad"),
-    (
-        "trajectory",
-        "the prosthetic joints over one stride as set points in time, for tracking by proportional-derivative control",
-    ),
+    ("trajectory", "set points of the prosthetic joints over one stride, for proportional-derivative tracking in time"),
     ("trajectory.rate_hz", "samples per second; the last sample is the end of the stride"),
     ("trajectory.time_s", "time of each sample from right heel strike, s"),
     ("trajectory.knee_rad", "knee angle, flexion positive, rad"),
     ("trajectory.ankle_rad", "ankle angle, dorsiflexion positive, rad"),
-    ("trajectory.knee_rad_s", "its rate, rad/s; jumps at impacts"),
-    ("trajectory.ankle_rad_s", "the ankle's rate, rad/s; jumps at impacts"),
-    ("trajectory.knee_torque_n_m", "torque of the planned gait, flexion positive, N m: a feed-forward"),
-    ("trajectory.ankle_torque_n_m", "the same of the ankle, dorsiflexion positive, N m"),
+    ("trajectory.knee_rad_s", "knee velocity, rad/s; discontinuous at impacts"),
+    ("trajectory.ankle_rad_s", "ankle velocity, rad/s; discontinuous at impacts"),
+    ("trajectory.knee_torque_n_m", "feed-forward knee torque of the gait, flexion positive, N m"),
+    ("trajectory.ankle_torque_n_m", "feed-forward ankle torque of the gait, dorsiflexion positive, N m"),
 ];
 
-/// A gait for the device.
+/// A controller file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControllerFile {
@@ -77,59 +71,60 @@ pub struct ControllerFile {
     pub format: String,
     /// Version of the layout.
     pub format_version: u32,
-    /// Every field in words.
+    /// Description of each field.
     pub fields: BTreeMap<String, String>,
     /// Name of the prosthesis.
     pub device: String,
-    /// Whether the gait passed its certificate; absent in the file of a blinded walk, where it would tell the gait.
+    /// Whether the gait passed its certificate. Absent in the file of a blinded walk, because it could identify the
+    /// gait.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate_passed: Option<bool>,
-    /// s.
+    /// Stride time, s.
     pub stride_time_s: f64,
-    /// m.
+    /// Stride length, m.
     pub stride_length_m: f64,
     /// The eight domains.
     pub domains: Vec<ControlledDomain>,
-    /// The prosthetic joints over time.
+    /// Set points of the prosthetic joints over time.
     pub trajectory: Trajectory,
 }
 
-/// One contact situation.
+/// A domain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControlledDomain {
-    /// `DS2_R`, ...
+    /// Name: `DS2_R`, ...
     pub name: String,
     /// The stance leg.
     pub stance: Side,
-    /// s.
+    /// Planned duration, s.
     pub duration_s: f64,
-    /// The event that ends it, in words.
+    /// The event that ends the domain.
     pub ends: String,
-    /// d(hip position)/d(angle) by name, m/rad.
+    /// Derivative of the hip position with respect to each angle, m/rad.
     pub phase_gradient_m_per_rad: BTreeMap<String, f64>,
-    /// m.
+    /// Hip position at the start, m.
     pub phase_start_m: f64,
-    /// m.
+    /// Hip position at the end, m.
     pub phase_end_m: f64,
-    /// m/s; none in the underactuated domains.
+    /// Set point of the hip velocity, m/s; `None` in underactuated domains.
     pub hip_velocity_m_s: Option<f64>,
-    /// The driven joints.
+    /// The joints that the controller drives.
     pub outputs: Vec<Output>,
 }
 
-/// A joint and its curve.
+/// A driven joint and its curve.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// `hip_L`, ...
+    /// Name: `hip_L`, ...
     pub joint: String,
     /// Bezier coefficients, rad.
     pub bezier_rad: [f64; BEZIER_COEFFICIENTS],
 }
 
 impl Output {
-    /// The curve at a phase, rad.
+    /// The set point at a phase, rad.
     pub fn at(&self, s: f64) -> f64 {
         self.bezier_rad.iter().zip(basis(s)[0]).map(|(a, b)| a * b).sum()
     }
@@ -139,21 +134,21 @@ impl Output {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Trajectory {
-    /// Hz.
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
-    /// s from right heel strike.
+    /// Times of the samples from right heel strike, s.
     pub time_s: Vec<f64>,
-    /// rad.
+    /// Knee angle, flexion positive, rad.
     pub knee_rad: Vec<f64>,
-    /// rad.
+    /// Ankle angle, dorsiflexion positive, rad.
     pub ankle_rad: Vec<f64>,
-    /// rad/s.
+    /// Knee velocity, rad/s.
     pub knee_rad_s: Vec<f64>,
-    /// rad/s.
+    /// Ankle velocity, rad/s.
     pub ankle_rad_s: Vec<f64>,
-    /// N m.
+    /// Feed-forward knee torque, N m.
     pub knee_torque_n_m: Vec<f64>,
-    /// N m.
+    /// Feed-forward ankle torque, N m.
     pub ankle_torque_n_m: Vec<f64>,
 }
 
@@ -167,10 +162,10 @@ fn ends(kind: DomainKind) -> &'static str {
 }
 
 impl ControllerFile {
-    /// Of a gait, with set points at a rate.
+    /// The controller file of a gait, with set points at a sampling rate.
     ///
     /// # Errors
-    /// [`ModelError`] when the gait is not well-formed or the rate is out of [`RATE_RANGE_HZ`].
+    /// [`ModelError`] if the gait is malformed or the rate is outside [`RATE_RANGE_HZ`].
     pub fn new(gait: &Gait, rate_hz: f64) -> Result<Self, ModelError> {
         let rows = samples(gait, rate_hz)?;
         let model = WalkerModel::new(&gait.subject, &gait.device)?;
@@ -202,7 +197,7 @@ impl ControllerFile {
                     .collect(),
             })
             .collect();
-        // Prosthetic knee and ankle: the last two of coordinates and of torques.
+        // Prosthetic knee and ankle are the last two coordinates and the last two torques.
         let column =
             |value: &dyn Fn(&crate::gait::motion::Instant) -> f64| rows.iter().map(|(_, i)| value(i)).collect();
         let trajectory = Trajectory {
@@ -228,25 +223,25 @@ impl ControllerFile {
         })
     }
 
-    /// Reads a file and checks that it is one.
+    /// Parses and validates a controller file.
     ///
     /// # Errors
-    /// [`ModelError`] with line and column, or naming what is wrong.
+    /// [`ModelError`] with line and column, or with the reason.
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
         let malformed = |reason: String| ModelError::Malformed { what: "controller file".to_owned(), reason };
         let file: Self = serde_json::from_str(text).map_err(|e| malformed(e.to_string()))?;
         if file.format != FORMAT || file.format_version != FORMAT_VERSION {
-            return Err(malformed(format!("it is {:?} version {}", file.format, file.format_version)));
+            return Err(malformed(format!("format {:?} version {} is unknown", file.format, file.format_version)));
         }
         ModelError::check_range("trajectory.rate_hz", file.trajectory.rate_hz, RATE_RANGE_HZ.0, RATE_RANGE_HZ.1)?;
         if !file.domains.iter().map(|d| d.name.as_str()).eq(CYCLE.iter().map(|d| d.name())) {
-            return Err(malformed("the eight domains are not complete and in order".to_owned()));
+            return Err(malformed("the file must have the eight domains of a stride in order".to_owned()));
         }
         let t = &file.trajectory;
         let columns =
             [&t.knee_rad, &t.ankle_rad, &t.knee_rad_s, &t.ankle_rad_s, &t.knee_torque_n_m, &t.ankle_torque_n_m];
         if columns.iter().any(|column| column.len() != t.time_s.len()) {
-            return Err(malformed("the columns of the trajectory differ in length".to_owned()));
+            return Err(malformed("all columns of the trajectory must have the same length".to_owned()));
         }
         Ok(file)
     }

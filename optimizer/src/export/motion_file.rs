@@ -1,14 +1,14 @@
-//! A gait as an OpenSim motion file (.mot), with the coordinate names of the planar gait models (gait10dof18musc).
+//! OpenSim motion files (.mot) with the coordinate names of the planar gait models (gait10dof18musc).
 //!
-//! OpenSim's signs: pelvis_tilt and lumbar_extension backward, knee_angle negative in flexion. Pelvis and trunk are one
-//! link here, so lumbar_extension is 0 and hip_flexion, measured from the pelvis, is the model's hip angle.
+//! In OpenSim, pelvis_tilt and lumbar_extension are positive backwards and knee_angle is negative in flexion. The
+//! walker has one link for pelvis and trunk, so lumbar_extension is 0, and hip_flexion is the hip angle of the walker.
 
 use super::samples;
 use crate::gait::Gait;
 use crate::subject::ModelError;
 use std::fmt::Write;
 
-/// A column: name, index into q, sign.
+/// The columns: name, index into q, sign.
 const COLUMNS: [(&str, usize, f64); 9] = [
     ("pelvis_tilt", 2, -1.0),
     ("pelvis_tx", 0, 1.0),
@@ -21,10 +21,10 @@ const COLUMNS: [(&str, usize, f64); 9] = [
     ("ankle_angle_l", 5, 1.0),
 ];
 
-/// One stride from right heel strike, angles in degrees, at a rate.
+/// The motion file of one stride from right heel strike, angles in degrees, at a sampling rate.
 ///
 /// # Errors
-/// [`ModelError`] when the gait is not well-formed or the rate is out of [`super::RATE_RANGE_HZ`].
+/// [`ModelError`] if the gait is malformed or the rate is outside [`super::RATE_RANGE_HZ`].
 pub fn motion_file(gait: &Gait, rate_hz: f64) -> Result<String, ModelError> {
     let rows = samples(gait, rate_hz)?;
     let mut text = format!(

@@ -1,14 +1,14 @@
-//! Filtering forwards and backwards, so that nothing is delayed: what SciPy calls `filtfilt`, with its treatment of the
-//! ends (odd extension, each pass begins in the steady state of its first value).
+//! Zero-phase filtering by a forward and a backward pass, as `filtfilt` of SciPy: odd extension at both ends, and each
+//! pass starts in the steady state of its first value.
 
 use super::butterworth::Section;
 
-/// How far a signal is extended at both ends: three times the number of coefficients of the whole filter.
+/// Number of samples by which a signal is extended at both ends: three times the number of coefficients of the filter.
 pub(crate) fn extension(sections: &[Section]) -> usize {
     3 * (2 * sections.len() + 1)
 }
 
-/// The filtered signal; it must be longer than the extension.
+/// The filtered signal. `signal` must be longer than [`extension`].
 pub(crate) fn filter(sections: &[Section], signal: &[f64]) -> Vec<f64> {
     let extension = extension(sections);
     let last = signal.len() - 1;
@@ -22,7 +22,7 @@ pub(crate) fn filter(sections: &[Section], signal: &[f64]) -> Vec<f64> {
     extended[extension..extension + signal.len()].to_vec()
 }
 
-/// One pass, in place.
+/// One pass in place.
 fn pass(sections: &[Section], signal: &mut [f64]) {
     let mut steady = signal[0];
     for Section { b, a } in sections {

@@ -1,8 +1,8 @@
-//! The gait between its nodes: the continuous motion that its numbers stand for.
+//! The continuous motion of a gait between its nodes.
 //!
-//! Coordinates: the quintic through position, velocity and acceleration of neighbouring points. Torques and forces: the
-//! parabola through the three points of a mesh interval. Fibre lengths: the cubic of Hermite-Simpson collocation, whose
-//! slope is the parabola through the fibre velocities.
+//! - Coordinates: the quintic through position, velocity and acceleration of adjacent nodes.
+//! - Torques and forces: the parabola through the three nodes of a mesh interval.
+//! - Fibre lengths: the cubic of Hermite-Simpson collocation, whose slope is the parabola through the fibre velocities.
 
 use crate::gait::{DomainTrajectory, Gait, MuscleTrajectory};
 
@@ -21,13 +21,13 @@ pub(crate) struct Instant {
 #[derive(Debug, Clone)]
 pub(crate) struct MuscleInstant {
     pub(crate) fibre_length: [f64; 10],
-    /// Time derivative of `fibre_length`, 1/s.
+    /// Time derivative of the fibre length, 1/s.
     pub(crate) fibre_length_rate: [f64; 10],
     pub(crate) fibre_velocity: [f64; 10],
     pub(crate) activation: [f64; 10],
 }
 
-/// The gait at a share (0 to 1) of a well-formed domain's duration.
+/// The gait at a fraction (0 to 1) of the duration of a well-formed domain.
 pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> Instant {
     let gaps = domain.q.len() - 1;
     let gap_length = domain.duration_s / gaps as f64;
@@ -63,9 +63,8 @@ pub(crate) fn instant(domain: &DomainTrajectory, share: f64) -> Instant {
 }
 
 impl Gait {
-    /// The same gait with `parts` points for each of its own, for drawing: coordinates with velocities and accelerations,
-    /// and fibre lengths, as they are between the nodes; what has no derivatives there, linear. What is not a
-    /// well-formed gait stays as it is.
+    /// The gait with `parts` points for each node, for drawings. Coordinates and fibre lengths follow the continuous
+    /// motion; the other quantities are interpolated linearly. A malformed gait is returned unchanged.
     #[must_use]
     pub fn refined(&self, parts: usize) -> Self {
         let mut refined = self.clone();
@@ -110,7 +109,7 @@ fn refine(domain: &DomainTrajectory, parts: usize) -> DomainTrajectory {
     }
 }
 
-/// A mesh interval of three points, and a place in it.
+/// A mesh interval of three nodes, and a position in it.
 struct Interval {
     first: usize,
     share: f64,
@@ -143,7 +142,7 @@ impl Interval {
     }
 }
 
-/// The quintic on \[0, 1\] with the given value and two derivatives at both ends: value and two derivatives at s.
+/// Value and two derivatives at `s` of the quintic on \[0, 1\] with the given value and two derivatives at both ends.
 fn quintic(a: [f64; 3], b: [f64; 3], s: f64) -> [f64; 3] {
     let [value, slope, curvature] = [a[0], a[1], 0.5 * a[2]];
     let rest = [b[0] - value - slope - curvature, b[1] - slope - 2.0 * curvature, 0.5 * b[2] - curvature];
@@ -157,7 +156,7 @@ fn quintic(a: [f64; 3], b: [f64; 3], s: f64) -> [f64; 3] {
     ]
 }
 
-/// The cubic on \[0, 1\] with the given value and derivative at both ends: value and derivative at s.
+/// Value and derivative at `s` of the cubic on \[0, 1\] with the given value and derivative at both ends.
 fn cubic(a: [f64; 2], b: [f64; 2], s: f64) -> [f64; 2] {
     let change = b[0] - a[0];
     let c2 = 3.0 * change - 2.0 * a[1] - b[1];
@@ -177,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refined_domain_keeps_its_points_and_is_smooth_between_them() {
+    fn refined_domain_keeps_its_nodes_and_is_smooth_between_them() {
         let points = 5;
         let at = |k: usize| power(5, k as f64 / (points - 1) as f64);
         let row = |value: f64| [value; 9];
@@ -212,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn polynomials_of_its_degree_are_met_exactly() {
+    fn interpolation_reproduces_polynomials_of_its_degree() {
         for s in [0.0, 0.13, 0.5, 0.77, 1.0] {
             let wanted = power(5, s);
             for (found, wanted) in quintic(power(5, 0.0), power(5, 1.0), s).into_iter().zip(wanted) {

@@ -1,18 +1,18 @@
-//! Whether the parts of a gait fit together: for gaits that come from files.
+//! Validation of gaits from files: dimensions, order, times and ranges.
 
 use super::{DomainTrajectory, Gait};
 use crate::subject::ModelError;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain};
 
-/// What is known twice agrees up to this, s or m/s.
+/// Tolerance for redundant quantities, s or m/s.
 const ROUNDING: f64 = 1e-6;
 
 impl Gait {
-    /// Checks subject, device, bounds and settings against their ranges, and that the eight domains are complete, in
-    /// order, of matching lengths and times, and finite.
+    /// Checks the ranges of subject, device, bounds and settings, and the order, lengths, times and numbers of the
+    /// eight domains.
     ///
     /// # Errors
-    /// [`ModelError`] naming what is wrong.
+    /// [`ModelError`] with the field and the reason.
     pub fn validate(&self) -> Result<(), ModelError> {
         let version = f64::from(self.format_version);
         ModelError::check_range("format_version", version, 1.0, f64::from(crate::gait::FORMAT_VERSION))?;
@@ -39,25 +39,27 @@ impl Gait {
     }
 }
 
-/// `Err` in words when the points are not evenly spaced from the end of the domain before.
+/// Checks that the nodes are evenly spaced from the end of the previous domain. The error is the reason.
 fn check_times(trajectory: &DomainTrajectory, start_s: f64) -> Result<(), String> {
     let gaps = (trajectory.time_s.len() - 1) as f64;
     let planned = |k: usize| start_s + trajectory.duration_s * k as f64 / gaps;
     let in_time = |(k, time): (usize, &f64)| (time - planned(k)).abs() <= ROUNDING;
     match trajectory.time_s.iter().enumerate().position(|point| !in_time(point)) {
-        Some(k) => Err(format!("time_s[{k}] is {}, expected {:.6} by the durations", trajectory.time_s[k], planned(k))),
+        Some(k) => {
+            Err(format!("time_s[{k}] is {}, expected {:.6} from the durations", trajectory.time_s[k], planned(k)))
+        }
         None => Ok(()),
     }
 }
 
-/// `Err` in words when a trajectory is not one of the domain.
+/// Checks that a trajectory belongs to the domain. The error is the reason.
 fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result<(), String> {
     if trajectory.name != domain.name() {
-        return Err(format!("is named {:?}", trajectory.name));
+        return Err(format!("the name is {:?}", trajectory.name));
     }
     let points = trajectory.q.len();
     if points < 3 || points.is_multiple_of(2) {
-        return Err(format!("{points} points, expected an odd number from 3"));
+        return Err(format!("it has {points} nodes, expected an odd number of at least 3"));
     }
     let contacts = domain.contact_rows();
     let outputs = domain.outputs();
@@ -68,7 +70,7 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
             .zip(&contacts)
             .all(|(name, row)| (name.point, name.side, name.axis) == (row.point, row.side, row.axis));
     if !same_rows {
-        return Err("contact_rows are not those of this domain".to_owned());
+        return Err("contact_rows do not match the domain".to_owned());
     }
     if trajectory.outputs != outputs {
         return Err(format!("outputs are {:?}, expected {outputs:?}", trajectory.outputs));
@@ -84,7 +86,7 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
     lengths.extend(trajectory.contact_forces.iter().map(|f| ("contact_forces", f.len(), contacts.len())));
     lengths.extend(trajectory.bezier.iter().map(|row| ("bezier", row.len(), BEZIER_COEFFICIENTS)));
     if muscles != trajectory.muscles.is_some() {
-        return Err("muscles do not agree with the gait's".to_owned());
+        return Err("muscles are present in some domains only, or do not match with_muscles".to_owned());
     }
     if let Some(states) = &trajectory.muscles {
         lengths.push(("fibre_length", states.fibre_length.len(), points));
@@ -109,6 +111,6 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
     if angles.chain(efforts).chain(curves).all(|value| value.is_finite()) {
         Ok(())
     } else {
-        Err("holds a number that is not finite".to_owned())
+        Err("a number is not finite".to_owned())
     }
 }

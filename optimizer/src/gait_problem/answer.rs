@@ -1,11 +1,11 @@
-//! From variables to a gait in physical units.
+//! Conversion of variables to a gait in physical units.
 
 use super::programme::GaitProgramme;
 use crate::gait::{ContactRowName, DomainTrajectory, FORMAT_VERSION, Gait, MuscleTrajectory};
 use crate::solve::GaitProblem;
 use crate::walking::BEZIER_COEFFICIENTS;
 
-/// The gait that the variables of a programme describe.
+/// The gait of a vector of variables.
 pub fn gait_of(problem: &GaitProblem, programme: &GaitProgramme, x: &[f64]) -> Gait {
     let layout = &programme.layout;
     let value = |index: usize| layout.value(x, index);

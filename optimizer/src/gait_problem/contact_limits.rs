@@ -1,4 +1,4 @@
-//! C3: friction cones, heights of the feet, swing clearance, touchdown speed, forward hip velocity in SS1.
+//! Rows of C3: friction cones, foot heights, swing clearance, touchdown speed, and forward hip velocity in SS1.
 
 use super::entries::Entries;
 use super::layout::{FORCE, PointVariables, Q, QD};
@@ -10,31 +10,30 @@ use crate::body::dynamics::LinkHessian;
 use crate::gait::{Axis, Side};
 use crate::walking::{DomainKind, clearance_profile};
 
-/// Of a friction row, per newton.
+/// Scale of a friction row, 1/N.
 pub(super) const FRICTION_SCALE: f64 = 1.0 / 500.0;
-/// Of a height row, per metre.
+/// Scale of a height row, 1/m.
 pub(super) const HEIGHT_SCALE: f64 = 10.0;
 
-/// Side of a foot point (heel_L, toe_L, heel_R, toe_R).
+/// Side of a foot point in the order heel_L, toe_L, heel_R, toe_R.
 fn side_of(foot_point: usize) -> Side {
     if foot_point < 2 { Side::Left } else { Side::Right }
 }
 
-/// Each foot on the ground with its number, stance foot first.
+/// The feet on the ground with their numbers, stance foot first.
 fn feet(context: &PointContext<'_>) -> impl Iterator<Item = (usize, Side)> {
     let stance = context.layout.domain.stance;
     let on_the_ground = |side: &Side| context.contacts.iter().any(|row| row.side == *side);
     [stance, stance.other()].into_iter().filter(on_the_ground).enumerate()
 }
 
-/// The forces of a foot: whether along x, and their index.
+/// The forces of a foot: axis and index.
 fn forces_of(context: &PointContext<'_>, side: Side) -> impl Iterator<Item = (bool, usize)> {
     let rows = context.contacts.iter().enumerate().filter(move |(_, row)| row.side == side);
     rows.map(|(c, row)| (row.axis == Axis::X, c))
 }
 
-/// Share w of the swing that is over, as `(alpha T_SS2 + beta T_SS1) / (T_SS2 + T_SS1)`, with the two duration
-/// variables.
+/// Fraction of the swing, `w = (alpha T_SS2 + beta T_SS1) / (T_SS2 + T_SS1)`, with the two duration variables.
 struct SwingShare {
     w: f64,
     gradient: [f64; 2],
@@ -58,8 +57,8 @@ fn swing_share(programme: &GaitProgramme, d: usize, sigma: f64, x: &[f64]) -> Sw
     SwingShare { w, gradient, hessian, durations }
 }
 
-/// A height row at a relative time of domain `d`, on a node or not: the height, less the swing clearance where it
-/// applies.
+/// Value of a height row at a relative time of domain `d`, at a node or between nodes: the height minus the swing
+/// clearance, if it applies.
 pub(super) fn height_row(
     programme: &GaitProgramme,
     d: usize,
@@ -166,7 +165,7 @@ pub(super) fn jacobian(
     }
 }
 
-/// Hessian: link-space part into `link`, durations written directly.
+/// Hessian: adds the part in link space to `link`, and writes the part of the durations.
 #[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
     programme: &GaitProgramme,

@@ -1,14 +1,14 @@
-//! In which order a factorisation may eliminate the programme's variables and rows.
+//! The elimination tree of variables and rows, which the factorisation of the KKT matrix follows.
 //!
 //! From the leaves to the root:
 //!
-//! * each muscle at each node (states and force row; its activation higher, with the interval, where the objective
-//!   couples the activations of neighbouring points);
+//! * each muscle at each node: states and force row. If the objective couples activations of adjacent nodes, the
+//!   activation is higher, in the block of the interval;
 //! * each node;
-//! * the integration rows of each mesh interval, by bisection of the domain, so that an interval meets few others;
+//! * the integration rows of each mesh interval, by bisection of the domain, which limits the fill-in;
 //! * each domain (Bezier coefficients, phase limits);
-//! * each transition between domains (resets, impulse, and the velocities before an impact with the rows that determine
-//!   them, because the impact couples them with the next domain), by bisection of the stride's ring;
+//! * each transition between domains, by bisection of the ring of domains: resets, impulse, and the velocities before
+//!   an impact with the rows that determine them, because the impact couples them to the next domain;
 //! * the root: durations, hip velocities, lengths and the transition that closes the stride.
 
 use super::layout::{Layout, QD, QDD};
@@ -17,24 +17,24 @@ use crate::muscle::MUSCLE_COUNT;
 use crate::nlp::EliminationBlocks;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE};
 
-/// Transitions in the order of their elimination, each with the one that follows it; the last is part of the root.
+/// Transitions in order of elimination, each with its parent; the last one is part of the root.
 const TRANSITION_PARENTS: [(usize, usize); 7] = [(0, 1), (2, 1), (4, 5), (6, 5), (1, 3), (5, 3), (3, ROOT)];
 /// The transition that closes the stride.
 const ROOT: usize = 7;
 
-/// Blocks of one domain.
+/// Blocks of a domain.
 #[derive(Debug, Default)]
 struct DomainBlocks {
-    /// By point.
+    /// Block of each node.
     points: Vec<usize>,
-    /// By point, the first of ten.
+    /// First of the ten muscle blocks of each node.
     muscles: Vec<usize>,
-    /// By interval; empty without integration rows.
+    /// Block of each interval; empty without integration rows.
     intervals: Vec<usize>,
     own: usize,
 }
 
-/// Numbers blocks and notes their parents.
+/// Numbers blocks and records their parents.
 #[derive(Debug, Default)]
 struct Numbering {
     parent: Vec<Option<usize>>,
@@ -46,7 +46,7 @@ impl Numbering {
         self.parent.len() - 1
     }
 
-    /// Blocks of intervals [from, to), the middle one above both halves; returns the highest.
+    /// Adds blocks of the intervals [from, to), the middle one as parent of both halves. Returns the highest block.
     fn bisect(&mut self, blocks: &mut [usize], from: usize, to: usize) -> Option<usize> {
         if from == to {
             return None;
@@ -122,8 +122,8 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable, activations_are
                     for offset in [domain.fibre_length(), domain.fibre_velocity(), domain.activation()] {
                         tree.block_of_variable[p + offset + muscle] = own;
                     }
-                    // The higher block of a point between two intervals is above all others that either meets, and of
-                    // neighbouring intervals one is above the other.
+                    // Of two adjacent intervals one is an ancestor of the other. The ancestor takes the node between
+                    // them.
                     if let Some(interval) = highest.filter(|_| activations_are_coupled) {
                         tree.block_of_variable[p + domain.activation() + muscle] = interval;
                     }

@@ -1,4 +1,4 @@
-//! Writers of sparse derivatives: the same traversal first records the structure, later fills the values.
+//! Sparse derivatives: the same traversal first records the sparsity structure and later writes the values.
 
 use crate::nlp::SparsityPattern;
 
@@ -14,12 +14,12 @@ enum Sink<'a> {
 }
 
 impl<'a> Entries<'a> {
-    /// Records which entries are written.
+    /// Records the positions of entries.
     pub fn structure(scale: &'a [f64], entries: &'a mut Vec<(usize, usize)>) -> Self {
         Self { scale, sink: Sink::Structure(entries) }
     }
 
-    /// Adds into `values`, which is zeroed first.
+    /// Adds to `values`, which starts at zero.
     pub fn values(scale: &'a [f64], slots: &'a [u32], values: &'a mut [f64]) -> Self {
         values.fill(0.0);
         Self { scale, sink: Sink::Values { slots, values, cursor: 0 } }
@@ -31,7 +31,7 @@ impl<'a> Entries<'a> {
         self.put(row, variable, derivative * self.scale[variable]);
     }
 
-    /// Second derivative by two variables in physical units. Each unordered pair of different variables is written
+    /// Second derivative with respect to two variables in physical units. Each pair of different variables is written
     /// once, in either order.
     #[inline]
     pub fn hessian(&mut self, a: usize, b: usize, derivative: f64) {
@@ -51,17 +51,17 @@ impl<'a> Entries<'a> {
     }
 }
 
-/// A compressed structure and, for each call in traversal order, the slot it adds into.
+/// A compressed structure and, for each entry in traversal order, the slot that it adds to.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Compressed {
-    /// The structure.
+    /// Compressed structure.
     pub pattern: SparsityPattern,
-    /// Slot of each traversal entry.
+    /// Slot of each entry of the traversal.
     pub slots: Vec<u32>,
 }
 
 impl Compressed {
-    /// Compresses recorded entries into columns with ascending unique rows.
+    /// Compresses recorded entries to columns with increasing unique rows.
     pub fn new(rows: usize, columns: usize, entries: &[(usize, usize)]) -> Self {
         let mut order: Vec<u32> = (0..u32::try_from(entries.len()).unwrap_or(u32::MAX)).collect();
         order.sort_unstable_by_key(|&e| {

@@ -1,7 +1,7 @@
-//! C2: the relative-degree-1 hip-velocity output and the phase it drives.
+//! Rows of C2: the hip velocity, an output of relative degree 1, and the phase that it drives.
 //!
-//! In the fully actuated domains `dp = pa + v_hip T sigma_k`, `dp_dot = v_hip`, `dp_ddot = 0` (divided by 10); at the
-//! first point of every domain `dp = pa`.
+//! In the fully actuated domains `dp = pa + v_hip T sigma_k`, `dp_dot = v_hip` and `dp_ddot = 0` (divided by 10). At
+//! the first node of every domain `dp = pa`.
 
 use super::entries::Entries;
 use super::layout::{PointVariables, Q, QD, QDD};

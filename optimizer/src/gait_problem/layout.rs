@@ -1,28 +1,28 @@
-//! Where each variable of the programme sits, and its scale.
+//! Index and scale of each variable of the gait problem.
 //!
-//! All domains' point blocks first (domain-major, point-major), then v_hip (4), (x_L, D), then per domain the duration
-//! T, the phase limits, the Bezier coefficients (column-major) and the impulse. Variables are stored divided by their
-//! scale.
+//! The nodes of all domains come first (domain by domain, node by node), then four v_hip, then x_L and D, then for each
+//! domain the duration T, the phase limits, the Bezier coefficients (column-major) and the impulse. Variables are
+//! stored divided by their scale.
 
 use crate::body::{COORDINATES, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
 use crate::settings::Mesh;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, Domain, DomainKind};
 
-/// Most contact rows of a domain.
+/// Largest number of contact rows of a domain.
 pub const MAX_CONTACTS: usize = 5;
-/// Most outputs of a domain.
+/// Largest number of outputs of a domain.
 pub const MAX_OUTPUTS: usize = 6;
 
-/// Offsets within a point block.
+/// Offset of the coordinates in the variables of a node.
 pub const Q: usize = 0;
-/// Velocities.
+/// Offset of the velocities.
 pub const QD: usize = COORDINATES;
-/// Accelerations.
+/// Offset of the accelerations.
 pub const QDD: usize = 2 * COORDINATES;
-/// Torques.
+/// Offset of the torques.
 pub const U: usize = 3 * COORDINATES;
-/// Contact forces.
+/// Offset of the contact forces.
 pub const FORCE: usize = U + JOINTS;
 
 const SCALE_QD: f64 = 3.0;
@@ -33,22 +33,22 @@ const SCALE_FIBRE_VELOCITY: f64 = 3.0;
 const SCALE_DURATION: f64 = 0.2;
 const SCALE_IMPULSE: f64 = 20.0;
 
-/// Where the variables of one domain sit.
+/// Indices of the variables of a domain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DomainLayout {
-    /// Which domain.
+    /// The domain.
     pub domain: Domain,
-    /// Mesh intervals N.
+    /// Number of mesh intervals N.
     pub intervals: usize,
-    /// Points K = 2N + 1.
+    /// Number of nodes K = 2N + 1.
     pub points: usize,
-    /// First variable of the first point.
+    /// First variable of the first node.
     pub start: usize,
-    /// Variables per point.
+    /// Number of variables of a node.
     pub per_point: usize,
-    /// Contact rows nc.
+    /// Number of contact rows nc.
     pub contacts: usize,
-    /// Outputs (indices into q).
+    /// Outputs, as indices into q.
     pub outputs: Vec<usize>,
     /// Duration variable.
     pub duration: usize,
@@ -58,29 +58,29 @@ pub struct DomainLayout {
     pub phase_end: Option<usize>,
     /// First Bezier coefficient; coefficient i of output j is at `bezier + i * outputs.len() + j`.
     pub bezier: usize,
-    /// First impulse component, in domains opened by an impact.
+    /// First component of the impulse, in domains that begin with an impact.
     pub impulse: Option<usize>,
     /// Hip-velocity variable.
     pub hip_velocity: Option<usize>,
 }
 
 impl DomainLayout {
-    /// First variable of point k.
+    /// First variable of node k.
     #[inline]
     pub fn point(&self, k: usize) -> usize {
         self.start + k * self.per_point
     }
-    /// Offset of the fibre lengths within a point.
+    /// Offset of the fibre lengths in the variables of a node.
     #[inline]
     pub fn fibre_length(&self) -> usize {
         FORCE + self.contacts
     }
-    /// Offset of the fibre velocities within a point.
+    /// Offset of the fibre velocities in the variables of a node.
     #[inline]
     pub fn fibre_velocity(&self) -> usize {
         self.fibre_length() + MUSCLE_COUNT
     }
-    /// Offset of the activations within a point.
+    /// Offset of the activations in the variables of a node.
     #[inline]
     pub fn activation(&self) -> usize {
         self.fibre_velocity() + MUSCLE_COUNT
@@ -90,12 +90,12 @@ impl DomainLayout {
     pub fn bezier_coefficient(&self, j: usize, i: usize) -> usize {
         self.bezier + i * self.outputs.len() + j
     }
-    /// sigma_k = k / (K - 1).
+    /// Relative time of node k: sigma_k = k / (K - 1).
     #[inline]
     pub fn sigma(&self, k: usize) -> f64 {
         k as f64 / (self.points - 1) as f64
     }
-    /// Composite Simpson weight of point k over the domain (the weights sum to 1).
+    /// Composite Simpson weight of node k; the weights of a domain sum to 1.
     #[inline]
     pub fn simpson(&self, k: usize) -> f64 {
         let weight = if k % 2 == 1 {
@@ -107,29 +107,29 @@ impl DomainLayout {
         };
         weight / (6.0 * self.intervals as f64)
     }
-    /// Index of the last point.
+    /// Index of the last node.
     #[inline]
     pub fn last(&self) -> usize {
         self.points - 1
     }
 }
 
-/// Variable layout of the whole programme.
+/// Layout of the variables of the gait problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
-    /// With muscle variables.
+    /// Whether the problem has muscles.
     pub muscles: bool,
     /// The eight domains.
     pub domains: Vec<DomainLayout>,
-    /// First of the four hip velocities.
+    /// Index of the first of the four hip velocities.
     pub hip_velocities: usize,
-    /// Length of the right step x_L; the stride length D follows.
+    /// Index of the right step length x_L; the stride length D follows.
     pub right_step_length: usize,
-    /// Stride length D.
+    /// Index of the stride length D.
     pub stride_length: usize,
     /// Number of variables.
     pub variables: usize,
-    /// Physical value = stored value * scale.
+    /// Scale of each variable: physical value = stored value * scale.
     pub scale: Vec<f64>,
 }
 
@@ -144,11 +144,11 @@ pub struct PointVariables {
     pub qdd: [f64; 9],
     /// Torques, N m.
     pub u: [f64; 6],
-    /// Contact forces, N (unused entries 0).
+    /// Contact forces, N; unused entries are 0.
     pub force: [f64; MAX_CONTACTS],
-    /// Fibre length / optimal length.
+    /// Fibre length, optimal fibre lengths.
     pub fibre_length: [f64; MUSCLE_COUNT],
-    /// Fibre velocity, optimal lengths per second.
+    /// Fibre velocity, optimal fibre lengths per second.
     pub fibre_velocity: [f64; MUSCLE_COUNT],
     /// Activation.
     pub activation: [f64; MUSCLE_COUNT],
@@ -229,7 +229,7 @@ impl Layout {
         Self { muscles, domains, hip_velocities, right_step_length, stride_length, variables: next, scale }
     }
 
-    /// A variable in words, and its unit: `SS1_R point 3, velocity of knee_R`.
+    /// Name and unit of a variable: `SS1_R point 3, velocity of knee_R`.
     pub fn variable_label(&self, index: usize) -> (String, &'static str) {
         for layout in &self.domains {
             let name = layout.domain.name();
@@ -265,7 +265,7 @@ impl Layout {
         x[index] * self.scale[index]
     }
 
-    /// All variables of point k of domain d in physical units.
+    /// The variables of node k of domain d in physical units.
     #[inline]
     pub fn point_variables(&self, x: &[f64], d: usize, k: usize) -> PointVariables {
         let layout = &self.domains[d];
@@ -301,7 +301,7 @@ impl Layout {
         result
     }
 
-    /// Writes the variables of point k of domain d from physical units.
+    /// Writes the variables of node k of domain d from physical units.
     pub fn set_point_variables(&self, x: &mut [f64], d: usize, k: usize, point: &PointVariables) {
         let layout = &self.domains[d];
         let p = layout.point(k);

@@ -1,5 +1,4 @@
-//! C3, C4: bounds of the variables and of the inequality rows, from the tuned bounds a1..a8, the device and the
-//! settings.
+//! C3 and C4: bounds of variables and of inequality rows, from the tuned bounds a1 to a8, the device and the settings.
 
 use super::layout::{FORCE, Layout, Q, QD, QDD, U};
 use super::rows::RowTable;
@@ -10,16 +9,16 @@ use crate::muscle::{MUSCLE_COUNT, Muscle};
 use crate::settings::{GaitLimits, GaitSettings, PerDomainKind};
 use crate::walking::{CYCLE, DomainKind};
 
-/// Lower and upper bounds of the stored (scaled) variables.
+/// Lower and upper bounds of the stored, scaled variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VariableBounds {
-    /// Lower.
+    /// Lower bounds.
     pub lower: Vec<f64>,
-    /// Upper.
+    /// Upper bounds.
     pub upper: Vec<f64>,
 }
 
-/// Limits as the rows use them.
+/// Limits in the inequality rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ActiveLimits {
     /// Friction coefficient.
@@ -31,7 +30,7 @@ pub struct ActiveLimits {
 }
 
 impl ActiveLimits {
-    /// From settings and tuned bounds.
+    /// The limits of settings and tuned bounds.
     pub fn new(limits: &GaitLimits, bounds: &TunedBounds) -> Self {
         Self {
             friction: limits.friction,
@@ -50,7 +49,7 @@ fn of_kind(per: &PerDomainKind, kind: DomainKind) -> f64 {
     }
 }
 
-/// Least vertical force under the trailing foot, N, where a load falls linearly from heel strike to toe-off.
+/// Smallest vertical force under the trailing foot, N: it decreases linearly from heel strike to toe-off.
 fn trailing_load(kind: DomainKind, sigma: f64, at_heel_strike_n: f64) -> f64 {
     match kind {
         DomainKind::Ds2 => at_heel_strike_n * (1.0 - 0.5 * sigma),
@@ -157,8 +156,8 @@ pub fn variable_bounds(
     VariableBounds { lower, upper }
 }
 
-/// Sets the bounds of the inequality rows that depend on settings. With `relaxed_touchdown` the landing points only
-/// have to move downwards (first phase of the cold start).
+/// Sets the bounds of the inequality rows that depend on settings. With `relaxed_touchdown`, in the first phase of a
+/// cold start, landing points must only move downwards.
 pub fn set_row_bounds(rows: &mut RowTable, limits: &GaitLimits, relaxed_touchdown: bool) {
     for d in 0..rows.domains.len() {
         let touchdown = match CYCLE[d].kind {

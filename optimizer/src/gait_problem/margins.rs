@@ -1,8 +1,8 @@
-//! By how much bounds at nodes are tightened, so that the gait keeps them between the points too.
+//! Margins: tightened bounds at nodes, so that the gait satisfies the bounds between nodes too.
 //!
-//! A gait satisfies its constraints at the nodes; between two points that lie at a bound it may exceed it. What it
-//! exceeds there is taken from the bound at both, and the programme is solved on (an exchange method of semi-infinite
-//! programming, Hettich and Kortanek 1993, section 7).
+//! A gait satisfies its constraints at nodes, but may violate a bound between two nodes at the bound. The violation is subtracted
+//! from the bound at both nodes, and the solve continues (an exchange method of semi-infinite programming, Hettich and Kortanek
+//! 1993, section 7).
 
 use super::contact_limits::{FRICTION_SCALE, HEIGHT_SCALE, height_row};
 use super::layout::{DomainLayout, FORCE, Q, QD, QDD, U};
@@ -15,12 +15,12 @@ use crate::nlp::NonlinearProgram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Places between neighbouring points where the gait is checked, and their distance from the first point.
+/// Number of parts into which the check divides the interval between adjacent nodes.
 const PARTS: usize = 10;
-/// A bound is never moved by more than this share of its range.
+/// Largest margin, as a share of the range.
 const LARGEST_SHARE: f64 = 0.25;
 
-// What may be exceeded between the points: half of what the certificate allows there.
+// Tolerances between nodes: half of the limits of the certificate.
 const ANGLE_RAD: f64 = 0.005;
 const SPEED_RAD_S: f64 = 0.05;
 const ACCELERATION_RAD_S2: f64 = 2.5;
@@ -28,20 +28,20 @@ const TORQUE_N_M: f64 = 1.0;
 const HEIGHT_M: f64 = 5e-4;
 const NORMAL_FORCE_N: f64 = 2.5;
 const FRICTION_N: f64 = 6.0;
-/// Of the largest activation and of the largest fibre velocity.
+/// Share of the largest activation and of the largest fibre velocity.
 const MUSCLE_SHARE: f64 = 0.025;
 
-/// Tightened bounds, in the units of the stored variables and rows.
+/// Margins of variables and rows, in scaled units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(into = "MarginLists", from = "MarginLists")]
 pub struct Margins {
-    /// By variable: what the lower bound is raised by, the upper one lowered by.
+    /// For each variable, the margins of the lower and the upper bound.
     variables: BTreeMap<usize, [f64; 2]>,
-    /// By row: what the lower bound is raised by.
+    /// For each row, the margin of the lower bound.
     rows: BTreeMap<usize, f64>,
 }
 
-/// Margins as they are written: lists, because names of fields are words.
+/// Serialised form: lists, because JSON keys are strings.
 #[derive(Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct MarginLists {
@@ -61,29 +61,29 @@ impl From<MarginLists> for Margins {
     }
 }
 
-/// What a gait exceeds between its nodes.
+/// Violations of a gait between its nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excess {
-    /// By how much, at the points beside.
+    /// The violations, as margins of the adjacent nodes.
     margins: Margins,
-    /// The worst one as a multiple of what is left alone.
+    /// The largest violation, as a multiple of its tolerance.
     pub worst: f64,
 }
 
 impl Margins {
-    /// Whether nothing is tightened.
+    /// Whether no bound is tightened.
     pub fn is_empty(&self) -> bool {
         self.variables.is_empty() && self.rows.is_empty()
     }
 
-    /// Whether they can belong to a programme of this size.
+    /// Whether the margins fit a problem with these dimensions.
     pub fn fit(&self, variables: usize, rows: usize) -> bool {
         let usable = |margin: &f64| margin.is_finite() && *margin >= 0.0;
         self.variables.iter().all(|(&at, both)| at < variables && both.iter().all(usable))
             && self.rows.iter().all(|(&at, margin)| at < rows && usable(margin))
     }
 
-    /// Tightened further by what was exceeded.
+    /// Adds violations to the margins.
     pub fn grow(&mut self, excess: &Excess) {
         for (&variable, by) in &excess.margins.variables {
             let margin = self.variables.entry(variable).or_default();
@@ -96,14 +96,13 @@ impl Margins {
         }
     }
 
-    /// How many bounds are tightened.
+    /// Number of tightened bounds.
     pub fn count(&self) -> usize {
         let of_variables = self.variables.values().flatten().filter(|margin| **margin > 0.0);
         of_variables.count() + self.rows.len()
     }
 
-    /// The margins that bear on the point `x`: those whose tightened bound is not further away than the margin is wide. The
-    /// others are not needed there.
+    /// The margins that are relevant at the point `x`: those with a distance to the tightened bound of at most the margin.
     #[must_use]
     pub fn bearing_on(&self, programme: &GaitProgramme, x: &[f64]) -> Self {
         let mut values = vec![0.0; programme.rows.names.len()];
@@ -123,7 +122,7 @@ impl Margins {
         kept
     }
 
-    /// Moves bounds inwards: of variables by at most a share of their range, fixed ones not at all.
+    /// Tightens bounds: those of variables by at most a share of their range, those of fixed variables not at all.
     pub(super) fn apply(&self, lower: &mut [f64], upper: &mut [f64], row_lower: &mut [f64]) {
         for (&at, [low, high]) in &self.variables {
             let most = LARGEST_SHARE * (upper[at] - lower[at]);
@@ -137,7 +136,7 @@ impl Margins {
 }
 
 impl Excess {
-    /// A value between two points of a variable that is bounded at both.
+    /// Adds a value of a variable between two nodes.
     fn note_variable(&mut self, programme: &GaitProgramme, points: [usize; 2], value: f64, left_alone: f64) {
         for variable in points {
             let (low, high) = programme.variable_range(variable);
@@ -146,7 +145,7 @@ impl Excess {
         }
     }
 
-    /// `side` 0: below what is allowed, 1: above.
+    /// Adds a violation; `side` is 0 for the lower and 1 for the upper bound.
     fn note_side(&mut self, programme: &GaitProgramme, variable: usize, side: usize, beyond: f64, left_alone: f64) {
         if beyond > 0.5 * left_alone {
             self.worst = self.worst.max(beyond / left_alone);
@@ -164,8 +163,8 @@ impl Excess {
     }
 }
 
-/// What `gait`, the gait of the point `x` of `programme`, exceeds between its nodes: bounds of coordinates,
-/// torques, activations and fibre velocities, the heights of the feet, normal forces and friction.
+/// The violations between nodes of `gait`, the gait of the point `x` of `programme`: coordinates, torques, activations, fibre
+/// velocities, foot heights, normal forces and friction.
 pub fn excess_between_points(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> Excess {
     let mut values = vec![0.0; programme.rows.names.len()];
     programme.constraints(x, &mut values);
@@ -188,7 +187,7 @@ pub fn excess_between_points(programme: &GaitProgramme, gait: &Gait, x: &[f64]) 
 fn note_variables(programme: &GaitProgramme, layout: &DomainLayout, gap: usize, now: &Instant, excess: &mut Excess) {
     let beside = |offset: usize| [layout.point(gap) + offset, layout.point(gap + 1) + offset];
     for i in 0..COORDINATES {
-        // The hip's position is bounded for the solver's sake only.
+        // The bounds of the hip position are artificial.
         if i >= 2 {
             excess.note_variable(programme, beside(Q + i), now.q[i], ANGLE_RAD);
         }
@@ -234,11 +233,11 @@ fn note_forces(
     let layout = &programme.layout.domains[d];
     for (c, _) in programme.contacts[d].iter().enumerate().filter(|(_, row)| row.axis == Axis::Z) {
         for k in [gap, gap + 1] {
-            // Whatever the bound at the point: some are of the load that a foot still has to carry there.
+            // The limit is 0, because some bounds at nodes are the load of a foot before lift-off.
             excess.note_side(programme, layout.point(k) + FORCE + c, 0, -now.forces[c], NORMAL_FORCE_N);
         }
     }
-    // Forces follow parabolas, and the cone's edges are linear in them.
+    // Forces are parabolas, and the edges of the cone are linear in them.
     let points = &programme.rows.domains[d].points;
     let first = gap - gap % 2;
     let s = 0.5 * (share * (layout.points - 1) as f64 - first as f64);
@@ -259,7 +258,7 @@ mod tests {
     use crate::solve::GaitProblem;
     use crate::subject::Subject;
 
-    /// A programme and a posture that hangs still high above the ground, well within all bounds, its feet pressed down.
+    /// A problem, and a posture at rest high above the ground that satisfies all bounds, with positive normal forces.
     fn hanging() -> (GaitProblem, GaitProgramme, Vec<f64>) {
         let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
         let programme = problem.programme(false).unwrap();
@@ -284,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_swings_out_between_two_points_is_found_there_alone() {
+    fn joint_violation_between_nodes_is_found_at_its_place_only() {
         let (problem, programme, mut x) = hanging();
         assert_eq!(excess(&problem, &programme, &x), Excess::default());
         let layout = &programme.layout.domains[2];
@@ -309,7 +308,7 @@ mod tests {
         let by = most - tightened.variable_range(knee(5, Q)).1;
         assert!((by - of_angles[0].1[1] * scale[knee(5, Q)]).abs() < 1e-12);
         assert_eq!(tightened.variable_range(knee(4, Q)), programme.variable_range(knee(4, Q)));
-        // They are kept where the point is near the bound, and dropped where it is far from it.
+        // Margins near their bound stay relevant; others do not.
         let on = margins.bearing_on(&programme, &x);
         assert!(on.variables.contains_key(&knee(5, Q)) && on.variables.contains_key(&knee(6, Q)));
         x[knee(5, Q)] = 0.0;
@@ -317,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_foot_that_is_too_low_or_pulls_between_two_points_is_found() {
+    fn low_foot_and_pulling_force_between_nodes_are_found() {
         let (problem, programme, mut x) = hanging();
         let layout = &programme.layout.domains[0];
         let [first, second, third] = [0, 1, 2].map(|k| layout.point(k) + FORCE);
@@ -325,7 +324,7 @@ mod tests {
         x[first + row] = 1000.0 / programme.layout.scale[first + row];
         (x[second + row], x[third + row]) = (0.0, 0.0);
         let found = excess(&problem, &programme, &x);
-        // The parabola is lowest in the second gap: -125 N.
+        // The minimum of the parabola is in the second interval: -125 N.
         for at in [second + row, third + row] {
             let missing = found.margins.variables[&at][0] * programme.layout.scale[at];
             assert!((missing - 120.0).abs() < 6.0, "{missing}");
@@ -345,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_is_moved_by_a_quarter_of_its_range_at_most_and_only_where_there_is_one() {
+    fn margins_are_at_most_a_quarter_of_the_range_of_a_bound() {
         let margins = Margins {
             variables: BTreeMap::from([(0, [0.1, 9.0]), (1, [0.5, 0.5])]),
             rows: BTreeMap::from([(0, 0.2), (1, 0.2)]),

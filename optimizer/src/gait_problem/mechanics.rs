@@ -1,8 +1,8 @@
-//! C1 at one node: equations of motion and the kinematics of the contact points.
+//! Rows of C1 at a node: equations of motion and kinematics of the contact points.
 //!
-//! `M qdd + h = B u + J^T lambda` (divided by 100), `J qdd + Jdot qd = 0` (divided by 10), contact positions and
-//! velocities. All terms live in link space, so the Hessian of every row of a point is accumulated there once,
-//! together with the heights of [`super::contact_limits`].
+//! The rows are `M qdd + h = B u + J^T lambda` (divided by 100), `J qdd + Jdot qd = 0` (divided by 10), contact
+//! positions and contact velocities. The Hessians of all rows of a node, including the heights of
+//! [`super::contact_limits`], are summed in link space and transformed once.
 
 use super::entries::Entries;
 use super::layout::{FORCE, PointVariables, Q, QD, QDD, U};
@@ -18,7 +18,7 @@ use crate::walking::ContactRow;
 pub(super) const DYNAMICS_SCALE: f64 = 1.0 / 100.0;
 pub(super) const ACCELERATION_SCALE: f64 = 1.0 / 10.0;
 
-/// Generalised angle indices (0 torso, 1..4 left, 4..7 right) that a leg's links move.
+/// Indices of the angles that move the links of a leg: 0 torso, 1 to 3 left, 4 to 6 right.
 #[inline]
 pub(super) fn leg_angles(side: Side) -> [usize; 4] {
     match side {
@@ -27,7 +27,7 @@ pub(super) fn leg_angles(side: Side) -> [usize; 4] {
     }
 }
 
-/// Whether two generalised angles share a link (the two legs meet only in the torso).
+/// Whether two angles move a common link. The legs have only the torso in common.
 #[inline]
 pub(super) fn coupled(a: usize, b: usize) -> bool {
     a == 0 || b == 0 || (a < 4) == (b < 4)
@@ -50,7 +50,7 @@ fn along(axis: Axis, value: f64) -> [f64; 2] {
     }
 }
 
-/// d(position component)/d(generalised angles) of a contact point.
+/// d(position component)/d(angles) of a contact point.
 #[inline]
 pub(super) fn position_gradient(state: &PointState, point: &ContactPoint, axis: Axis) -> [f64; LINKS] {
     let mut per_link = [0.0; LINKS];
@@ -65,7 +65,7 @@ pub(super) fn position_gradient(state: &PointState, point: &ContactPoint, axis: 
     to_generalised(&per_link)
 }
 
-/// d(velocity component)/d(generalised angles).
+/// d(velocity component)/d(angles) of a contact point.
 #[inline]
 pub(super) fn velocity_angle_gradient(state: &PointState, point: &ContactPoint, axis: Axis) -> [f64; LINKS] {
     let mut per_link = [0.0; LINKS];
@@ -100,7 +100,7 @@ pub(super) fn add_contact_hessian(
     }
 }
 
-/// Values of the rows of one point.
+/// Values of the rows of a node.
 pub(super) fn values(
     programme: &GaitProgramme,
     context: &PointContext<'_>,
@@ -151,7 +151,7 @@ pub(super) fn subtract_force(
     }
 }
 
-/// Jacobian of the rows of one point. `p`: first variable of the point.
+/// Jacobian of the rows of a node; `p` is the first variable of the node.
 pub(super) fn jacobian(
     programme: &GaitProgramme,
     context: &PointContext<'_>,
@@ -162,7 +162,7 @@ pub(super) fn jacobian(
     out: &mut Entries<'_>,
 ) {
     let mut d = InverseDynamics::new(&programme.model).jacobian(state);
-    // Contact forces turn with their links: d(-t . f)/dpsi = a . f, A^T diag A.
+    // d(-t . f)/dpsi = a . f in link space, transformed by A^T diag A.
     let mut link_stiffness = [0.0; LINKS];
     for (c, row) in context.contacts.iter().enumerate() {
         let foot = programme.contact_point(*row);
@@ -254,7 +254,7 @@ pub(super) fn jacobian(
     }
 }
 
-/// Accumulates the Hessian of the rows of one point in link space, and writes the force columns.
+/// Adds the Hessian of the rows of a node in link space, and writes the columns of the forces.
 #[allow(clippy::too_many_arguments)] // point, posture, multipliers and the two sinks are different things
 pub(super) fn hessian(
     programme: &GaitProgramme,
@@ -276,7 +276,7 @@ pub(super) fn hessian(
     for (c, contact) in context.contacts.iter().enumerate() {
         let foot = programme.contact_point(*contact);
         let axis = axis_index(contact.axis);
-        // -t . f weighted: second derivative +t . f, cross with the force +a.
+        // The term -t . f has the second derivative +t . f and the mixed derivative +a with the force.
         let mut cross = [[0.0; 1]; LINKS];
         for (k, u) in foot.vectors.iter().enumerate() {
             let j = foot.first_link + k;
@@ -307,7 +307,7 @@ pub(super) fn hessian(
     }
 }
 
-/// Writes an accumulated link-space Hessian of one point.
+/// Writes the Hessian of a node, summed in link space.
 pub(super) fn write_link_hessian(link: &LinkHessian, p: usize, out: &mut Entries<'_>) {
     let general = link.generalised();
     for i in 0..LINKS {

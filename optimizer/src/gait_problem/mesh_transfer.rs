@@ -1,9 +1,9 @@
-//! A primal-dual point of one mesh as a start on another.
+//! Transfer of a primal-dual point to another mesh.
 //!
-//! Variables follow the parabola through the three points of their mesh interval. Constraints at points approximate
-//! constraints at all times, so a multiplier there is a density times the point's share of the domain (its Simpson
-//! weight): densities are interpolated linearly, which keeps their signs. Multipliers of the integration rows are
-//! values of a costate and are interpolated as they are.
+//! Variables are interpolated by the parabola through the three nodes of their mesh interval. Constraints at nodes
+//! approximate constraints at all times, so a multiplier is a density times the Simpson weight of its node. Densities
+//! are interpolated linearly, which preserves their signs. Multipliers of integration rows are values of a costate and
+//! are interpolated directly.
 
 use super::layout::DomainLayout;
 use super::programme::GaitProgramme;
@@ -11,8 +11,8 @@ use super::rows::{Place, RowKind, RowName};
 use crate::nlp::WarmPoint;
 use std::collections::HashMap;
 
-/// Moves `point` of `from` to the mesh of `to`, a programme of the same variant. Slacks and their multipliers are left to
-/// the solver, which derives them from the rows.
+/// Transfers `point` from the mesh of `from` to that of `to`, a problem of the same variant. The solver initialises
+/// slacks and their multipliers from the rows.
 pub fn transfer(from: &GaitProgramme, to: &GaitProgramme, point: &WarmPoint) -> WarmPoint {
     WarmPoint {
         x: transfer_variables(from, to, &point.x, parabola),
@@ -23,7 +23,7 @@ pub fn transfer(from: &GaitProgramme, to: &GaitProgramme, point: &WarmPoint) -> 
     }
 }
 
-/// The value at a place of the domain given those at its old points.
+/// Interpolates at a position in the domain, given the values at its old nodes.
 type Interpolation = fn(&DomainLayout, &DomainLayout, usize, &dyn Fn(usize) -> f64) -> f64;
 
 fn transfer_variables(from: &GaitProgramme, to: &GaitProgramme, values: &[f64], by: Interpolation) -> Vec<f64> {
@@ -35,13 +35,13 @@ fn transfer_variables(from: &GaitProgramme, to: &GaitProgramme, values: &[f64], 
             }
         }
     }
-    // What does not belong to a node comes last, in the same order.
+    // The variables without node come last, in the same order.
     let (start_old, start) = (from.layout.hip_velocities, to.layout.hip_velocities);
     result[start..].copy_from_slice(&values[start_old..]);
     result
 }
 
-/// Parabola through the three points of the old interval.
+/// Parabola through the three nodes of the old interval.
 fn parabola(old: &DomainLayout, new: &DomainLayout, k: usize, value: &dyn Fn(usize) -> f64) -> f64 {
     let place = new.sigma(k) * old.intervals as f64;
     let interval = whole_below(place, old.intervals - 1);
@@ -50,7 +50,7 @@ fn parabola(old: &DomainLayout, new: &DomainLayout, k: usize, value: &dyn Fn(usi
     a * (1.0 - s) * (1.0 - 2.0 * s) + b * 4.0 * s * (1.0 - s) + c * s * (2.0 * s - 1.0)
 }
 
-/// Linear between the densities at the old points.
+/// Linear interpolation of the densities at the old nodes.
 fn density(old: &DomainLayout, new: &DomainLayout, k: usize, value: &dyn Fn(usize) -> f64) -> f64 {
     let place = new.sigma(k) * old.last() as f64;
     let at = whole_below(place, old.last() - 1);
@@ -66,14 +66,14 @@ fn whole_below(value: f64, most: usize) -> usize {
 }
 
 fn transfer_rows(from: &GaitProgramme, to: &GaitProgramme, values: &[f64]) -> Vec<f64> {
-    // Rows that differ in their point only, in the order of the points.
+    // Rows that differ in their node only, in the order of the nodes.
     let mut alike: HashMap<RowName, Vec<usize>> = HashMap::new();
     for (row, name) in from.rows.names.iter().enumerate() {
         alike.entry(whatever_the_point(*name)).or_default().push(row);
     }
     let multiplier = |name: RowName| match alike.get(&whatever_the_point(name)).map(Vec::as_slice) {
         None => 0.0,
-        // A condition at one place, not on a share of the domain.
+        // A condition at one instant has no density.
         Some([row]) => values[*row],
         Some(rows) => {
             let sigma_of = |row: usize| sigma(from, from.rows.names[row]);
@@ -81,7 +81,7 @@ fn transfer_rows(from: &GaitProgramme, to: &GaitProgramme, values: &[f64]) -> Ve
             let place = sigma(to, name);
             let above = rows.partition_point(|row| sigma_of(*row) < place).clamp(1, rows.len() - 1);
             let (a, b) = (rows[above - 1], rows[above]);
-            // Constant beyond the first and the last.
+            // Constant before the first and after the last.
             let share = ((place - sigma_of(a)) / (sigma_of(b) - sigma_of(a))).clamp(0.0, 1.0);
             weight(to, name) * ((1.0 - share) * density_of(a) + share * density_of(b))
         }
@@ -96,13 +96,13 @@ fn whatever_the_point(name: RowName) -> RowName {
     }
 }
 
-/// Where in its domain a row is, from 0 to 1.
+/// Position of a row in its domain, 0 to 1.
 fn sigma(programme: &GaitProgramme, name: RowName) -> f64 {
     let Place::Point { domain, point } = name.place else { return 0.0 };
     programme.layout.domains[usize::from(domain)].sigma(usize::from(point))
 }
 
-/// Share of the domain that a row at a point stands for; 1 for the integration over an interval.
+/// Simpson weight of the node of a row; 1 for an integration row.
 fn weight(programme: &GaitProgramme, name: RowName) -> f64 {
     let Place::Point { domain, point } = name.place else { return 1.0 };
     match name.kind {
@@ -134,7 +134,7 @@ mod tests {
     const COARSE: Mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 3 };
     const FINE: Mesh = Mesh { ds2: 4, ds3: 2, ss2: 6, ss1: 5 };
 
-    /// Any numbers, positive as bound multipliers are.
+    /// Arbitrary positive numbers, as bound multipliers must be positive.
     fn numbers(count: usize) -> Vec<f64> {
         (0..count).map(|i| 1.0 + (i as f64 * 0.7).sin()).collect()
     }
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_mesh_changes_nothing() {
+    fn transfer_to_the_same_mesh_is_the_identity() {
         let programme = programme(COARSE);
         let point = some_point(&programme);
         let moved = transfer(&programme, &programme, &point);
@@ -167,9 +167,8 @@ mod tests {
         }
     }
 
-    /// Variables that are parabolas in time, multipliers whose densities are straight lines.
     #[test]
-    fn parabolas_and_even_densities_are_met_on_another_mesh() {
+    fn transfer_reproduces_parabolas_and_linear_densities() {
         let (coarse, fine) = (programme(COARSE), programme(FINE));
         let fill = |programme: &GaitProgramme| {
             let mut point = some_point(programme);

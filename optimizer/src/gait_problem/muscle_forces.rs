@@ -1,5 +1,7 @@
-//! C5-C7: force equilibrium of fibre and tendon, `s f_l(l_ce) f_v(v_ce) = f_se(e)`, with the tendon strain e from the
-//! posture; C9-C12: the joint torques are the muscles' (divided by 100).
+//! Rows of C5 to C7 and C9 to C12.
+//!
+//! C5 to C7 are the force equilibrium of fibre and tendon, `s f_l(l_ce) f_v(v_ce) = f_se(e)`, with the tendon strain e
+//! from the posture. C9 to C12 equate joint torques and muscle torques (divided by 100).
 
 use super::entries::Entries;
 use super::layout::{DomainLayout, PointVariables, Q, U};
@@ -10,14 +12,14 @@ use crate::muscle::{CurveValue, MUSCLE_COUNT, Muscle, force_length, force_veloci
 
 const TORQUE_SCALE: f64 = 1.0 / 100.0;
 
-/// Curves and geometry of one muscle at one point.
+/// Curves and geometry of a muscle at a node.
 struct MuscleState {
     length: CurveValue,
     velocity: CurveValue,
     tendon: CurveValue,
     /// d(strain)/d(fibre length).
     strain_by_length: f64,
-    /// (coordinate, geometry) of the spanned joints.
+    /// Coordinate and geometry of each spanned joint.
     joints: [Option<(usize, AttachmentValue)>; 2],
     slack: f64,
     max_force: f64,
@@ -44,7 +46,7 @@ fn muscle_state(muscle: &Muscle, m: usize, point: &PointVariables) -> MuscleStat
     }
 }
 
-/// Torque row (0 hip_L, 1 knee_L, 2 ankle_L, 3 hip_R) of a coordinate.
+/// Torque row of a coordinate: 0 hip_L, 1 knee_L, 2 ankle_L, 3 hip_R.
 const fn torque_row(coordinate: usize) -> usize {
     coordinate - 3
 }
@@ -127,8 +129,8 @@ pub(super) fn hessian(
         out.hessian(activation, velocity, weight * fl.value * fv.first * inverse_speed);
         out.hessian(velocity, length, weight * s * fl.first * fv.first * inverse_speed);
         out.hessian(velocity, velocity, weight * s * fl.value * fv.second * inverse_speed * inverse_speed);
-        // The tendon force enters its own row with -1 and the torque rows with -arm F_max: with
-        // W(q) = -weight - sum_i scale mu_i arm_i(q_i), the rest of the Lagrangian is W(q) f_se(e(x, q)).
+        // The tendon force has the coefficient -1 in its own row and -arm F_max in the torque rows. Its part of the
+        // Lagrangian is W(q) f_se(e(x, q)) with W(q) = -weight - sum_i scale mu_i arm_i(q_i).
         let scale = -TORQUE_SCALE * state.max_force;
         let mut w = -weight;
         for (coordinate, joint) in state.joints.iter().flatten() {

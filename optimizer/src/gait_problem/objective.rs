@@ -1,9 +1,11 @@
-//! The objective: mechanical cost of transport, regularisation, and (in the cold start) tracking of the reference.
+//! The objective: mechanical cost of transport, regularisation, and tracking of the reference gait.
 //!
-//! `f = w_cot E / (m g D) + w_track track + reg`, `E = sum_domains T sum_k w_k sum_i (sqrt(P_i^2 + eps^2) - eps)` over the
-//! six joint powers `P_i = u_i qd_(3+i)`, `reg = sum_domains T (sum_k w_k (weighted squares) + (1/N) sum (weighted squares
-//! of bends))`, a bend being `s_(k-1) - 2 s_k + s_(k+1)` of an activation at three neighbouring points of a domain,
-//! `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`; w_k composite Simpson weights.
+//! `f = w_cot E / (m g D) + w_track track + reg` with composite Simpson weights w_k and
+//!
+//! - `E = sum_domains T sum_k w_k sum_i (sqrt(P_i^2 + eps^2) - eps)`, over the six joint powers `P_i = u_i qd_(3+i)`,
+//! - `reg = sum_domains T (sum_k w_k (weighted squares) + (1/N) sum (weighted squares of bends))`, where the bend of an
+//!   activation is its second difference `s_(k-1) - 2 s_k + s_(k+1)` over adjacent nodes of a domain,
+//! - `track = sum_domains (1/K) sum_k |q[2..] - q_ref|^2`.
 
 use super::entries::Entries;
 use super::layout::{FORCE, Q, QD, QDD, U};
@@ -11,20 +13,20 @@ use super::programme::GaitProgramme;
 use crate::body::{COORDINATES, GRAVITY, JOINTS};
 use crate::muscle::MUSCLE_COUNT;
 
-/// The parts of the objective, before their weights.
+/// The parts of the objective before weighting.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ObjectiveParts {
     /// Mechanical cost of transport E / (m g D).
     pub cost_of_transport: f64,
-    /// Mechanical energy E of a stride, J.
+    /// Mechanical effort E of a stride, J.
     pub energy_j: f64,
-    /// Regularisation, weighted.
+    /// Regularisation, with its weights.
     pub regularisation: f64,
     /// Tracking.
     pub tracking: f64,
 }
 
-/// A regularised variable: offset within the point and weight of its square in physical units.
+/// A regularised variable: offset in the variables of a node, and weight of its square in physical units.
 fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
     let layout = &programme.layout.domains[d];
     let weights = &programme.regularisation;
@@ -45,10 +47,10 @@ fn squares(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = (usize, 
         }))
 }
 
-/// Coefficients of an activation's bend at three neighbouring points.
+/// Coefficients of the bend of an activation at three adjacent nodes.
 const BEND: [f64; 3] = [1.0, -2.0, 1.0];
 
-/// Variables of each activation's bend, and the weight of its square; nothing without a weight.
+/// The variables of each bend with the weight of its square; empty if the weight is zero.
 fn bends(programme: &GaitProgramme, d: usize) -> impl Iterator<Item = ([usize; 3], f64)> + '_ {
     let domain = &programme.layout.domains[d];
     let bends = if programme.activations_are_coupled() { domain.points - 2 } else { 0 };
@@ -113,7 +115,7 @@ pub(super) fn value(programme: &GaitProgramme, x: &[f64]) -> f64 {
     weights.cost_of_transport * parts.cost_of_transport + weights.tracking * parts.tracking + parts.regularisation
 }
 
-/// Gradient by the stored (scaled) variables.
+/// Gradient with respect to the stored, scaled variables.
 pub(super) fn gradient(programme: &GaitProgramme, x: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     let layout = &programme.layout;

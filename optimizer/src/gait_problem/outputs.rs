@@ -1,8 +1,8 @@
-//! C2: the relative-degree-2 virtual constraints, exact on the zero dynamics.
+//! Rows of C2: the virtual constraints, outputs of relative degree 2.
 //!
-//! `e0 = q_o - y(s)`, `e1 = qd_o - y'(s) sd`, `e2 = qdd_o - y''(s) sd^2 - y'(s) sdd` (the last divided by 10) with
-//! Bezier y of the domain. In the fully actuated domains s = sigma_k, sd = 1/T, sdd = 0 exactly; in SS1
-//! `s = (dp - pa)/(pb - pa)` follows the walker.
+//! The rows are `e0 = q_o - y(s)`, `e1 = qd_o - y'(s) sd` and `e2 = qdd_o - y''(s) sd^2 - y'(s) sdd` (divided by 10),
+//! with the Bezier curve y of the domain. In the fully actuated domains s = sigma_k, sd = 1/T and sdd = 0 exactly. In
+//! SS1 `s = (dp - pa)/(pb - pa)` depends on the state.
 
 use super::entries::Entries;
 use super::layout::{DomainLayout, MAX_OUTPUTS, PointVariables, Q, QD, QDD};
@@ -12,7 +12,7 @@ use crate::walking::{BEZIER_COEFFICIENTS, basis};
 
 const SECOND_SCALE: f64 = 0.1;
 
-/// The phase of a point: s and its first two time derivatives, as the outputs see it.
+/// The phase s at a node, with its first two time derivatives.
 #[derive(Debug, Clone, Copy)]
 struct Phase {
     s: f64,
@@ -116,7 +116,7 @@ pub(super) fn jacobian(
                 out.jacobian(row2, layout.duration, -SECOND_SCALE * 2.0 * y[2] * phase.rate * rate_by_duration);
             }
             Some(end) => {
-                // Derivatives by (s, v, a), then by (dp, pa, pb), (dpd, ...), (dpdd, ...).
+                // Derivatives with respect to (s, v, a), then to (dp, pa, pb), (dpd, ...), (dpdd, ...).
                 let (v, a) = (phase.rate, phase.acceleration);
                 let by_s = [-y[1], -y[2] * v, -SECOND_SCALE * (y[3] * v * v + y[2] * a)];
                 let by_v = [0.0, -y[1], -SECOND_SCALE * 2.0 * y[2] * v];
@@ -223,7 +223,7 @@ pub(super) fn hessian(
                 + l_vv * dv[r] * dv[c];
         }
     }
-    // Second derivatives of s, v, a themselves: each is (z - pa')/width.
+    // Second derivatives of s, v and a; each has the form (z - pa')/width.
     let i2 = inverse * inverse;
     let mut both = |r: usize, c: usize, value: f64| {
         h[r][c] += value;

@@ -1,4 +1,4 @@
-//! The programme as the solver sees it: traversal of all rows for values, Jacobian and Hessian.
+//! The gait problem as a nonlinear programme for the solver: traversal of all rows for values, Jacobian and Hessian.
 
 use super::elimination_tree::elimination_tree;
 use super::entries::{Compressed, Entries};
@@ -22,16 +22,16 @@ use crate::subject::{ModelError, Subject};
 use crate::walking::{CYCLE, ContactRow, phase_gradient};
 use std::sync::Arc;
 
-/// Weights of the objective's parts in a phase of the solve.
+/// Weights of the parts of the objective in a phase of the solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObjectiveWeights {
-    /// Of the cost of transport.
+    /// Weight of the cost of transport.
     pub cost_of_transport: f64,
-    /// Of the tracking term.
+    /// Weight of the tracking term.
     pub tracking: f64,
 }
 
-/// Nonzero terms of the phase gradient of a stance side: (index in q, coefficient).
+/// Nonzero terms of the phase gradient of a stance side: index in q and coefficient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PhaseTerms([(usize, f64); 4]);
 
@@ -47,7 +47,7 @@ impl PhaseTerms {
         self.0.into_iter()
     }
 
-    /// dp and its first two derivatives at a point.
+    /// dp and its first two time derivatives at a node.
     #[inline]
     pub(super) fn derivatives(&self, point: &PointVariables) -> [f64; 3] {
         [self.along(&point.q), self.along(&point.qd), self.along(&point.qdd)]
@@ -59,7 +59,7 @@ impl PhaseTerms {
     }
 }
 
-/// What the rows of one domain share.
+/// Common data of the rows of a domain.
 pub(super) struct DomainContext<'a> {
     pub(super) d: usize,
     pub(super) layout: &'a DomainLayout,
@@ -67,7 +67,7 @@ pub(super) struct DomainContext<'a> {
     pub(super) duration: f64,
 }
 
-/// What the rows of one point share.
+/// Common data of the rows of a node.
 pub(super) struct PointContext<'a> {
     pub(super) d: usize,
     pub(super) k: usize,
@@ -83,7 +83,7 @@ pub(super) struct PointContext<'a> {
 }
 
 impl PointContext<'_> {
-    /// dp and its first two derivatives at the point.
+    /// dp and its first two time derivatives at the node.
     #[inline]
     pub(super) fn hip_phase(&self, point: &PointVariables) -> [f64; 3] {
         self.phase.derivatives(point)
@@ -95,7 +95,7 @@ impl PointContext<'_> {
     }
 }
 
-/// The gait programme of one subject, device, set of bounds and variant.
+/// The gait problem of a subject, device, set of bounds and variant, as a nonlinear programme.
 #[derive(Debug, Clone)]
 pub struct GaitProgramme {
     /// The walker.
@@ -114,7 +114,7 @@ pub struct GaitProgramme {
     pub(super) contacts: Vec<Vec<ContactRow>>,
     contact_targets: Vec<Vec<[f64; 3]>>,
     phases: [PhaseTerms; 2],
-    /// Reference angles q[2..] by domain and point, rad.
+    /// Reference angles q[2..] of each domain and node, rad.
     pub(super) reference_angles: Vec<Vec<[f64; 7]>>,
     bounds: VariableBounds,
     settings: GaitSettings,
@@ -123,14 +123,14 @@ pub struct GaitProgramme {
     structure: Arc<Structure>,
 }
 
-/// A row or variable bound that is not met.
+/// A violated row or variable bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowViolation {
-    /// The row, or
+    /// The row, if it is one.
     pub row: Option<usize>,
-    /// the variable whose bound it is.
+    /// The variable, if it is a bound.
     pub variable: Option<usize>,
-    /// In coded units.
+    /// Violation, in scaled units.
     pub amount: f64,
 }
 
@@ -141,10 +141,10 @@ struct Structure {
     blocks: EliminationBlocks,
 }
 
-/// Stride fractions at the domain boundaries of the cold start's motion and of the tracked reference, from 0 to 1.
+/// Stride fractions, 0 to 1, of the boundaries between domains in the initial guess and the tracked reference gait.
 pub type StrideTiming = [f64; 9];
 
-/// Both steps alike.
+/// The same timing in both steps.
 pub const EVEN_TIMING: StrideTiming = [0.0, 0.07, 0.12, 0.33, 0.50, 0.57, 0.62, 0.83, 1.0];
 
 fn reference_points(layout: &Layout, reference: &ReferenceGait, timing: &StrideTiming) -> Vec<Vec<[f64; 7]>> {
@@ -156,10 +156,10 @@ fn reference_points(layout: &Layout, reference: &ReferenceGait, timing: &StrideT
 }
 
 impl GaitProgramme {
-    /// Builds the programme with the weights of the final phase (cost of transport 1, tracking as the settings say).
+    /// The gait problem with the weights of the final phase: 1 for the cost of transport, and that of the settings for tracking.
     ///
     /// # Errors
-    /// [`ModelError`] naming what is out of range.
+    /// [`ModelError`] with the field that is out of range.
     pub fn new(
         subject: &Subject,
         device: &Device,
@@ -214,8 +214,7 @@ impl GaitProgramme {
         Ok(programme)
     }
 
-    /// The same programme in the tracking phase of the cold start: other weights, landing points only have to move
-    /// downwards.
+    /// The problem of a tracking phase: other weights, and landing points must only move downwards.
     #[must_use]
     pub fn for_tracking(&self, tracking: f64) -> Self {
         let mut programme = self.clone();
@@ -224,7 +223,7 @@ impl GaitProgramme {
         programme
     }
 
-    /// The same programme with another timing of the tracked reference.
+    /// The problem with another timing of the tracked reference gait.
     #[must_use]
     pub fn with_timing(mut self, timing: &StrideTiming) -> Self {
         self.timing = *timing;
@@ -232,7 +231,7 @@ impl GaitProgramme {
         self
     }
 
-    /// Stride fraction of a relative time of domain d in the timing of the tracked reference.
+    /// Stride fraction of a relative time of domain d, by the timing of the tracked reference gait.
     pub fn stride_fraction(&self, d: usize, sigma: f64) -> f64 {
         self.timing[d] + sigma * (self.timing[d + 1] - self.timing[d])
     }
@@ -242,14 +241,14 @@ impl GaitProgramme {
         objective::parts(self, x)
     }
 
-    /// Largest violation of any row or variable bound at x, in coded units, with what is violated.
+    /// Largest violation of a row or variable bound at x, in scaled units, with its row or variable.
     pub fn violations(&self, x: &[f64]) -> Vec<RowViolation> {
         let mut values = vec![0.0; self.rows.names.len()];
         self.constraints(x, &mut values);
         let mut result = Vec::new();
         for (row, value) in values.iter().enumerate() {
             let excess = (self.rows.lower[row] - value).max(value - self.rows.upper[row]);
-            // A value that is not a number is a violation.
+            // NaN is a violation.
             if excess > 0.0 || excess.is_nan() {
                 result.push(RowViolation { row: Some(row), variable: None, amount: excess });
             }
@@ -264,7 +263,7 @@ impl GaitProgramme {
         result
     }
 
-    /// The same programme with tightened bounds.
+    /// The problem with tightened bounds.
     #[must_use]
     pub fn tightened(&self, margins: &Margins) -> Self {
         let mut programme = self.clone();
@@ -277,14 +276,14 @@ impl GaitProgramme {
         (&self.bounds.lower, &self.bounds.upper)
     }
 
-    /// Moves every variable into its bounds.
+    /// Projects every variable into its bounds.
     pub fn project_into_bounds(&self, x: &mut [f64]) {
         for (value, (low, high)) in x.iter_mut().zip(self.bounds.lower.iter().zip(&self.bounds.upper)) {
             *value = value.max(*low).min(*high);
         }
     }
 
-    /// Range of a variable in physical units.
+    /// Range of a variable, in physical units.
     pub fn variable_range(&self, variable: usize) -> (f64, f64) {
         let scale = self.layout.scale[variable];
         (self.bounds.lower[variable] * scale, self.bounds.upper[variable] * scale)
@@ -295,7 +294,7 @@ impl GaitProgramme {
         self.reference.seven_angles(fraction)
     }
 
-    /// Contact rows of a domain with their target positions (m) and foot points.
+    /// Contact rows of a domain with their target positions, m, and foot points.
     pub fn contact_targets_at(
         &self,
         d: usize,
@@ -308,12 +307,12 @@ impl GaitProgramme {
         })
     }
 
-    /// Whether domain d already fixes the same foot in the same direction.
+    /// Whether domain d has a contact row of the same foot in the same direction.
     pub fn shares_contact(&self, d: usize, contact: ContactRow) -> bool {
         self.contacts[d].iter().any(|row| row.side == contact.side && row.axis == contact.axis)
     }
 
-    /// Position component of a foot point and its gradient by the nine coordinates.
+    /// Position component of a foot point, and its gradient with respect to the nine coordinates.
     pub fn foot_point_linearised(&self, state: &PointState, foot_point: usize, axis: Axis) -> (f64, [f64; 9]) {
         let point = &self.foot_points[foot_point];
         let index = mechanics::axis_index(axis);
@@ -323,28 +322,27 @@ impl GaitProgramme {
         (state.contact_position(point)[index], gradient)
     }
 
-    /// dp of domain d's stance leg at a posture, m.
+    /// dp of the stance leg of domain d in a posture, m.
     pub fn hip_phase_of(&self, d: usize, q: &[f64; 9]) -> f64 {
         self.phase_of_stance(self.layout.domains[d].domain.stance).along(q)
     }
 
-    /// A variable vector with everything that is not at a node taken from another programme of the same mesh
-    /// (its point blocks are zero).
+    /// A vector with the variables without node of another problem on the same mesh; the variables of nodes are zero.
     pub fn adopt_globals(&self, other: &Self, x_other: &[f64]) -> Vec<f64> {
         let mut x = vec![0.0; self.layout.variables];
-        // Points come first in every layout; the tail has the same order in both variants.
+        // Nodes come first in every layout, and the other variables have the same order in both variants.
         let (start, start_other) = (self.layout.hip_velocities, other.layout.hip_velocities);
         let tail = self.layout.variables - start;
         x[start..].copy_from_slice(&x_other[start_other..start_other + tail]);
         x
     }
 
-    /// The settings it was built with.
+    /// The settings of the problem.
     pub fn settings(&self) -> &GaitSettings {
         &self.settings
     }
 
-    /// Whether the objective couples the activations of neighbouring points.
+    /// Whether the objective couples activations of adjacent nodes.
     pub(super) fn activations_are_coupled(&self) -> bool {
         self.layout.muscles && self.regularisation.activation_bend > 0.0
     }
@@ -432,7 +430,7 @@ impl GaitProgramme {
     }
 
     fn record_structure(&self) -> Structure {
-        // Any point with positive durations and phase widths serves: entries do not depend on values.
+        // The structure does not depend on values; any point with positive durations and phase widths gives it.
         let mut x = vec![0.5; self.layout.variables];
         for domain in &self.layout.domains {
             if let Some(end) = domain.phase_end {
@@ -454,7 +452,7 @@ impl GaitProgramme {
     }
 }
 
-/// World position of a contact row: (constant, coefficient of x_L, coefficient of D), m.
+/// Target position of a contact row, m: constant, coefficient of x_L and coefficient of D.
 fn contact_target(model: &WalkerModel, stance: Side, row: ContactRow) -> [f64; 3] {
     if row.axis == Axis::Z {
         return [0.0; 3];

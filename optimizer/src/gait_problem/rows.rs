@@ -1,11 +1,11 @@
-//! The rows of the programme: names, bounds, and where each group of rows starts.
+//! The rows of the gait problem: names, bounds, and the index of each group of rows.
 
 use super::layout::Layout;
 use crate::gait::{Axis, FootPoint, Side};
 use crate::muscle::{MUSCLE_COUNT, MUSCLES};
 use crate::walking::{CYCLE, ContactRow, DomainKind};
 
-/// What a row says.
+/// Kind of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum RowKind {
@@ -43,7 +43,7 @@ pub enum RowKind {
 }
 
 impl RowKind {
-    /// Number of the paper's constraint.
+    /// Number of the constraint in the paper.
     pub fn constraint(self, component: u8) -> &'static str {
         match self {
             Self::Dynamics
@@ -78,7 +78,7 @@ impl RowKind {
         }
     }
 
-    /// (what it is in words, unit of the physical residual, physical residual per unit of the coded row)
+    /// Description, unit of the physical residual, and physical residual per unit of the scaled row.
     pub fn description(self) -> (&'static str, &'static str, f64) {
         match self {
             Self::Dynamics => ("equation of motion", "N or N m", 100.0),
@@ -113,10 +113,10 @@ impl RowKind {
     }
 }
 
-/// Where a row belongs.
+/// Place of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Place {
-    /// Point `point` of domain `domain`.
+    /// Node `point` of domain `domain`.
     Point {
         /// 0..8.
         domain: u8,
@@ -135,11 +135,11 @@ pub enum Place {
 /// Name of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct RowName {
-    /// Where.
+    /// Place.
     pub place: Place,
-    /// What.
+    /// Kind.
     pub kind: RowKind,
-    /// Which component (meaning depends on the kind).
+    /// Component; its meaning depends on the kind.
     pub component: u8,
 }
 
@@ -162,7 +162,7 @@ fn contact_name(row: ContactRow) -> String {
 }
 
 impl RowName {
-    /// The component in words: a coordinate, a contact row, a muscle, ...
+    /// Name of the component: a coordinate, a contact row, a muscle, ...
     pub fn component_name(&self) -> String {
         let component = usize::from(self.component);
         let domain = match self.place {
@@ -215,7 +215,7 @@ impl RowName {
     }
 }
 
-/// First row of each group at one node. Groups that a point lacks are `None` or empty.
+/// First row of each group of a node. Missing groups are `None` or empty.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointRows {
     /// 9 rows.
@@ -232,7 +232,7 @@ pub struct PointRows {
     pub output_velocity: usize,
     /// One per output.
     pub output_acceleration: usize,
-    /// dp = pa + v_hip T sigma (or dp = pa at the first point).
+    /// dp = pa + v_hip T sigma, or dp = pa at the first node.
     pub hip_phase: Option<usize>,
     /// dp_dot = v_hip.
     pub hip_velocity: Option<usize>,
@@ -242,39 +242,39 @@ pub struct PointRows {
     pub muscle_force: Option<usize>,
     /// 4 rows.
     pub muscle_torque: Option<usize>,
-    /// Two rows per foot on the ground, stance foot first.
+    /// Two rows for each foot on the ground, stance foot first.
     pub friction: usize,
-    /// How many these are.
+    /// Number of these rows.
     pub friction_edges: usize,
     /// Heights of the points in the air.
     pub heights: Vec<HeightRow>,
     /// dp_dot >= minimum.
     pub phase_rate: Option<usize>,
-    /// (foot point, row) of the landing point's vertical velocity.
+    /// Foot point and row of the vertical velocity of the landing point.
     pub touchdown: Option<(usize, usize)>,
 }
 
-/// A height row: foot point (0 heel_L, 1 toe_L, 2 heel_R, 3 toe_R), row, and whether the clearance a5 applies.
+/// A height row. Foot points are 0 heel_L, 1 toe_L, 2 heel_R, 3 toe_R.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HeightRow {
     /// Foot point.
     pub foot_point: usize,
     /// Row.
     pub row: usize,
-    /// With the swing clearance profile.
+    /// Whether the swing clearance a5 applies.
     pub clearance: bool,
 }
 
-/// Rows of one domain that are not at a single point, and of the transition out of it.
+/// Rows of a domain, including those of the transition to the next one.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DomainRows {
-    /// By point.
+    /// Rows of each node.
     pub points: Vec<PointRows>,
-    /// Four rows per interval (midpoint phase, endpoint phase, midpoint rate, endpoint rate), SS1.
+    /// In SS1, four rows for each interval: midpoint phase, endpoint phase, midpoint rate, endpoint rate.
     pub zero_dynamics: Option<usize>,
-    /// pb = dp at the last point, SS1.
+    /// In SS1, pb = dp at the last node.
     pub phase_end: Option<usize>,
-    /// 20 rows per interval (10 midpoint, 10 endpoint).
+    /// 20 rows for each interval: 10 of the midpoint, 10 of the endpoint.
     pub fibres: Option<usize>,
     /// 9 rows into the next domain.
     pub position_reset: usize,
@@ -333,8 +333,8 @@ impl RowTable {
         row
     }
 
-    /// All rows of a layout. Inequality rows are `>= 0` except where their own limits (speed, steps, touchdown, phase
-    /// rate) are set later by [`super::limits`].
+    /// The rows of a layout. Inequality rows are `>= 0`; [`super::limits`] later sets the limits of speed, steps, touchdown and phase
+    /// rate.
     pub fn new(layout: &Layout) -> Self {
         let mut table = Self::default();
         for (d, domain_layout) in layout.domains.iter().enumerate() {
@@ -412,7 +412,7 @@ impl RowTable {
         if !first || domain.opens_with_impact() {
             rows.contact_velocity = Some(equality(RowKind::ContactVelocity, nc));
         }
-        // At the first point only the rows that the reset does not already imply: the guard of the landing point.
+        // At the first node, only rows that the reset does not imply.
         let positions: Vec<usize> = match (first, domain.kind) {
             (false, _) => (0..nc).collect(),
             (true, DomainKind::Ds2) => vec![0, 1],
@@ -431,8 +431,8 @@ impl RowTable {
         rows.friction_edges = 2 * feet;
         rows.friction = self.add(place, RowKind::Friction, rows.friction_edges, 0.0, f64::INFINITY);
         if domain.kind == DomainKind::Ds3 && k == domain_layout.last() {
-            // The trailing foot leaves the ground. Its cone is down to the vertex, which the bounds of its forces say; two
-            // rows without an interior would have unbounded multipliers.
+            // At lift-off the friction cone of the trailing foot degenerates to its vertex. Bounds of the forces impose it,
+            // because rows without an interior would have unbounded multipliers.
             self.lower[rows.friction + 2..].fill(f64::NEG_INFINITY);
         }
         self.height_rows(domain_layout, place, k, &mut rows);
@@ -470,7 +470,7 @@ impl RowTable {
                     continue;
                 }
                 let swing = side != domain.stance;
-                // Rows that a contact before, or the guard after, makes zero.
+                // A contact before, or the guard after, makes these rows zero.
                 let implied = match (domain.kind, swing, point) {
                     (DomainKind::Ss2, true, FootPoint::Toe) | (DomainKind::Ss1, false, FootPoint::Heel) => first,
                     (DomainKind::Ss1, true, FootPoint::Heel) | (DomainKind::Ds2, false, FootPoint::Toe) => last,

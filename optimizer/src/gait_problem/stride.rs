@@ -1,4 +1,4 @@
-//! C4 over the whole stride: step lengths x_L and D - x_L (m), walking speed D / sum T (m/s).
+//! Rows of C4 over the whole stride: step lengths x_L and D - x_L (m), and walking speed D / sum T (m/s).
 
 use super::entries::Entries;
 use super::programme::GaitProgramme;

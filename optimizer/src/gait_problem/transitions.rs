@@ -1,8 +1,8 @@
-//! C2: resets from the last point of a domain to the first point of the next, periodic over the stride.
+//! Rows of C2: resets from the last node of a domain to the first node of the next one, periodic over the stride.
 //!
-//! Positions are continuous (px less D after the last domain). Into DS2 and DS3 a plastic impact:
-//! `M(q) (qd+ - qd-) = J^T Lambda` with the new domain's contact rows (divided by 5); else velocities are continuous
-//! (divided by 3). Fibre lengths are continuous. The landing heel's impulse stays in its friction cone.
+//! Positions are continuous, with px reduced by D after the last domain. Before DS2 and DS3 a plastic impact satisfies
+//! `M(q) (qd+ - qd-) = J^T Lambda` with the contact rows of the new domain (divided by 5). Otherwise velocities are
+//! continuous (divided by 3). Fibre lengths are continuous. The impulse of the landing heel is in its friction cone.
 
 use super::entries::Entries;
 use super::layout::{PointVariables, Q, QD};
@@ -43,8 +43,7 @@ fn transition(programme: &GaitProgramme, x: &[f64], d: usize) -> Transition {
     }
 }
 
-/// Posture and velocity jump at the impact, as a state whose accelerations are the jump. The posture is the one after
-/// the impact (positions are continuous).
+/// Posture and velocity jump of an impact, as a state whose accelerations are the jump.
 fn jump(t: &Transition) -> PointState {
     let mut dv = [0.0; 9];
     for i in 0..9 {

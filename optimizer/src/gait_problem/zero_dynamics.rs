@@ -1,8 +1,7 @@
-//! C1 in SS1: the one underactuated degree of freedom, integrated by Hermite-Simpson.
+//! Rows of C1 in SS1: Hermite-Simpson integration of the underactuated degree of freedom.
 //!
-//! Per interval of length h = T/N with points 0, m, 1: `z_m = (z_0 + z_1)/2 + h/8 (f_0 - f_1)`,
-//! `z_1 = z_0 + h/6 (f_0 + 4 f_m + f_1)` for (z, f) = (dp, dp_dot) and (dp_dot, dp_ddot). The phase limit pb is dp at
-//! the last point.
+//! In each interval of length h = T/N with nodes 0, m and 1, `z_m = (z_0 + z_1)/2 + h/8 (f_0 - f_1)` and `z_1 = z_0 +
+//! h/6 (f_0 + 4 f_m + f_1)` for (z, f) = (dp, dp_dot) and (dp_dot, dp_ddot). The phase limit pb is dp at the last node.
 
 use super::entries::Entries;
 use super::layout::{Q, QD, QDD};
@@ -40,7 +39,7 @@ pub(super) fn values(
     }
 }
 
-/// Coefficients of (z0, zm, z1) and of h times (f0, fm, f1) in the midpoint and the endpoint row.
+/// Coefficients of (z0, zm, z1) and of h times (f0, fm, f1) in the rows of midpoint and endpoint.
 const STATE: [[f64; 3]; 2] = [[-0.5, 1.0, -0.5], [-1.0, 0.0, 1.0]];
 const SLOPE: [[f64; 3]; 2] = [[-1.0 / 8.0, 0.0, 1.0 / 8.0], [-1.0 / 6.0, -4.0 / 6.0, -1.0 / 6.0]];
 

@@ -1,8 +1,8 @@
-//! The three curves of a muscle-tendon unit, smooth, each with its first and second derivative.
+//! The three curves of a muscle-tendon unit, with first and second derivatives.
 //!
-//! Smoothing replaces the corners of the published curves (Geyer, Seyfarth & Blickhan 2003): the force-velocity slope
-//! jumps from 6 to 19.4 at zero velocity, the tendon has a jump in curvature at slack length. The fit errors stated
-//! with each curve are checked in the tests.
+//! The published curves (Geyer, Seyfarth and Blickhan 2003) have corners, which are smoothed here: the slope of the
+//! force-velocity curve jumps from 6 to 19.4 at zero velocity, and the curvature of the tendon curve jumps at slack
+//! length. Tests check the stated fit errors.
 
 /// Value, first and second derivative of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,15 +15,15 @@ pub struct CurveValue {
     pub second: f64,
 }
 
-/// Width of the force-length curve, optimal lengths.
+/// Width of the force-length curve, in optimal fibre lengths.
 const WIDTH: f64 = 0.56;
-/// ln of the force at one width from the optimum (0.05).
+/// Logarithm of the relative force at one width from the optimum, ln 0.05.
 const LN_C: f64 = -2.995_732_273_553_991;
-/// Rounding of |y|^3 at 0.
+/// Smoothing of |y|^3 at 0.
 const FORCE_LENGTH_ROUNDING: f64 = 1e-6;
 
-/// Force-length curve `exp(ln(0.05) |x - 1|^3 / 0.56^3)` at fibre length x (optimal lengths), with |y|^3 as
-/// `y^2 sqrt(y^2 + 1e-6)`; largest difference to the published curve 2e-7.
+/// Force-length curve `exp(ln(0.05) |x - 1|^3 / 0.56^3)` at fibre length x (optimal fibre lengths), with |y|^3 smoothed
+/// to `y^2 sqrt(y^2 + 1e-6)`. Largest difference from the published curve: 2e-7.
 #[inline]
 pub fn force_length(x: f64) -> CurveValue {
     let y = (x - 1.0) / WIDTH;
@@ -39,12 +39,12 @@ pub fn force_length(x: f64) -> CurveValue {
     CurveValue { value, first: value * g1, second: value * (g1 * g1 + g2) }
 }
 
-/// Rounding of the corner of the force-velocity curve.
+/// Smoothing of the corner of the force-velocity curve.
 const FORCE_VELOCITY_ROUNDING: f64 = 0.01;
 
-/// Force-velocity curve at relative fibre velocity nu = v_ce / V (shortening negative):
-/// concentric `(1 + nu)/(1 - 5 nu)` and eccentric `1.5 - 0.5 (1 - nu)/(1 + 37.8 nu)`, joined smoothly; against the
-/// published curve on [-1, 1]: RMS error 0.004, largest 0.052 (at 0).
+/// Force-velocity curve at relative fibre velocity nu = v_ce / V (negative in shortening): concentric `(1 + nu)/(1 - 5
+/// nu)` and eccentric `1.5 - 0.5 (1 - nu)/(1 + 37.8 nu)`, joined smoothly. Difference from the published curve on [-1,
+/// 1]: RMS 0.004, largest 0.052 (at 0).
 #[inline]
 pub fn force_velocity(nu: f64) -> CurveValue {
     let d2 = FORCE_VELOCITY_ROUNDING * FORCE_VELOCITY_ROUNDING;
@@ -70,16 +70,16 @@ pub fn force_velocity(nu: f64) -> CurveValue {
 
 /// Tendon strain at maximum isometric force.
 const REFERENCE_STRAIN: f64 = 0.04;
-/// Rounding of the slack corner, strain.
+/// Smoothing of the corner at slack length, strain.
 const TENDON_ROUNDING: f64 = 0.002;
 
-/// Tendon force / F_max at strain e: `(max(e, 0) / 0.04)^2` with max(e, 0) as `(e + sqrt(e^2 + 0.002^2))/2`; largest
-/// difference to the published curve 1.3e-3.
+/// Tendon force / F_max at strain e: `(max(e, 0) / 0.04)^2`, with max(e, 0) smoothed to `(e + sqrt(e^2 + 0.002^2))/2`.
+/// Largest difference from the published curve: 1.3e-3.
 #[inline]
 pub fn tendon_force(e: f64) -> CurveValue {
     let d2 = TENDON_ROUNDING * TENDON_ROUNDING;
     let r = (e * e + d2).sqrt();
-    // e + r cancels when slack: the conjugate form keeps full precision.
+    // The conjugate form avoids the cancellation of e + r in a slack tendon.
     let sum = if e >= 0.0 { e + r } else { d2 / (r - e) };
     let scale = 1.0 / (2.0 * REFERENCE_STRAIN);
     let g = scale * sum;
@@ -105,7 +105,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn derivatives_match_differences(x in 0.3..1.6_f64, nu in -1.0..1.0_f64, e in -0.1..0.08_f64) {
+        fn derivatives_match_finite_differences(x in 0.3..1.6_f64, nu in -1.0..1.0_f64, e in -0.1..0.08_f64) {
             check(force_length, x);
             check(force_velocity, nu);
             check(tendon_force, e);
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn fit_errors_are_as_stated() {
+    fn fit_errors_are_within_their_documented_limits() {
         let published_fv = |nu: f64| {
             if nu < 0.0 { (1.0 + nu) / (1.0 - 5.0 * nu) } else { 1.5 - 0.5 * (1.0 - nu) / (1.0 + 37.8 * nu) }
         };

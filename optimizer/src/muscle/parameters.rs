@@ -1,14 +1,14 @@
-//! Muscle parameters of a person: the published table, scaled to the person or overridden where better is known.
+//! Muscle parameters of a subject: the published table, scaled to the subject or overridden by measured values.
 
 use super::unit::{MUSCLE_COUNT, MUSCLES, Muscle};
 use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 
-/// Height and mass of the person that the published table describes (Geyer & Herr 2010).
+/// Height and mass of the person in the published table (Geyer and Herr 2010).
 const TABLE_HEIGHT_M: f64 = 1.8;
 const TABLE_MASS_KG: f64 = 80.0;
 
-/// What is known better of one kind of muscle; what is absent stays as in the table.
+/// Measured values of one kind of muscle, which override the table. Missing fields keep the table's values.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MuscleOverride {
@@ -35,20 +35,20 @@ pub struct MuscleOverride {
     pub ankle_lever_m: Option<f64>,
 }
 
-/// A number of a kind of muscle: its name with its unit, what it means, and its allowed range.
+/// A parameter of a kind of muscle.
 #[derive(Debug, Clone, Copy)]
 pub struct MuscleField {
-    /// As in a document: `max_force_n`.
+    /// Name with unit, as in JSON: `max_force_n`.
     pub name: &'static str,
-    /// What it is.
+    /// Description with unit.
     pub meaning: &'static str,
     /// Smallest allowed value.
     pub minimum: f64,
     /// Largest allowed value.
     pub maximum: f64,
-    /// What a person has of one's own.
+    /// The override of a subject.
     pub given: fn(&MuscleOverride) -> Option<f64>,
-    /// What a muscle has; none: it does not span that joint.
+    /// The value of a muscle; `None` if the muscle does not span the joint.
     pub value: fn(&Muscle) -> Option<f64>,
 }
 
@@ -65,7 +65,7 @@ const fn field(
 }
 
 impl MuscleOverride {
-    /// Every number, in order.
+    /// The parameters, in order.
     pub const FIELDS: [MuscleField; 7] = [
         field(
             "max_force_n",
@@ -119,17 +119,17 @@ impl MuscleOverride {
     ];
 }
 
-/// The largest lever arm of a muscle at a joint, m; none: it does not span it.
+/// Largest lever arm of a muscle at a joint, m; `None` if the muscle does not span it.
 fn lever(muscle: &Muscle, joint: Joint) -> Option<f64> {
     muscle.attachments.iter().flatten().find(|attachment| attachment.joint() == joint).map(|found| found.lever_m)
 }
 
-/// How the muscles of a person differ from the published table; both legs alike.
+/// Differences of a subject's muscles from the published table; the same for both legs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MuscleParameters {
-    /// Whether lengths and lever arms are scaled by body height and forces by body mass, from the 1.8 m and 80 kg of
-    /// the table. Overrides count as they are.
+    /// Whether lengths and lever arms scale with body height, and forces with body mass, from the 1.8 m and 80 kg of
+    /// the table. Overrides are not scaled.
     pub scaled_to_body: bool,
     /// Hamstrings.
     pub ham: MuscleOverride,
@@ -148,12 +148,12 @@ pub struct MuscleParameters {
 }
 
 impl MuscleParameters {
-    /// Whether the published table holds.
+    /// Whether the published table applies unchanged.
     pub fn is_published(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Kinds of muscles and what is known better of them.
+    /// The kinds of muscles with their overrides.
     pub fn overrides(&self) -> [(&'static str, &MuscleOverride); 7] {
         [
             ("ham", &self.ham),
@@ -166,10 +166,10 @@ impl MuscleParameters {
         ]
     }
 
-    /// Checks every number against its allowed range, and that lever arms are given only where the muscle has them.
+    /// Checks the range of each override, and that lever arms exist only at joints that the muscle spans.
     ///
     /// # Errors
-    /// [`ModelError`] naming the field.
+    /// [`ModelError`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         for (kind, given) in self.overrides() {
             for MuscleField { name, minimum, maximum, given: value, .. } in &MuscleOverride::FIELDS {
@@ -185,7 +185,7 @@ impl MuscleParameters {
                     return Err(ModelError::Unknown {
                         field: format!("muscles.{kind}.{}_lever_m", joint.name()),
                         value: value.to_string(),
-                        known: format!("nothing: {kind} does not span the {}", joint.name()),
+                        known: format!("none, because {kind} does not span the {}", joint.name()),
                     });
                 }
             }
@@ -193,12 +193,12 @@ impl MuscleParameters {
         Ok(())
     }
 
-    /// A muscle of a person of this kind (`ham`); none: there is no such kind.
+    /// A muscle of this kind (`ham`) with the subject's parameters; `None` if the kind does not exist.
     pub fn muscle_of_kind(&self, subject: &Subject, kind: &str) -> Option<Muscle> {
         self.muscles(subject).into_iter().find(|muscle| is_of(muscle, kind))
     }
 
-    /// The ten muscles of a person.
+    /// The ten muscles of a subject.
     pub fn muscles(&self, subject: &Subject) -> [Muscle; MUSCLE_COUNT] {
         let (length, force) = if self.scaled_to_body {
             (subject.height_m / TABLE_HEIGHT_M, subject.body_mass_kg / TABLE_MASS_KG)
@@ -246,7 +246,7 @@ impl Joint {
     }
 }
 
-/// Whether a muscle of the table (`HAM_L`) is of a kind (`ham`).
+/// Whether a muscle (`HAM_L`) is of a kind (`ham`).
 fn is_of(muscle: &Muscle, kind: &str) -> bool {
     muscle.name.split('_').next().is_some_and(|name| name.eq_ignore_ascii_case(kind))
 }
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn without_wishes_the_published_table_holds_for_everybody() {
+    fn default_parameters_are_the_published_table() {
         let small = Subject::new(1.5, 50.0).unwrap();
         assert_eq!(MuscleParameters::default().muscles(&small), MUSCLES);
         let table = Subject::new(TABLE_HEIGHT_M, TABLE_MASS_KG).unwrap();
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn scaling_follows_height_and_mass_and_spares_overrides() {
+    fn scaling_follows_height_and_mass_except_for_overrides() {
         let small = Subject::new(0.9 * TABLE_HEIGHT_M, 0.5 * TABLE_MASS_KG).unwrap();
         let muscles = read(r#"{"scaled_to_body": true, "sol": {"max_force_n": 3333.0}}"#).muscles(&small);
         let ham = (&muscles[0], &MUSCLES[0]);
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn an_override_holds_on_both_legs_and_is_checked() {
+    fn overrides_apply_to_both_legs_and_are_validated() {
         let subject = Subject::builtin(1).unwrap();
         let muscles = read(r#"{"ham": {"hip_lever_m": 0.07}}"#).muscles(&subject);
         for name in ["HAM_L", "HAM_R"] {
@@ -291,7 +291,7 @@ mod tests {
         }
         for (text, expected) in [
             (r#"{"ta": {"max_force_n": 1.0}}"#, "muscles.ta.max_force_n = 1 is outside the allowed range [50, 20000]"),
-            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m: unknown value \"0.05\"; known: nothing"),
+            (r#"{"sol": {"knee_lever_m": 0.05}}"#, "muscles.sol.knee_lever_m: unknown value \"0.05\"; known: none"),
         ] {
             let refusal = read(text).validate().unwrap_err().to_string();
             assert!(refusal.contains(expected), "{refusal}");

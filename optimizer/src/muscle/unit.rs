@@ -1,8 +1,9 @@
 //! The ten muscle-tendon units: parameters, attachments, length and lever arms.
 //!
-//! Geyer & Herr 2010 (IEEE TNSRE 18:263), values as in their model file. Geyer's joint angles: hip and knee 180 deg
-//! straight, ankle 90 deg; larger = extended / plantarflexed. The length change uses `rho r0`, the torque `r0`, as
-//! published (rho stands in for pennation), so muscle power is not exactly joint power.
+//! Parameters are those of the model file of Geyer and Herr 2010 (IEEE TNSRE 18:263). In Geyer's convention, hip and
+//! knee are at 180° when straight and the ankle is at 90°; angles increase with extension and plantarflexion. As
+//! published, length changes use `rho r0` and torques `r0`, where rho accounts for pennation. Muscle power therefore
+//! differs slightly from joint power.
 
 use super::parameters::Joint;
 use crate::gait::Side;
@@ -11,61 +12,61 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Number of muscles.
 pub const MUSCLE_COUNT: usize = 10;
 
-/// One joint that a muscle spans.
+/// The attachment of a muscle at one joint that it spans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attachment {
-    /// Index of the joint angle in q (3 hip_L, 4 knee_L, 5 ankle_L, 6 hip_R).
+    /// Index of the joint angle in q: 3 hip_L, 4 knee_L, 5 ankle_L, 6 hip_R.
     pub coordinate: usize,
     /// Largest lever arm r0, m.
     pub lever_m: f64,
-    /// Factor of the length change.
+    /// Factor rho of the length change.
     pub rho: f64,
-    /// Geyer angle of the largest lever arm, rad; `None`: constant lever arm (hip).
+    /// Geyer angle of the largest lever arm, rad; `None` for the constant lever arm at the hip.
     pub angle_of_largest_lever: Option<f64>,
-    /// Geyer angle at which the unit has length l_opt + l_slack, rad.
+    /// Geyer angle at which the unit has the length l_opt + l_slack, rad.
     pub reference_angle: f64,
-    /// +1 extends the joint (raises Geyer's angle), -1 flexes it.
+    /// +1 for a muscle that extends the joint (increases Geyer's angle), -1 for one that flexes it.
     pub direction: f64,
 }
 
-/// One muscle-tendon unit.
+/// A muscle-tendon unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Muscle {
-    /// `HAM_L`, ...
+    /// Name: `HAM_L`, ...
     pub name: &'static str,
-    /// Which leg.
+    /// Leg.
     pub side: Side,
     /// Maximum isometric force F_max, N.
     pub max_force_n: f64,
-    /// Maximum shortening speed V, optimal lengths per second.
+    /// Maximum shortening speed V, optimal fibre lengths per second.
     pub max_speed: f64,
     /// Optimal fibre length l_opt, m.
     pub optimal_length_m: f64,
     /// Tendon slack length l_slack, m.
     pub slack_length_m: f64,
-    /// Spanned joints; the second is `None` for a one-joint muscle.
+    /// Attachments; the second is `None` for a monoarticular muscle.
     pub attachments: [Option<Attachment>; 2],
 }
 
-/// Length change and lever arm of an attachment at a joint angle, with derivatives by that angle.
+/// Length contribution and lever arm of an attachment at a joint angle, with derivatives with respect to the angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttachmentValue {
-    /// Contribution to the unit's length, m.
+    /// Contribution to the length of the unit, m.
     pub length: f64,
-    /// Its derivative, m/rad.
+    /// First derivative, m/rad.
     pub length_first: f64,
-    /// Its second derivative, m/rad².
+    /// Second derivative, m/rad².
     pub length_second: f64,
-    /// Torque on the model joint (flexion / dorsiflexion positive) per newton, m.
+    /// Lever arm, m: joint torque per newton, positive in flexion and dorsiflexion.
     pub arm: f64,
-    /// Its derivative, m/rad.
+    /// First derivative, m/rad.
     pub arm_first: f64,
-    /// Its second derivative, m/rad².
+    /// Second derivative, m/rad².
     pub arm_second: f64,
 }
 
 impl Attachment {
-    /// Length contribution and lever arm at joint angle `angle` (model convention, rad).
+    /// Length contribution and lever arm at a joint angle in rad, in the convention of the walker.
     #[inline]
     pub fn at(&self, angle: f64) -> AttachmentValue {
         let phi = if self.coordinate == 5 { FRAC_PI_2 - angle } else { PI - angle };
@@ -96,7 +97,7 @@ impl Attachment {
 }
 
 impl Attachment {
-    /// The joint it crosses.
+    /// The joint.
     pub(super) fn joint(&self) -> Joint {
         match self.coordinate {
             KNEE_L => Joint::Knee,
@@ -107,7 +108,7 @@ impl Attachment {
 }
 
 impl Muscle {
-    /// Whether it spans a joint.
+    /// Whether the muscle spans a joint.
     pub(super) fn spans(&self, joint: Joint) -> bool {
         self.attachments.iter().flatten().any(|attachment| attachment.joint() == joint)
     }
@@ -165,8 +166,8 @@ const VAS: (f64, f64, f64, f64) = (6000.0, 12.0, 0.08, 0.23);
 const SOL: (f64, f64, f64, f64) = (4000.0, 6.0, 0.04, 0.26);
 const TA: (f64, f64, f64, f64) = (800.0, 12.0, 0.06, 0.24);
 
-/// The ten muscles in the paper's order. The right hamstring is attached at the hip only: the prosthetic knee is not
-/// driven by it.
+/// The ten muscles of the published table, in the order of the paper. The right hamstrings have no attachment at the
+/// prosthetic knee.
 pub const MUSCLES: [Muscle; MUSCLE_COUNT] = [
     muscle(
         "HAM_L",

@@ -1,21 +1,22 @@
-//! Which reference suits a subject: the nearest in height and body mass.
+//! The reference gait nearest to a subject in height and body mass.
 
 use super::ReferenceGait;
 use crate::subject::Subject;
 
-/// A difference in height that weighs as much as [`MASS_UNIT_KG`]: about one standard deviation of adults, m.
+/// Unit of the difference in height, m: about one standard deviation of adults.
 const HEIGHT_UNIT_M: f64 = 0.10;
-/// kg.
+/// Unit of the difference in body mass, kg: about one standard deviation of adults.
 const MASS_UNIT_KG: f64 = 15.0;
 
-/// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`; none when the reference does not say whose it is.
+/// Distance of a reference gait from a subject: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. `None` if the height or mass
+/// of the recorded person is unknown.
 pub fn distance(subject: &Subject, reference: &ReferenceGait) -> Option<f64> {
     let height = (reference.height_m? - subject.height_m) / HEIGHT_UNIT_M;
     let mass = (reference.body_mass_kg? - subject.body_mass_kg) / MASS_UNIT_KG;
     Some(height.hypot(mass))
 }
 
-/// The nearest reference with its distance, the first of equally near ones; none when no reference says whose it is.
+/// The nearest reference gait with its distance; the first of equally near ones. `None` if no distance is known.
 pub fn nearest<'a>(
     subject: &Subject,
     references: impl IntoIterator<Item = &'a ReferenceGait>,

@@ -1,35 +1,36 @@
-//! A recording of joint angles over several strides, in the walker's convention, with what was done to get there.
+//! A recording of joint angles over several strides, converted to the convention of the walker.
 
 use super::LARGEST_ANGLE_RAD;
 use crate::opensim::{AngleUnit, StorageFile};
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table, lines_of};
 
-/// Place of the left knee among the reference's angles.
+/// Index of the left knee among the angles of a reference gait.
 const KNEE: usize = 2;
-/// A knee that walks bends over more than this, rad; one in radians that was read as degrees does not.
+/// Smallest range of motion of a walking knee, rad. Radians taken for degrees are below.
 const SMALLEST_KNEE_RANGE_RAD: f64 = 0.1;
-/// No joint turns faster between two rows, rad/s: walking reaches about 7 (a swinging knee), noise of markers some more.
+/// Largest plausible angular velocity between two rows, rad/s. A knee in swing reaches about 7; marker noise adds to
+/// it.
 const LARGEST_SPEED_RAD_S: f64 = 40.0;
 
-/// Joint angles over time: torso, hip_L, knee_L, ankle_L, hip_R, rad, of the seven-link walker.
+/// Joint angles over time in the convention of the walker: torso, hip_L, knee_L, ankle_L and hip_R, rad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// Name of the file.
     pub what: String,
-    /// s.
+    /// Times of the rows, s.
     pub time_s: Vec<f64>,
-    /// One row per time.
+    /// One row of five angles for each time.
     pub angles_rad: Vec<[f64; 5]>,
-    /// Right knee, where it was recorded, rad: for finding heel strikes.
+    /// Right knee, if recorded, rad; needed to detect heel strikes by kinematics.
     pub knee_r_rad: Option<Vec<f64>>,
-    /// Vertical force under the right foot, where it was recorded.
+    /// Vertical force under the right foot, if recorded.
     pub right_force: Option<VerticalForce>,
-    /// What was done, step by step.
+    /// Processing steps, for the provenance of the reference gait.
     pub steps: Vec<String>,
 }
 
-/// A vertical force over its own times: force plates are often sampled more densely than markers.
+/// A vertical force with its own times, because force plates often have a higher sampling rate than markers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VerticalForce {
     /// s.
@@ -45,8 +46,8 @@ impl VerticalForce {
 }
 
 impl Recording {
-    /// An OpenSim motion or storage file (.mot, .sto) of a gait model: `inDegrees` says the unit (`unit` where it does
-    /// not), columns by OpenSim's names; `force_column`, if given, is the vertical force under the right foot.
+    /// Parses an OpenSim motion or storage file (.mot, .sto) of a gait model. `unit` applies if the header has no
+    /// `inDegrees`. `force_column`, if given, is the vertical force under the right foot.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -63,8 +64,8 @@ impl Recording {
         Self::from_opensim_columns(what, &table, unit.in_radians(), force_column, &mut steps)
     }
 
-    /// The recording with the vertical force under the right foot from an OpenSim file of its own, as `subject01_grf.mot`;
-    /// both files have one clock.
+    /// Adds the vertical force under the right foot from a separate OpenSim file such as `subject01_grf.mot`. Both
+    /// files must have the same clock.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -72,7 +73,8 @@ impl Recording {
         self.with_force(what, &StorageFile::read(what, text)?.table, column)
     }
 
-    /// The same from the `fp` table of the trial of Camargo et al. 2021, written as its `ik` table was.
+    /// Adds the vertical force under the right foot from the `fp` table of a trial of Camargo et al. 2021, exported in
+    /// the same way as the `ik` table.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -86,9 +88,9 @@ impl Recording {
         Ok(self)
     }
 
-    /// A table exported from the data set of Camargo et al. 2021 (J Biomech 119:110320): the `data` table of a trial's
-    /// `ik` file written with MATLAB's `writetable(data, 'trial.csv')`. First column `Header` (s), angles in degrees
-    /// under OpenSim's names.
+    /// Parses a table exported from the data set of Camargo et al. 2021 (J Biomech 119:110320): the `data` table of the
+    /// `ik` file of a trial, written with MATLAB's `writetable(data, 'trial.csv')`. The first column is `Header` (s);
+    /// angles are in degrees and have OpenSim's names.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -99,9 +101,9 @@ impl Recording {
         Self::from_opensim_columns(what, &table, AngleUnit::Degrees.in_radians(), None, &mut steps)
     }
 
-    /// Our own table: `time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad`, optionally `knee_R_rad` and
-    /// `right_force_n`, in the walker's convention (forward lean, flexion, dorsiflexion positive; hips from the trunk).
-    /// Lines that begin with `#` before the header are kept as provenance.
+    /// Parses Gaitwright's table: `time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad`, optionally
+    /// `knee_R_rad` and `right_force_n`. Forward lean, flexion and dorsiflexion are positive; hip angles are relative
+    /// to the trunk. Lines that begin with `#` before the names become provenance.
     ///
     /// # Errors
     /// [`ModelError::Malformed`] with line and column.
@@ -121,8 +123,8 @@ impl Recording {
         Self::whole(what, &table, &angles, table.find("knee_R_rad"), force, steps)
     }
 
-    /// OpenSim's gait models: pelvis_tilt and lumbar_extension backward, knee_angle negative in flexion, hips from the
-    /// pelvis.
+    /// Converts the columns of OpenSim's gait models: pelvis_tilt and lumbar_extension are positive backwards,
+    /// knee_angle is negative in flexion, and hip angles are relative to the pelvis.
     fn from_opensim_columns(
         what: &str,
         table: &Table,
@@ -134,10 +136,10 @@ impl Recording {
         let pelvis = angle("pelvis_tilt")?;
         let lumbar = if let Some(column) = table.find("lumbar_extension") {
             steps.push("trunk lean = -(pelvis_tilt + lumbar_extension)".to_owned());
-            steps.push("hips from the trunk = hip_flexion - lumbar_extension".to_owned());
+            steps.push("hip relative to the trunk = hip_flexion - lumbar_extension".to_owned());
             column.into_iter().map(|v| v * scale).collect()
         } else {
-            steps.push("no lumbar_extension: the pelvis stands for the trunk, hips as recorded".to_owned());
+            steps.push("no column lumbar_extension: the trunk moves with the pelvis, hip = hip_flexion".to_owned());
             vec![0.0; table.len()]
         };
         steps.push("knee flexion = -knee_angle".to_owned());
@@ -167,7 +169,9 @@ impl Recording {
         for (column, name) in angles.iter().zip(super::REFERENCE_COLUMNS) {
             if let Some(row) = column.iter().position(|a| a.abs() > LARGEST_ANGLE_RAD) {
                 let angle = column[row];
-                let reason = format!("{name} is {angle:.1} rad, beyond {LARGEST_ANGLE_RAD:.2} rad; is the unit right?");
+                let reason = format!(
+                    "{name} is {angle:.1} rad; at most {LARGEST_ANGLE_RAD:.2} rad is plausible; check the unit"
+                );
                 return Err(table.malformed_row(row, None, reason));
             }
         }
@@ -185,17 +189,17 @@ impl Recording {
         Ok(Self { what: what.to_owned(), time_s, angles_rad, knee_r_rad, right_force, steps })
     }
 
-    /// The lowest and the highest value.
+    /// Lowest and highest value.
     pub(crate) fn extremes(values: &[f64]) -> (f64, f64) {
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
     }
 
-    /// Why this is no knee that walks, flexion positive.
+    /// The reason why an angle is not that of a walking knee with flexion positive, if any.
     pub(crate) fn no_knee(flexion_rad: &[f64]) -> Option<String> {
         still_knee(flexion_rad).or_else(|| backward_knee(flexion_rad))
     }
 
-    /// The first row to which an angle turns faster than any joint does, and by how much, rad.
+    /// The first row at which an angle jumps faster than plausible, and the size of the jump, rad.
     pub(crate) fn jump(time_s: &[f64], angle_rad: &[f64]) -> Option<(usize, f64)> {
         (1..angle_rad.len())
             .map(|row| (row, angle_rad[row] - angle_rad[row - 1]))
@@ -203,25 +207,25 @@ impl Recording {
     }
 }
 
-/// Why this is no knee that walks: it hardly bends.
+/// The reason why an angle is not that of a walking knee: its range is too small.
 fn still_knee(flexion_rad: &[f64]) -> Option<String> {
     let (lowest, highest) = Recording::extremes(flexion_rad);
     let range = highest - lowest;
     (range < SMALLEST_KNEE_RANGE_RAD)
-        .then(|| format!("moves over {range:.3} rad only, less than {SMALLEST_KNEE_RANGE_RAD} rad; is the unit right?"))
+        .then(|| format!("moves by only {range:.3} rad, less than {SMALLEST_KNEE_RANGE_RAD} rad; check the unit"))
 }
 
-/// Why this is no knee that walks, flexion positive: it is bent backwards, as where a file has the other sign.
+/// The reason why an angle is not that of a walking knee: flexion is negative.
 fn backward_knee(flexion_rad: &[f64]) -> Option<String> {
     let (lowest, highest) = Recording::extremes(flexion_rad);
     (lowest + highest < 0.0).then(|| {
         format!(
-            "is from {lowest:.2} to {highest:.2} rad with flexion positive: the file's knee angle has the other sign"
+            "ranges from {lowest:.2} to {highest:.2} rad, but flexion must be positive; check the sign of the knee angle"
         )
     })
 }
 
-/// A table of Camargo et al. 2021: the first column has the time, s.
+/// Parses a table of Camargo et al. 2021, whose first column is the time in s.
 fn camargo_table(what: &str, text: &str) -> Result<Table, ModelError> {
     let lines = lines_of(text);
     Table::read(what, &lines, 1, Separator::Comma, Clock::Column("Header"))

@@ -1,4 +1,4 @@
-//! From a recording to a reference: heel strikes, strides of 101 points, mean and standard deviation.
+//! From a recording to a reference gait: heel strikes, strides of 101 points, mean and standard deviation.
 
 use super::recording::Recording;
 use super::{REFERENCE_ROWS, ReferenceGait};
@@ -8,48 +8,49 @@ use std::ops::Range;
 
 mod plausible;
 
-/// Durations of strides that are kept, s.
+/// Durations of valid strides, s.
 pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
-/// What to do where heel strikes cannot be found in the angles.
-const NO_KNEE: &str = "the right knee (column knee_R_rad) was not recorded, and without it heel strikes cannot be found in the angles: \
-                       tell the times of the right heel strikes, or take a force under the right foot";
-/// A stride with more than so long between two rows is not wholly recorded, s.
+/// The error if heel strikes cannot be detected by kinematics.
+const NO_KNEE: &str = "the recording has no right knee (column knee_R_rad), which the detection of heel strikes by kinematics needs; \
+                       give the times of the right heel strikes, or use a force under the right foot";
+/// Longest gap between two rows of a valid stride, s.
 const LONGEST_GAP_S: f64 = 0.1;
-/// Vertical force that tells contact, N.
+/// Vertical force above which the foot is in contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
-/// A heel strike by force comes after at least so long without contact, s.
+/// Shortest time without contact before a heel strike, s.
 const SHORTEST_SWING_S: f64 = 0.1;
-/// A contact lasts at least so long, s: what noise or vibration makes of an unloaded plate is shorter.
+/// Shortest contact, s. Noise and vibration of an unloaded plate are shorter.
 const SHORTEST_CONTACT_S: f64 = 0.05;
-/// What differences of times may be off by rounding, s.
+/// Rounding error of a difference of times, s.
 const ROUNDING_S: f64 = 1e-9;
-/// A heel strike by kinematics is the farthest forward heel within so long before and after, s.
+/// Half width of the window in which a heel strike by kinematics is the maximum, s.
 const NEIGHBOURHOOD_S: f64 = 0.3;
-/// Place of the left knee among the reference's angles.
+/// Index of the left knee among the angles of a reference gait.
 const LEFT_KNEE: usize = 2;
-/// A thigh that is so far behind is behind, rad.
+/// Smallest angle by which one thigh is clearly behind the other, rad.
 const BEHIND_RAD: f64 = 0.05;
-/// A knee may bend so much more while it carries than while it swings, rad: legs that swing nearly straight are walked with, too.
+/// Largest plausible excess of knee flexion in stance over that in swing, rad. Some people walk with a nearly straight
+/// swing leg.
 const STANCE_FLEXION_RAD: f64 = 0.26;
-/// So many heel strikes are written down one by one.
+/// Largest number of heel strikes that the provenance lists one by one.
 const MANY_STRIKES: usize = 200;
-/// Thigh and shank, in body heights (Winter 2009).
+/// Lengths of thigh and shank, in body heights (Winter 2009).
 const LEG: [f64; 2] = [0.245, 0.246];
 
-/// How right heel strikes are found.
+/// Method that determines the right heel strikes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum HeelStrikes {
-    /// At these times, s.
+    /// Given times, s.
     Given(Vec<f64>),
-    /// Where the vertical force under the right foot rises above 20 N, to stay there for 50 ms.
+    /// By force: the vertical force under the right foot rises above 20 N and stays there for at least 50 ms.
     Force,
-    /// Where the right heel is farthest ahead of the pelvis (Zeni et al. 2008, Gait & Posture 27:710).
+    /// By kinematics: the right heel is farthest ahead of the pelvis (Zeni et al. 2008, Gait & Posture 27:710).
     Kinematics,
-    /// The first and the last row: the recording is one stride, as this program writes gaits.
+    /// The first and last row: the recording is one stride, such as an exported gait.
     Ends,
 }
 
-/// Whose gait was recorded, where that is known.
+/// Height and mass of the recorded person, if known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Walker {
     /// Body height, m.
@@ -72,8 +73,8 @@ impl Walker {
     }
 }
 
-/// When a foot comes to the ground: where a signal that tells contact rises above a threshold for a contact, having had
-/// none for a swing. Linear between samples.
+/// Times of initial contact: a signal rises above the threshold for the duration of a contact, after no contact for the
+/// duration of a swing. Interpolated linearly.
 pub(crate) fn contacts(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<f64> {
     let mut unloaded_since = time_s.first().copied();
     let mut strikes = Vec::new();
@@ -91,7 +92,7 @@ pub(crate) fn contacts(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<f6
     strikes
 }
 
-/// The samples of each contact: all above the threshold, for as long as a contact lasts.
+/// The ranges of samples of the contacts: above the threshold for at least the shortest contact.
 fn loaded(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<Range<usize>> {
     let mut contacts = Vec::new();
     let mut start = 0;
@@ -105,40 +106,39 @@ fn loaded(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<Range<usize>> {
     contacts
 }
 
-/// Heel strikes that were told: in order, within the recording, at least two.
+/// Checks given heel strikes: at least two, increasing, and within the recording.
 pub(crate) fn given(what: &str, times: &[f64], first: f64, last: f64) -> Result<(), ModelError> {
     for &time in times {
         ModelError::check_range("heel strike (s)", time, first, last)?;
     }
     if times.windows(2).any(|pair| pair[1] <= pair[0]) {
-        let reason = "the heel strikes are not in order".to_owned();
+        let reason = "the heel strikes must increase".to_owned();
         return Err(ModelError::Malformed { what: what.to_owned(), reason });
     }
     Ok(())
 }
 
-/// Why the mean of the strides does not begin where the right heel strikes: then the right thigh is ahead of the left one,
-/// and the left leg swings in the first half.
+/// The reason why a mean stride does not begin with a right heel strike, if any. At right heel strike the right thigh
+/// is ahead of the left one, and the left leg swings in the first half of the stride.
 fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
     let [_, hip_l, _, _, hip_r] = mean[0];
-    let cause =
-        "are left and right, or the signs of the hips, the other way round, or the heel strikes not the right foot's?";
+    let cause = "check sides, the signs of the hip angles, and that the heel strikes are those of the right foot";
     if hip_l - hip_r > BEHIND_RAD {
         let behind = (hip_l - hip_r).to_degrees();
-        return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one: {cause}"));
+        return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one; {cause}"));
     }
     let highest = |rows: &[[f64; 5]]| rows.iter().map(|row| row[LEFT_KNEE]).fold(f64::NEG_INFINITY, f64::max);
     let (first, second) = mean.split_at(REFERENCE_ROWS / 2 + 1);
     (highest(second) > highest(first) + STANCE_FLEXION_RAD).then(|| {
         let (first, second) = (highest(first).to_degrees(), highest(second).to_degrees());
         format!(
-            "the left knee bends to {second:.0}° in the second half of the stride from right heel strike and to {first:.0}° in \
-             the first, in which the left leg swings: {cause}"
+            "the left leg swings in the first half of the stride from right heel strike, but the left knee bends to {first:.0}° \
+             there and to {second:.0}° in the second half; {cause}"
         )
     })
 }
 
-/// Times, s; of many, the first and the last.
+/// Formats times in s; only the first and last one if there are many.
 fn in_words(times: &[f64]) -> String {
     match times {
         [first, .., last] if times.len() > MANY_STRIKES => format!("{first:.4} to {last:.4}"),
@@ -147,10 +147,10 @@ fn in_words(times: &[f64]) -> String {
 }
 
 impl Recording {
-    /// Times of right heel strikes, s.
+    /// Times of the right heel strikes, s.
     ///
     /// # Errors
-    /// [`ModelError`] when there are fewer than two, or when what is asked for was not recorded.
+    /// [`ModelError`] if there are fewer than two, or if the recording lacks the signal for the method.
     pub fn heel_strikes(&self, how: &HeelStrikes) -> Result<Vec<f64>, ModelError> {
         let malformed = |reason: String| ModelError::Malformed { what: self.what.clone(), reason };
         let found = match how {
@@ -159,7 +159,7 @@ impl Recording {
                 times.clone()
             }
             HeelStrikes::Force => {
-                let none = || malformed("no force under the right foot was recorded".to_owned());
+                let none = || malformed("the recording has no force under the right foot".to_owned());
                 let force = self.right_force.as_ref().ok_or_else(none)?;
                 let mut strikes = contacts(&force.time_s, &force.force_n, CONTACT_FORCE_N);
                 let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
@@ -179,10 +179,10 @@ impl Recording {
                 format!(" (angles from {}, forces from {})", span(&self.time_s), span(&force.time_s))
             });
             let hint = match how {
-                HeelStrikes::Kinematics => "; a recording of one stride begins and ends with one: choose its ends",
+                HeelStrikes::Kinematics => "; for a recording of exactly one stride, use its ends",
                 _ => "",
             };
-            let reason = format!("{} right heel strikes{recorded}, two make a stride{hint}", found.len());
+            let reason = format!("{} right heel strikes found{recorded}; a stride needs two{hint}", found.len());
             return Err(malformed(reason));
         }
         Ok(found)
@@ -204,7 +204,7 @@ impl Recording {
                 let time = self.time_s[k];
                 let inside = time - first >= NEIGHBOURHOOD_S && last - time >= NEIGHBOURHOOD_S;
                 let near = |other: &usize| (self.time_s[*other] - time).abs() <= NEIGHBOURHOOD_S;
-                // Of equal heights the first one.
+                // The first of equal maxima.
                 inside
                     && (0..k).rev().take_while(near).all(|o| ahead[o] < ahead[k])
                     && (k + 1..ahead.len()).take_while(near).all(|o| ahead[o] <= ahead[k])
@@ -213,7 +213,7 @@ impl Recording {
             .collect()
     }
 
-    /// The angles at a time, linear between rows.
+    /// The angles at a time, interpolated linearly.
     fn at(&self, time: f64) -> [f64; 5] {
         let after = self.time_s.partition_point(|&t| t < time).clamp(1, self.time_s.len() - 1);
         let (t0, t1) = (self.time_s[after - 1], self.time_s[after]);
@@ -222,17 +222,17 @@ impl Recording {
         std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
     }
 
-    /// Whether no row is missing between two times.
+    /// Whether there is no gap between two times.
     fn is_whole(&self, start: f64, end: f64) -> bool {
         self.time_s
             .windows(2)
             .all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S + ROUNDING_S)
     }
 
-    /// The mean stride with its standard deviation, as a reference.
+    /// The mean stride with its standard deviation, as a reference gait.
     ///
     /// # Errors
-    /// [`ModelError`] when no stride is left.
+    /// [`ModelError`] if no stride is valid, or if the mean stride is implausible.
     pub fn reference(&self, name: &str, how: &HeelStrikes, walker: Walker) -> Result<ReferenceGait, ModelError> {
         walker.validate()?;
         let strikes = self.heel_strikes(how)?;
@@ -244,7 +244,7 @@ impl Recording {
             .collect();
         let kept = format!("{} to {} s, without a gap of {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
-            let reason = format!("none of {} strides lasts {kept}", strikes.len() - 1);
+            let reason = format!("none of the {} strides lasts {kept}", strikes.len() - 1);
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let count = strides.len() as f64;
@@ -265,13 +265,13 @@ impl Recording {
         let found = match how {
             HeelStrikes::Given(_) => "given",
             HeelStrikes::Ends => "at the ends of the recording",
-            HeelStrikes::Force => "by the force under the right foot (above 20 N for 50 ms)",
-            HeelStrikes::Kinematics => "by the farthest forward right heel (Zeni et al. 2008)",
+            HeelStrikes::Force => "by the vertical force under the right foot (above 20 N for 50 ms)",
+            HeelStrikes::Kinematics => "by the right heel farthest ahead of the pelvis (Zeni et al. 2008)",
         };
         let mut steps = self.steps.clone();
         steps.push(format!("{} right heel strikes {found}: {} s", strikes.len(), in_words(&strikes)));
         steps.push(format!(
-            "mean of {} strides of {kept} ({} dropped), {REFERENCE_ROWS} points each, linear between rows",
+            "mean of {} strides of {kept} ({} dropped), {REFERENCE_ROWS} points each, interpolated linearly",
             strides.len(),
             strikes.len() - 1 - strides.len()
         ));

@@ -1,5 +1,5 @@
-//! What a solve tries: a warm start, then cold guesses side by side; which attempt is the answer; and what becomes of it
-//! between its nodes.
+//! The attempts of a solve: a warm start, then initial guesses in parallel, the choice of an attempt, and tightened bounds
+//! between nodes.
 
 use super::cold_guesses::ColdGuess;
 use super::run::{Context, Run};
@@ -13,14 +13,14 @@ use crate::nlp::{NlpResult, NonlinearProgram};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// Largest scaled violation of a gait that is called converged.
+/// Largest scaled violation of a converged gait.
 pub const CONVERGED_VIOLATION: f64 = 1e-6;
 
-/// Local optima that differ by less are one: what is left of an objective and of a Gait RMSE at the tolerance of a solve.
+/// Largest differences of objective and Gait RMSE within a local optimum, at the tolerance of a solve.
 const SAME_OBJECTIVE: f64 = 1e-4;
 const SAME_RMSE_RAD: f64 = 5e-3;
 
-/// A result with what choosing needs.
+/// A result with the quantities that decide the choice.
 pub(super) struct Choice {
     pub(super) result: NlpResult,
     pub(super) gait: Gait,
@@ -31,15 +31,14 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// The residuals of the point that is handed out are measured on that point, after it is moved into its bounds
-    /// (the solver works in bounds widened by 1e-8).
+    /// Measures the residuals after projection into the bounds, because the solver relaxes bounds by 1e-8.
     pub(super) fn new(context: &Context<'_>, mut result: NlpResult) -> Self {
         let programme = context.programme;
         programme.project_into_bounds(&mut result.x);
         let gait = gait_of(context.problem, programme, &result.x);
         let violation = programme.violations(&result.x).first().map_or(0.0, |v| v.amount);
         let mut status = SolveStatus::from(result.status);
-        let met = violation <= CONVERGED_VIOLATION; // false for NaN
+        let met = violation <= CONVERGED_VIOLATION; // False for NaN.
         if status == SolveStatus::Converged && !met {
             status = SolveStatus::Stalled;
         }
@@ -72,14 +71,14 @@ impl Choice {
 pub(super) struct Tried {
     pub(super) choice: Choice,
     pub(super) attempt: Attempt,
-    /// Bounds that were tightened.
+    /// Tightened bounds.
     pub(super) margins: Margins,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra: LinearAlgebra,
 }
 
 impl Tried {
-    /// Whether nothing more is to be tried: a gait, or an end that was asked for.
+    /// Whether no further attempt is needed: it converged or was stopped.
     pub(super) fn is_final(&self) -> bool {
         matches!(self.choice.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
@@ -96,9 +95,8 @@ impl Tried {
     }
 }
 
-/// Tries a warm start, its bounds tightened as they were there. It has the iterations that any attempt has: what goes
-/// nowhere for long may converge all the same, and where no gait is found from it none is found soon otherwise
-/// (docs/benchmarks/optimizer.md, warm starts that fail).
+/// Tries a warm start with its tightened bounds. It has the same iteration limit as other attempts, because slow progress does
+/// not predict failure (docs/benchmarks/optimizer.md, warm starts that fail).
 pub(super) fn try_warm(
     context: &Context<'_>,
     start: Start,
@@ -117,7 +115,7 @@ pub(super) fn try_warm(
     Ok(Tried::new(context, result, strategy, margins, &run))
 }
 
-/// Numbers the local optima in which the attempts ended: those whose objective and Gait RMSE agree are one.
+/// Numbers the local optima of the attempts. Attempts with the same objective and Gait RMSE share a local optimum.
 pub(super) fn number_basins(tried: &mut [Tried]) {
     let mut known: Vec<(f64, f64)> = Vec::new();
     for attempt in tried.iter_mut().map(|t| &mut t.attempt).filter(|a| a.status == SolveStatus::Converged) {
@@ -133,8 +131,8 @@ pub(super) fn number_basins(tried: &mut [Tried]) {
     }
 }
 
-/// Solves on from the chosen gait with bounds tightened where it exceeds them between its nodes, until it does not
-/// or the rounds are over. Index of the answer: the last gait that converged, or what was cancelled.
+/// Tightens the bounds that the chosen gait violates between its nodes and continues the solve, until there is no violation or
+/// the rounds are used up. Returns the index of the last converged attempt, or of a cancelled one.
 pub(super) fn keep_between_points(
     context: &Context<'_>,
     tried: &mut Vec<Tried>,
@@ -181,15 +179,15 @@ fn try_guess(
     Ok(Tried::new(context, result, &guess.label(), Margins::default(), &run))
 }
 
-/// What the threads tell the calling one.
-#[allow(clippy::large_enum_variant)] // a handful of messages per solve end, each moved once
+/// Messages from the threads of the attempts to the calling thread.
+#[allow(clippy::large_enum_variant)] // A few messages per solve, each moved once.
 enum Message {
     Iteration(IterationRecord),
     Done(usize, Result<Tried, SolveError>),
 }
 
-/// Tries every guess, as many at a time as there are threads. Results come in the order of the guesses, the first of
-/// which has number `first`, and do not depend on the number of threads.
+/// Tries all guesses, as many in parallel as there are threads. The results have the order of the guesses, the first of which
+/// has the number `first`, and do not depend on the number of threads.
 pub(super) fn try_guesses(
     context: &Context<'_>,
     guesses: &[ColdGuess],
@@ -212,7 +210,7 @@ pub(super) fn try_guesses(
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(guess) = guesses.get(index) else { break };
                     let mut tell = |record: &IterationRecord| {
-                        // Nobody listens any more only when the calling thread is unwinding.
+                        // The receiver is gone only if the calling thread panics.
                         let _ = sender.send(Message::Iteration(*record));
                     };
                     let tried = try_guess(context, first + index, guess, threads / workers, &mut tell);
@@ -231,11 +229,11 @@ pub(super) fn try_guesses(
     done.into_iter().flatten().collect()
 }
 
-/// Attempts that end at a stationary point of the violation before the others are spared: each takes a thousand
-/// iterations, and bounds that have a gait rarely end there from so many guesses.
+/// Number of attempts at a stationary point of the violation after which no further guess is tried. With feasible bounds, so
+/// many guesses rarely end there.
 const MOST_INFEASIBLE: usize = 3;
 
-/// Tries the guesses that are asked for side by side, what is left of the catalogue while nothing has come of any.
+/// Tries the requested guesses in parallel, then further guesses until one converges.
 pub(super) fn try_catalogue(
     context: &Context<'_>,
     observer: &mut dyn FnMut(&IterationRecord),
@@ -255,9 +253,8 @@ pub(super) fn try_catalogue(
     Ok(tried)
 }
 
-/// Index of the answer: a cancelled attempt if there is one (the caller wants no answer), otherwise by `choice` among
-/// the converged, otherwise the one with the smallest violation, of those that end at a stationary point if there are any:
-/// they know why there is no gait, others only gave up.
+/// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the smallest
+/// violation. Among the latter, stationary points of the violation come first, because they show which constraints conflict.
 pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
     if let Some(cancelled) = tried.iter().position(|t| t.choice.status == SolveStatus::Cancelled) {
         return cancelled;

@@ -1,4 +1,4 @@
-//! The guesses that a cold start may begin with, several because the problem has several local optima.
+//! The initial guesses of cold starts. There are several, because the problem has several local optima.
 
 use super::GaitProblem;
 use crate::cold_start::{self, GuessSettings};
@@ -8,43 +8,43 @@ use crate::nlp::{BarrierStrategy, NlpSettings};
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// From the tracked motion without muscles to the start of the cost phase with muscles. Without muscles: the same.
+/// Route from the tracked motion without muscles to the cost phase with muscles. Without muscles all routes are the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ColdRoute {
-    /// Tracks the reference again with muscles.
+    /// Tracks the reference gait again with muscles.
     MuscleTracking,
-    /// Straight from the muscle guess on the tracked motion.
+    /// Starts the cost phase from the muscle states of the tracked motion.
     Direct,
-    /// Straight from the muscle guess on the cheapest gait without muscles.
+    /// Starts the cost phase from the muscle states of the optimal gait without muscles.
     PlainOptimum,
 }
 
-/// No violation of the scaled programme is this large: the constraints' curvature counts from the first iteration.
+/// Larger than any scaled violation: the curvature of the constraints counts from the first iteration.
 const WHOLE_HESSIAN: f64 = 1e6;
 
-/// Place of the knee among the reference's angles.
+/// Index of the knee among the angles of a reference gait.
 const KNEE: usize = 2;
 
-/// Share of the stride that each domain of a cold guess takes.
+/// Shares of the stride of the domains of an initial guess.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum GuessTiming {
-    /// Both steps alike.
+    /// The same shares in both steps.
     #[default]
     Even,
-    /// When each stance foot rises onto its toe: 0, early in its step (at 0.15 of the stride after the first strike), to 1, late
-    /// (at 0.36).
+    /// Time at which each stance foot rises onto its toe: from 0, early (0.15 of the stride after heel strike), to 1, late
+    /// (0.36).
     Rises {
-        /// Foot of the prosthesis.
+        /// The prosthetic foot.
         right: f64,
-        /// The other one.
+        /// The intact foot.
         left: f64,
     },
 }
 
 impl GuessTiming {
-    /// The step on the prosthesis rises early onto its toe, the other late.
+    /// The prosthetic foot rises early onto its toe, the intact foot late.
     pub const EARLY_RISE: Self = Self::Rises { right: 0.0, left: 1.0 };
 
     pub(super) fn fractions(self) -> StrideTiming {
@@ -57,23 +57,23 @@ impl GuessTiming {
     }
 }
 
-/// How the interior point goes about the cost phase.
+/// Settings of the interior-point solver in the cost phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum CostStrategy {
-    /// By the options of the solve.
+    /// The settings of the options.
     #[default]
     Usual,
-    /// The barrier parameter may rise and fall with the complementarity that is met.
+    /// Adaptive barrier update: the barrier parameter follows the complementarity and may increase.
     AdaptiveBarrier,
-    /// Regularisation of the Hessian and the proximal term begin a hundred times as large: shorter steps.
+    /// Regularisation of the Hessian and proximal term start at a hundred times their values, which shortens steps.
     MoreRegularisation,
-    /// The restoration phase is entered after two short steps and left when the violation has fallen to a tenth.
+    /// The restoration phase starts after two short steps, and ends when the violation has decreased to a tenth.
     EarlyRestoration,
 }
 
 impl CostStrategy {
-    /// The usual settings of the phase, changed.
+    /// Applies the strategy to the settings of the phase.
     pub(super) fn applied(self, usual: &NlpSettings) -> NlpSettings {
         match self {
             Self::Usual => *usual,
@@ -98,30 +98,30 @@ impl CostStrategy {
     }
 }
 
-/// One way to begin cold.
+/// An initial guess.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColdGuess {
     /// Route to the cost phase.
     pub route: ColdRoute,
-    /// Factor on the knee flexion of the reference that is tracked (1: as measured).
+    /// Factor on the knee flexion of the tracked reference gait; 1 as measured.
     pub knee_flexion: f64,
     /// Stride time, s.
     pub stride_time_s: f64,
     /// Stride length, m.
     pub stride_length_m: f64,
-    /// Shares of the domains.
+    /// Shares of the stride of the domains.
     pub timing: GuessTiming,
-    /// First barrier parameter of the cost phase with muscles; without, it begins with a tenth.
+    /// Initial barrier parameter of the cost phase with muscles. Without muscles it is a tenth of this.
     pub barrier: f64,
-    /// Scaled violation from which on the constraints' curvature counts (`NlpSettings::curvature_from_violation`).
+    /// Scaled violation below which the curvature of the constraints counts (`NlpSettings::curvature_from_violation`).
     pub curvature_from: f64,
-    /// How the cost phase is gone about.
+    /// Strategy of the cost phase.
     pub strategy: CostStrategy,
 }
 
 impl ColdGuess {
-    /// The plainest guess: with muscles mostly the basin with the natural swing knee.
+    /// The basic guess. With muscles it usually leads to the local optimum with a natural swing knee.
     pub const NATURAL: Self = Self {
         route: ColdRoute::Direct,
         knee_flexion: 1.0,
@@ -132,13 +132,12 @@ impl ColdGuess {
         curvature_from: 0.03,
         strategy: CostStrategy::Usual,
     };
-    /// With muscles mostly the basin with the lowest objective and a stiff swing knee.
+    /// With muscles, this guess usually leads to the local optimum with the lowest objective and a stiff swing knee.
     pub const EARLY_RISE: Self = Self { timing: GuessTiming::EARLY_RISE, curvature_from: 0.3, ..Self::NATURAL };
 
-    /// What a cold start tries: the first [`SolveOptions::cold_guesses`](super::SolveOptions) in any case, the
-    /// others one after the other while none has converged, [perturbed](Self::perturbed) ones where more are asked for.
-    /// The timing decides the basin most (with muscles: natural or stiff swing knee), then when the curvature of the
-    /// constraints counts; route, knee flexion, stride and barrier hardly matter (`examples/basins.rs`).
+    /// The fixed guesses. A cold start always tries the first [`SolveOptions::cold_guesses`](super::SolveOptions), and the others
+    /// until one converges. If more are requested, [perturbed](Self::perturbed) ones follow. The timing of the domains has the
+    /// largest influence on the local optimum, then the curvature of the constraints (`examples/basins.rs`).
     pub const CATALOGUE: [Self; 14] = [
         Self::NATURAL,
         Self::EARLY_RISE,
@@ -156,17 +155,17 @@ impl ColdGuess {
         Self { timing: GuessTiming::Rises { right: 1.0, left: 1.0 }, ..Self::NATURAL },
     ];
 
-    /// The most guesses of one cold start.
+    /// Largest number of guesses of a cold start.
     pub const MOST: usize = 64;
 
-    /// The first guesses of a cold start: the catalogue, then perturbed ones. Without muscles all routes are one, so only
-    /// [`ColdRoute::Direct`] is among them.
+    /// The first `count` guesses of a cold start: the fixed ones, then perturbed ones. Without muscles only those with
+    /// [`ColdRoute::Direct`] are used, because all routes are the same.
     pub fn first(count: usize, muscles: bool) -> Vec<Self> {
         let catalogue = Self::CATALOGUE.into_iter().filter(|guess| muscles || guess.route == ColdRoute::Direct);
         catalogue.chain((0..Self::MOST).map(Self::perturbed)).take(count).collect()
     }
 
-    /// Guess number 1, 2, ...: the catalogue, with and without muscles, then perturbed ones; `None` for 0 and beyond
+    /// The guess with a number, from 1: the fixed ones for both variants, then perturbed ones. `None` for 0 and above
     /// [`MOST`](Self::MOST).
     pub fn numbered(number: usize) -> Option<Self> {
         let index = number.checked_sub(1).filter(|index| *index < Self::MOST)?;
@@ -174,15 +173,15 @@ impl ColdGuess {
         Some(Self::CATALOGUE.get(index).copied().unwrap_or_else(perturbed))
     }
 
-    /// A guess with another timing, stride, knee and beginning of the constraints' curvature. The numbers fill their ranges
-    /// evenly, whatever their count: multiples of the powers of one irrational number, modulo 1 (Roberts 2018, *The
-    /// unreasonable effectiveness of quasirandom sequences*).
+    /// A guess with a perturbed timing, stride, knee flexion and threshold of the curvature. The perturbations are a quasirandom
+    /// sequence (Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*), which fills the ranges evenly for any
+    /// count.
     pub fn perturbed(number: usize) -> Self {
-        // x^7 = x + 1: six coordinates.
+        // The root of x^7 = x + 1, for six coordinates.
         const BASE: f64 = 1.112_775_684_278_705_5;
         let draw = |coordinate: i32, low: f64, high: f64| {
             let share = (0.5 + (number + 1) as f64 * BASE.powi(-coordinate)).fract();
-            // Three decimals: what a label says is what was tried.
+            // Three decimals, so that labels are exact.
             (1e3 * (low + share * (high - low))).round() / 1e3
         };
         Self {
@@ -195,10 +194,10 @@ impl ColdGuess {
         }
     }
 
-    /// Checks every field.
+    /// Checks each field.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::check_range("guess.knee_flexion", self.knee_flexion, 0.0, 2.0)?;
         ModelError::check_range("guess.stride_time_s", self.stride_time_s, 0.5, 3.0)?;
@@ -216,16 +215,15 @@ impl ColdGuess {
         GuessSettings { stride_time_s: self.stride_time_s, stride_length_m: self.stride_length_m }
     }
 
-    /// The first point of the first phase: scaled variables without muscles, for solvers elsewhere that are to start from
-    /// the same point.
+    /// The first point of the first phase, as scaled variables without muscles, for comparisons with other solvers.
     ///
     /// # Errors
-    /// [`ModelError`] when the problem is invalid.
+    /// [`ModelError`] if the problem is invalid.
     pub fn first_point(&self, problem: &GaitProblem) -> Result<Vec<f64>, ModelError> {
         Ok(self.begin(&self.tracked(problem), &|| false)?.1)
     }
 
-    /// The programme without muscles of the first phase, and its first point.
+    /// The problem of the first phase, without muscles, and its first point.
     pub(super) fn begin(
         &self,
         tracked: &GaitProblem,
@@ -238,7 +236,7 @@ impl ColdGuess {
         Ok((plain, first))
     }
 
-    /// The problem whose reference is tracked.
+    /// The problem with the modified reference gait for tracking.
     pub(super) fn tracked(&self, problem: &GaitProblem) -> GaitProblem {
         let mut problem = problem.clone();
         for angles in &mut problem.reference.angles_rad {
@@ -247,7 +245,7 @@ impl ColdGuess {
         problem
     }
 
-    /// In words: `cold, muscle tracking`.
+    /// Label: `cold, muscle tracking`.
     pub fn label(&self) -> String {
         let mut label = match self.route {
             ColdRoute::MuscleTracking => "cold, muscle tracking",

@@ -1,4 +1,4 @@
-//! Limits and numerical options of a solve.
+//! Options of a solve.
 
 use super::cold_guesses::ColdGuess;
 use super::solver_settings;
@@ -6,30 +6,30 @@ use crate::nlp::NlpSettings;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 
-/// Limits and numerical options of one solve.
+/// Options of a solve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolveOptions {
     /// Scaled optimality tolerance.
     pub tolerance: f64,
-    /// Most iterations of each phase; those that track the reference have 200 at most.
+    /// Largest number of iterations of each phase; tracking phases have at most 200.
     pub max_iterations: usize,
-    /// Most seconds of wall time for the whole solve; `None`: no limit.
+    /// Largest wall time of the whole solve, s; `None` for no limit.
     pub time_limit_s: Option<f64>,
-    /// Threads, 1 to 16: for the cold guesses side by side, then for the linear algebra of each. The result does not
+    /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result does not
     /// depend on it.
     pub threads: usize,
-    /// How many guesses a cold start tries, whatever becomes of them ([`ColdGuess::first`]). 1 to [`ColdGuess::MOST`].
+    /// Number of initial guesses that a cold start always tries ([`ColdGuess::first`]), 1 to [`ColdGuess::MOST`].
     pub cold_guesses: usize,
-    /// Whether the other guesses follow, one after the other, until one converges.
+    /// Whether further guesses follow until one converges.
     pub retry: bool,
-    /// Which of the converged guesses is the answer.
+    /// The choice among converged attempts.
     pub basin_choice: BasinChoice,
-    /// How often bounds are tightened where the gait exceeds them between its nodes by more than half of what its
-    /// certificate allows there, each time solving on from where it was; 0: never.
+    /// Largest number of rounds in which bounds are tightened if the gait violates them between nodes by more than half of the
+    /// limit of the certificate. 0 disables the check.
     pub tightening_rounds: usize,
-    /// Settings of the interior point, but for those that the phases of a solve decide. In JSON only
-    /// what differs from the default needs to be there.
+    /// Settings of the interior-point solver, except those that the phases of a solve determine. In JSON, missing fields have
+    /// their defaults.
     #[serde(with = "solver_settings", skip_serializing_if = "solver_settings::are_default")]
     pub solver: NlpSettings,
 }
@@ -51,10 +51,10 @@ impl Default for SolveOptions {
 }
 
 impl SolveOptions {
-    /// Checks every option.
+    /// Checks each option.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::check_range("tolerance", self.tolerance, 1e-10, 1e-2)?;
         ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
@@ -70,16 +70,16 @@ impl SolveOptions {
     }
 }
 
-/// Which of several converged gaits is the answer.
+/// The choice among several converged gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum BasinChoice {
-    /// The one with the lowest objective.
+    /// The gait with the lowest objective.
     #[default]
     LowestObjective,
-    /// The one with the lowest Gait RMSE among those whose objective is near the lowest.
+    /// The gait with the lowest Gait RMSE among those with an objective near the lowest.
     NearestToReference {
-        /// How far above the lowest objective a gait may be, per cent.
+        /// Largest excess over the lowest objective, per cent.
         within_percent: f64,
     },
 }
@@ -88,7 +88,7 @@ impl BasinChoice {
     /// Checks the percentage.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] naming the field.
+    /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         match self {
             Self::LowestObjective => Ok(()),

@@ -1,4 +1,4 @@
-//! One gait problem.
+//! The data of a gait problem.
 
 use crate::bounds::TunedBounds;
 use crate::device::Device;
@@ -8,29 +8,29 @@ use crate::settings::GaitSettings;
 use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 
-/// One gait problem.
+/// The data of a gait problem.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GaitProblem {
-    /// Who walks.
+    /// The subject.
     pub subject: Subject,
-    /// With which prosthesis (right leg).
+    /// The device on the right leg.
     pub device: Device,
-    /// Tuned bounds a1..a8.
+    /// The tuned bounds a1 to a8.
     pub bounds: TunedBounds,
-    /// With muscles (C1-C12) or without (C1-C4).
+    /// Whether the problem has muscles (C1 to C12) or not (C1 to C4).
     pub muscles: bool,
     /// Other settings of the problem.
     pub settings: GaitSettings,
-    /// Reference for Gait RMSE and for the cold start.
+    /// The reference gait, for Gait RMSE and for initial guesses.
     pub reference: ReferenceGait,
 }
 
 impl GaitProblem {
-    /// A problem with the built-in device and reference, default bounds and settings.
+    /// A problem with the built-in device and reference gait, default bounds and default settings.
     ///
     /// # Errors
-    /// [`ModelError`] naming what is out of range.
+    /// [`ModelError`] with the field that is out of range.
     pub fn new(subject: Subject, muscles: bool) -> Result<Self, ModelError> {
         subject.validate()?;
         Ok(Self {

@@ -1,13 +1,13 @@
-//! What a solve tells while it runs, and how it is stopped.
+//! Progress and cancellation of a solve.
 
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// One line of progress.
+/// The record of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct IterationRecord {
-    /// Iteration number over all phases of this solve.
+    /// Number of the iteration over all phases of the solve.
     pub iteration: usize,
     /// Phase of the solve: `tracking`, `muscle_tracking`, `cost`, ...
     pub phase: Phase,
@@ -21,7 +21,7 @@ pub struct IterationRecord {
     pub barrier: f64,
     /// Primal step length.
     pub step: f64,
-    /// Cold guess it belongs to, from 0; several may run at the same time.
+    /// Number of the initial guess, from 0; several may run in parallel.
     #[serde(default)]
     pub guess: usize,
 }
@@ -30,28 +30,28 @@ pub struct IterationRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// Tracking the reference without muscles (cold start).
+    /// Tracking of the reference gait without muscles, in a cold start.
     Tracking,
-    /// Tracking the reference with muscles (cold start).
+    /// Tracking of the reference gait with muscles, in a cold start.
     MuscleTracking,
-    /// Minimising the cost of transport without muscles, as the start of a gait with muscles (cold start).
+    /// Minimisation of the cost of transport without muscles, before the phase with muscles of a cold start.
     PlainCost,
-    /// Minimising the cost of transport.
+    /// Minimisation of the cost of transport.
     Cost,
-    /// The same with bounds tightened where the gait exceeded them between its nodes.
+    /// Minimisation of the cost of transport with tightened bounds.
     BetweenPoints,
 }
 
-/// Stops a solve from another thread within one iteration.
+/// Cancels a solve from another thread, within one iteration.
 #[derive(Debug, Clone, Default)]
 pub struct CancelToken(Arc<AtomicBool>);
 
 impl CancelToken {
-    /// A token that is not cancelled.
+    /// A token without cancellation.
     pub fn new() -> Self {
         Self::default()
     }
-    /// Asks every solve that holds this token to stop.
+    /// Cancels every solve with this token.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }

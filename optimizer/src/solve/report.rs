@@ -1,4 +1,4 @@
-//! What a solve gives back: figures, gait, violations.
+//! The outcome of a solve: report, gait and violations.
 
 use super::attempts::Choice;
 use super::run::Context;
@@ -11,21 +11,21 @@ use crate::metrics::gait_rmse;
 use crate::nlp::{NlpResult, NlpStatus, NonlinearProgram};
 use serde::{Deserialize, Serialize};
 
-/// How a solve ended. Only `Converged` is a gait that satisfies every constraint.
+/// Status of a solve. Only a `Converged` gait satisfies every constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SolveStatus {
-    /// First-order optimal and feasible to tolerance.
+    /// A feasible point that satisfies the first-order conditions to tolerance.
     Converged,
-    /// The constraint violation is at a stationary point: locally infeasible.
+    /// A stationary point of the violation: the problem is locally infeasible.
     Infeasible,
-    /// No further progress could be made.
+    /// The solver could not make progress.
     Stalled,
-    /// Iteration limit reached.
+    /// The iteration limit was reached.
     IterationLimit,
-    /// Time limit reached.
+    /// The time limit was reached.
     TimeLimit,
-    /// Cancelled through the token.
+    /// The solve was cancelled.
     Cancelled,
 }
 
@@ -42,75 +42,75 @@ impl From<NlpStatus> for SolveStatus {
     }
 }
 
-/// What a solve started from.
+/// Start of a solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StartedFrom {
-    /// Its own cold start.
+    /// A cold start.
     Cold,
-    /// The warm start that was given.
+    /// The given warm start.
     Warm,
-    /// A cold start after the given warm start did not converge.
+    /// A cold start, because the given warm start did not converge.
     ColdAfterWarm,
 }
 
-/// One thing that a solve tried.
+/// An attempt of a solve.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Attempt {
-    /// What, in words.
+    /// Label of the start.
     pub strategy: String,
-    /// How it ended.
+    /// Status of the attempt.
     pub status: SolveStatus,
-    /// Iterations over its phases.
+    /// Number of iterations over its phases.
     pub iterations: usize,
     /// Wall time, s.
     pub seconds: f64,
-    /// Objective where it ended.
+    /// Final objective.
     pub objective: f64,
-    /// Gait RMSE where it ended, rad.
+    /// Final Gait RMSE, rad.
     pub gait_rmse_rad: f64,
-    /// Why it could not be carried through, in words; empty when it could.
+    /// The reason why the attempt could not be completed; empty otherwise.
     #[serde(default)]
     pub reason: String,
-    /// Which of the local optima that were found it ended in, from 1 in the order of the attempts; none where it did not
-    /// converge. Attempts of one number ended in the same gait.
+    /// Number of its local optimum, from 1 in the order of the attempts. Attempts with the same number have the same gait. `None`
+    /// if it did not converge.
     #[serde(default)]
     pub basin: Option<usize>,
-    /// Whether it is the answer.
+    /// Whether it is the outcome of the solve.
     pub chosen: bool,
 }
 
-/// The first-order conditions of a local optimum, measured anew where the solve ended, as the solver scales them (by the
-/// size of the multipliers, WB06 eq. 5), of the problem with its tightened bounds. With `max_violation` they are the certificate of a converged gait.
+/// Residuals of the first-order conditions at the result, computed independently with the scaling of Wächter and Biegler
+/// (2006, eq. 5), for the problem with tightened bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Optimality {
-    /// Largest entry of the Lagrangian's gradient.
+    /// Largest entry of the gradient of the Lagrangian.
     pub dual_infeasibility: f64,
-    /// Largest product of a distance to a bound and its multiplier.
+    /// Largest complementarity product: distance from a bound times its multiplier.
     pub complementarity: f64,
     /// Last barrier parameter.
     pub barrier: f64,
 }
 
-/// What the linear algebra of a solve took, over all its attempts.
+/// Cost of the linear algebra of a solve, over all attempts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 pub struct LinearAlgebra {
-    /// Analysing the matrices' structure, once a phase, s.
+    /// Time of the symbolic analyses, one for each phase, s.
     pub seconds_analysis: f64,
-    /// Assembling and factorising, s.
+    /// Time of assembly and factorisation, s.
     pub seconds_factorisation: f64,
-    /// Substitutions, residuals and refinement, s.
+    /// Time of substitutions, residuals and refinement, s.
     pub seconds_solves: f64,
-    /// Numerical factorisations.
+    /// Number of numerical factorisations.
     pub factorisations: usize,
-    /// Forward-backward substitutions, those of refinement included.
+    /// Number of forward and backward substitutions, including refinement.
     pub substitutions: usize,
-    /// Times a factorisation broke down or was not trusted, and another method was asked.
+    /// Number of factorisations that the fallback method replaced.
     pub fallbacks: usize,
 }
 
 impl LinearAlgebra {
-    /// Adds what one phase took.
+    /// Adds the cost of a phase.
     pub(super) fn add_phase(&mut self, result: &NlpResult) {
         self.add(&Self {
             seconds_analysis: result.timing.analysis,
@@ -122,7 +122,7 @@ impl LinearAlgebra {
         });
     }
 
-    /// Adds what another attempt took.
+    /// Adds the cost of another attempt.
     pub(super) fn add(&mut self, other: &Self) {
         self.seconds_analysis += other.seconds_analysis;
         self.seconds_factorisation += other.seconds_factorisation;
@@ -137,40 +137,39 @@ impl LinearAlgebra {
     }
 }
 
-/// The figures of one solve: a contract for scripts (`gaitwright solve --json`).
+/// The report of a solve, and the format of `gaitwright solve --json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolveReport {
     /// How it ended.
     pub status: SolveStatus,
-    /// What it started from.
+    /// Start of the solve.
     pub started_from: StartedFrom,
-    /// Interior-point iterations over all phases.
+    /// Number of iterations over all phases.
     pub iterations: usize,
-    /// Objective: cost of transport plus regularisation.
+    /// Objective: cost of transport plus regularisation and naturalness terms.
     pub objective: f64,
     /// Mechanical cost of transport, dimensionless.
     pub cost_of_transport: f64,
     /// Gait RMSE: sum over the five human coordinates, rad.
     pub gait_rmse_rad: f64,
-    /// Its parts: torso, hip_L, knee_L, ankle_L, hip_R.
+    /// Parts of the Gait RMSE: torso, hip_L, knee_L, ankle_L, hip_R, rad.
     pub gait_rmse_parts_rad: [f64; 5],
     /// Largest violation of any constraint row or bound, in scaled units.
     pub max_violation: f64,
-    /// How well the conditions of a local optimum are met; `None` where that could not be measured, and in records of
-    /// versions that did not say.
+    /// Residuals of the first-order conditions; `None` if unknown.
     #[serde(default)]
     pub optimality: Option<Optimality>,
-    /// How many bounds at nodes are tightened so that the gait keeps them between the points too.
+    /// Number of bounds at nodes that are tightened so that the gait satisfies them between nodes.
     #[serde(default)]
     pub tightened_bounds: usize,
     /// Wall time, s.
     pub seconds_total: f64,
-    /// Evaluating functions and derivatives, s. This and what follows are sums over the attempts: of attempts side by side
-    /// they may be more than the wall time.
+    /// Time of function and derivative evaluations, s. This and the following times are sums over attempts, which may exceed the
+    /// wall time.
     pub seconds_evaluation: f64,
-    /// Linear algebra, s.
+    /// Time of the linear algebra, s.
     pub seconds_linear_algebra: f64,
-    /// Its parts; `None` in records of versions that did not say.
+    /// Parts of the linear algebra; `None` if unknown.
     #[serde(default)]
     pub linear_algebra: Option<LinearAlgebra>,
     /// Number of variables.
@@ -185,57 +184,56 @@ pub struct SolveReport {
     pub stride_length_m: f64,
     /// Durations of the eight domains, s.
     pub durations_s: [f64; 8],
-    /// v_hip of the four impact-free runs, m/s.
+    /// v_hip of the four sequences of domains without impact, m/s.
     pub vhip_m_s: [f64; 4],
-    /// Everything that was tried, in order; the figures above are those of the chosen one, iterations and seconds the
-    /// sum.
+    /// The attempts in order. Iterations and times above are sums, the other values are those of the chosen attempt.
     #[serde(default)]
     pub attempts: Vec<Attempt>,
 }
 
-/// A constraint row or bound that is not met, in words and numbers.
+/// A violated constraint row or bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Violation {
-    /// Name of the row: domain, node, constraint, component.
+    /// Name of the row: domain, node, constraint and component.
     pub row: String,
-    /// By how much, in `unit`.
+    /// Violation, in `unit`.
     pub amount: f64,
     /// Unit of `amount`.
     pub unit: String,
 }
 
-/// A local optimum that the guesses of a solve reached beside the answer.
+/// Another local optimum that a guess of the solve reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OtherBasin {
-    /// Its number among the attempts.
+    /// Number of the local optimum among the attempts.
     pub basin: usize,
-    /// Objective there.
+    /// Objective.
     pub objective: f64,
-    /// Gait RMSE there, rad.
+    /// Gait RMSE, rad.
     pub gait_rmse_rad: f64,
-    /// The gait, which keeps its bounds at its nodes; a solve from `warm_start` sees to it between them too.
+    /// The gait, which satisfies its bounds at nodes. A solve from `warm_start` also tightens them between nodes.
     pub gait: Gait,
-    /// For solving on in this basin.
+    /// Warm start in this local optimum.
     pub warm_start: WarmStart,
 }
 
-/// What a solve gives back, converged or not.
+/// The outcome of a solve, converged or not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolveOutcome {
-    /// The figures.
+    /// The report.
     pub report: SolveReport,
-    /// The last iterate as a gait. Only a gait to trust when the status is `Converged`.
+    /// The last iterate as a gait. It satisfies the constraints only if the status is `Converged`.
     pub gait: Gait,
-    /// For warm-starting another solve.
+    /// Warm start for another solve.
     pub warm_start: WarmStart,
-    /// The most violated rows, worst first; empty when converged.
+    /// The most violated rows, worst first; empty if converged.
     pub violations: Vec<Violation>,
-    /// The other local optima that were found, one gait each.
+    /// The other local optima, with one gait for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other_basins: Vec<OtherBasin>,
 }
 
-/// What all attempts of one solve cost together.
+/// Total cost of the attempts of a solve.
 #[derive(Default)]
 pub(super) struct Tally {
     pub(super) iterations: usize,
@@ -244,10 +242,10 @@ pub(super) struct Tally {
     pub(super) attempts: Vec<Attempt>,
 }
 
-/// Most violations reported.
+/// Largest number of reported violations.
 const MAX_VIOLATIONS: usize = 20;
 
-/// The outcome of the attempt that was chosen.
+/// The outcome of the chosen attempt.
 pub(super) fn outcome(
     context: &Context<'_>,
     choice: Choice,
@@ -301,7 +299,7 @@ pub(super) fn outcome(
     SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
 }
 
-/// A gait of a basin of its own, as it was found.
+/// The gait of another local optimum.
 pub(super) fn other_basin(context: &Context<'_>, choice: Choice, attempt: &Attempt, basin: usize) -> OtherBasin {
     OtherBasin {
         basin,
@@ -346,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_of_an_older_version_is_read_and_says_nothing_of_the_parts() {
+    fn report_without_linear_algebra_and_optimality_is_read() {
         let report: SolveReport = serde_json::from_value(older()).unwrap();
         assert_eq!((report.seconds_linear_algebra, report.linear_algebra), (0.8, None));
     }

@@ -1,4 +1,4 @@
-//! One attempt in progress: its phases, and what they cost.
+//! An attempt in progress: its phases and their cost.
 
 use super::attempts::CONVERGED_VIOLATION;
 use super::cold_guesses::{ColdGuess, ColdRoute};
@@ -11,32 +11,32 @@ use crate::nlp::{
 };
 use std::time::Instant;
 
-/// First barrier parameter of the tracking phases of a cold start. Small values keep the natural guess: at 0.1 the
-/// barrier of 7,000 bounds swamps a cost of 0.06.
+/// Initial barrier parameter of the tracking phases. It is small, because at 0.1 the barrier terms of 7,000 bounds dominate an
+/// objective of 0.06 and destroy the natural guess.
 const MU_TRACKING: f64 = 1e-3;
 const MU_MUSCLE_TRACKING: f64 = 1e-2;
-/// Weight of the tracking phases. Ten takes a tenth more iterations in all; one takes the fewest without muscles, and with them
-/// leads to dearer gaits.
+/// Weight of the tracking term in the tracking phases. Larger weights take more iterations; smaller ones lead to worse local
+/// optima with muscles.
 const TRACKING_WEIGHT: f64 = 3.0;
-/// Tolerances of a phase whose end is but a start: error, complementarity (it stays at the first barrier parameter),
-/// violation. Smaller ones cost iterations and save none afterwards.
+/// Tolerances of a phase whose result is only a start: error, complementarity (at the initial barrier parameter) and violation.
+/// Tighter ones cost iterations and save none in later phases.
 const ROUGH: f64 = 1e-2;
 const ROUGH_VIOLATION: f64 = 1e-3;
-/// Most iterations of a phase that tracks the reference. It takes some ten; on bounds with hardly a gait it may take a
-/// thousand, and the cost phase goes on from wherever it is.
+/// Iteration limit of a tracking phase. Usually it takes about ten. With nearly infeasible bounds it may take a thousand, and
+/// the cost phase can continue from any point.
 const MOST_TRACKING_ITERATIONS: usize = 200;
-/// Share of the violation allowed in an answer that is allowed before it is moved into its bounds.
+/// Violation before the projection into the bounds, as a share of the allowed violation.
 const VIOLATION_SHARE: f64 = 0.3;
-/// First barrier parameter of a cost phase that may not choose its own.
+/// Initial barrier parameter of a cost phase without warm start.
 const MU_COST: f64 = 1e-4;
-/// Distance from its bounds, relative and as a share of their width, that a point keeps on to which a phase goes.
+/// Distance from the bounds, relative and as a share of their width, of the first point of a phase.
 const WARM_PUSH: f64 = 1e-7;
 
-/// Without muscles the cost phase begins with this share of the guess's barrier parameter: a fifth fewer iterations. With
-/// muscles it would keep dearer gaits, which are nearer to the reference.
+/// Factor on the barrier parameter of the guess in a cost phase without muscles, which saves iterations. With muscles it would
+/// lead to worse local optima, near the reference gait.
 const PLAIN_BARRIER_SHARE: f64 = 0.1;
 
-/// What all attempts of one solve share.
+/// The common data of all attempts of a solve.
 #[derive(Clone, Copy)]
 pub(super) struct Context<'a> {
     pub(super) problem: &'a GaitProblem,
@@ -46,18 +46,18 @@ pub(super) struct Context<'a> {
     pub(super) started: Instant,
 }
 
-/// One attempt.
+/// An attempt.
 pub(super) struct Run<'a> {
     context: &'a Context<'a>,
     threads: usize,
     observer: &'a mut dyn FnMut(&IterationRecord),
     begun: Instant,
-    /// Number of the cold guess.
+    /// Number of the initial guess.
     pub(super) guess: usize,
     pub(super) iterations: usize,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra: LinearAlgebra,
-    /// Why a phase could not begin; empty when all could.
+    /// The reason why a phase could not start; empty otherwise.
     pub(super) reason: String,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Seconds since the attempt began.
+    /// Time since the start of the attempt, s.
     pub(super) fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
     }
@@ -123,7 +123,7 @@ impl<'a> Run<'a> {
             &|| self.context.cancel.is_cancelled(),
         );
         let result = match result {
-            // The fault of the start, not of the program: nothing can be done from there.
+            // The starting point is unusable.
             Err(error @ (NlpError::EvaluationFailed { .. } | NlpError::InvalidStart(_))) => {
                 self.reason = error.to_string();
                 return Ok(stuck(programme, start));
@@ -136,12 +136,12 @@ impl<'a> Run<'a> {
         Ok(result)
     }
 
-    /// Whether the caller or the clock ended it.
+    /// Whether the attempt was cancelled or reached its time limit.
     pub(super) fn interrupted(result: &NlpResult) -> bool {
         matches!(result.status, NlpStatus::Cancelled | NlpStatus::TimeLimit)
     }
 
-    /// Tracking, with muscles by the guess's route, then cost.
+    /// The tracking phases, by the route of the guess, then the cost phase.
     pub(super) fn cold(&mut self, guess: &ColdGuess) -> Result<NlpResult, SolveError> {
         let (problem, programme) = (self.context.problem, self.context.programme);
         let tracked_problem = guess.tracked(problem);
@@ -189,15 +189,14 @@ impl<'a> Run<'a> {
         let mu_initial = if problem.muscles { guess.barrier } else { PLAIN_BARRIER_SHARE * guess.barrier };
         let mut usual = NlpSettings { mu_initial, ..self.last_phase(&every_phase) };
         if tracked.status != NlpStatus::Converged {
-            // As near to feasible as it came (with muscles: its motion is): away from its bounds it violates up to a million
-            // times as much where domains are short.
+            // Keep the nearly feasible point: a larger distance from its bounds would increase the violation up to a million
+            // times in short domains.
             (usual.bound_push, usual.bound_fraction) = (WARM_PUSH, WARM_PUSH);
         }
         self.phase(Phase::Cost, programme, &StartPoint::Cold(tracked.x), &guess.strategy.applied(&usual))
     }
 
-    /// Begins with the barrier parameter that the point's own complementarity has in the mean: larger ones, by the violation
-    /// of the changed bounds, forget the point (twice to four times the iterations), smaller ones take more as well.
+    /// Starts with the mean complementarity of the point as barrier parameter. Larger and smaller values take more iterations.
     pub(super) fn warm(
         &mut self,
         phase: Phase,
@@ -217,8 +216,8 @@ impl<'a> Run<'a> {
         )
     }
 
-    /// With the tolerance of the answer. The answer is moved back into its bounds, which rows answer with up to a hundred
-    /// times the way: bounds are widened by little beside the tolerance, and the violation leaves room for what that adds.
+    /// Solves to the final tolerance. The projection into the bounds may change rows by up to a hundred times the distance, so
+    /// bounds are relaxed by little compared with the tolerance, and the violation has a margin.
     fn last_phase(&self, settings: &NlpSettings) -> NlpSettings {
         let tolerance = self.context.options.tolerance;
         NlpSettings {
@@ -230,7 +229,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// A solve that ended where it began.
+/// The result of a solve that ended at its starting point.
 fn stuck(programme: &GaitProgramme, start: &StartPoint) -> NlpResult {
     let x = match start {
         StartPoint::Cold(x) => x.clone(),
@@ -257,8 +256,8 @@ fn stuck(programme: &GaitProgramme, start: &StartPoint) -> NlpResult {
     blank(programme, x, nothing)
 }
 
-/// A result in the shape of `programme` whose multipliers carry no information.
-#[allow(clippy::needless_pass_by_value)] // the replaced vectors are not needed any more
+/// A result with the dimensions of `programme` and multipliers without information.
+#[allow(clippy::needless_pass_by_value)] // The replaced vectors are not needed any more.
 fn blank(programme: &GaitProgramme, x: Vec<f64>, result: NlpResult) -> NlpResult {
     let (n, m) = (programme.variables(), programme.rows());
     NlpResult {

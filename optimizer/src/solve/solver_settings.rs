@@ -1,8 +1,7 @@
-//! The settings of the interior point that a caller may choose for gait problems.
+//! The settings of the interior-point solver that a caller can choose for gait problems.
 //!
-//! The phases of a solve decide the others, by the rest of the options and the guess in progress: tolerances, limits, barrier
-//! parameters and strategy, distance of a warm start from its bounds (and of a cost phase after a tracking phase that did not
-//! converge), when the rows' curvature counts, threads.
+//! The phases of a solve determine the others from the options and the initial guess: tolerances, limits, barrier parameter and
+//! strategy, distance of the first point from its bounds, threshold of the curvature, and threads.
 
 use crate::nlp::{BoundMultiplierStart, NlpSettings};
 use crate::subject::ModelError;
@@ -11,7 +10,7 @@ use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-/// Fields that the phases decide.
+/// Fields that the phases determine.
 const DECIDED_BY_PHASES: [&str; 14] = [
     "tolerance",
     "violation_tolerance",
@@ -29,9 +28,9 @@ const DECIDED_BY_PHASES: [&str; 14] = [
     "threads",
 ];
 
-/// What suits gait problems: cold starts keep well away from their bounds, bound multipliers begin on the central path, the
-/// unregularised matrix is not tried again at once after it had the wrong inertia, and a second-order correction that did not
-/// help is not corrected again (a tenth of the iterations and a fifth of the substitutions of 40 cold starts without muscles).
+/// Defaults for gait problems. Cold starts keep a distance from their bounds, and bound multipliers start on the central path.
+/// After a wrong inertia the unregularised matrix is not tried again immediately, and an unsuccessful second-order correction is
+/// not repeated.
 pub(super) fn default() -> NlpSettings {
     NlpSettings {
         bound_push: 0.1,
@@ -55,12 +54,10 @@ fn fields(settings: &NlpSettings) -> Result<Map<String, Value>, String> {
 }
 
 fn decided(field: &str) -> String {
-    format!(
-        "{field} is decided by the phases of a solve; leave it out (the options beside solver, and the guesses, set it)"
-    )
+    format!("{field} is determined by the phases of a solve; omit it (other options and the initial guesses set it)")
 }
 
-/// Checks every range, and that nothing is set here that is decided elsewhere.
+/// Checks all ranges, and that no field is set that the phases determine.
 pub(super) fn validate(settings: &NlpSettings) -> Result<(), ModelError> {
     let invalid = |reason: String| ModelError::Malformed { what: "solver".to_owned(), reason };
     settings.validate().map_err(|error| invalid(error.to_string()))?;
@@ -71,7 +68,7 @@ pub(super) fn validate(settings: &NlpSettings) -> Result<(), ModelError> {
     }
 }
 
-/// Writes what differs from the default.
+/// Serialises the fields that differ from the defaults.
 pub(super) fn serialize<S: Serializer>(settings: &NlpSettings, serializer: S) -> Result<S::Ok, S::Error> {
     let usual = fields(&default()).map_err(S::Error::custom)?;
     let mut own = fields(settings).map_err(S::Error::custom)?;
@@ -79,7 +76,7 @@ pub(super) fn serialize<S: Serializer>(settings: &NlpSettings, serializer: S) ->
     own.serialize(serializer)
 }
 
-/// Fields that are left out have the default for gait problems; those that the phases decide must be left out.
+/// Deserialises settings. Missing fields have the defaults for gait problems; fields that the phases determine must be missing.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NlpSettings, D::Error> {
     let mut all = fields(&default()).map_err(D::Error::custom)?;
     let given = Map::deserialize(deserializer)?;
@@ -89,7 +86,7 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
     let mut settings = default();
     for (field, value) in given {
         all.insert(field.clone(), value);
-        // One after the other: what is wrong is then known by name.
+        // Field by field, so that errors have its name.
         settings = serde_json::from_value(Value::Object(all.clone()))
             .map_err(|error| D::Error::custom(format!("solver.{field}: {error}")))?;
     }
@@ -107,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_the_default_for_gaits() {
+    fn missing_fields_have_the_defaults_for_gait_problems() {
         let given = options(r#"{"solver": {"tau_min": 0.995}}"#).unwrap();
         let mut expected = SolveOptions::default();
         expected.solver.tau_min = 0.995;
@@ -117,12 +114,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_written_of_the_default() {
+    fn default_settings_serialise_to_an_empty_object() {
         assert!(!serde_json::to_string(&SolveOptions::default()).unwrap().contains("solver"));
     }
 
     #[test]
-    fn wrong_settings_are_named() {
+    fn invalid_settings_are_rejected_by_name() {
         for (text, expected) in [
             (r#"{"solver": {"tau_min": 1.5}}"#, "tau_min"),
             (r#"{"solver": {"tau_mni": 0.9}}"#, "unknown field `tau_mni`"),
@@ -131,9 +128,9 @@ mod tests {
             (r#"{"solver": {"bound_relaxation": 1e-3}}"#, "bound_relaxation is 0.001, allowed is 0 to 0.000001"),
             (r#"{"solver": {"hessian_regularisation_min": 1}}"#, "allowed is more than 0, up to 0.0001"),
             (r#"{"solver": {"kappa_epsilon": 0}}"#, "kappa_epsilon is 0, allowed is any positive number"),
-            (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial is decided by the phases of a solve"),
-            (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial is decided by the phases of a solve"),
-            (r#"{"solver": {"threads": 2}}"#, "threads is decided by the phases of a solve"),
+            (r#"{"solver": {"mu_initial": 0.2}}"#, "mu_initial is determined by the phases of a solve"),
+            (r#"{"solver": {"mu_initial": 0.1}}"#, "mu_initial is determined by the phases of a solve"),
+            (r#"{"solver": {"threads": 2}}"#, "threads is determined by the phases of a solve"),
         ] {
             let error = options(text).unwrap_err();
             assert!(error.contains(expected), "{text}: {error}");

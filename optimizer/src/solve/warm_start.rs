@@ -1,4 +1,4 @@
-//! Where an earlier solve ended, as a start.
+//! Warm starts: the result of a solve as a starting point.
 
 use super::{GaitProblem, SolveError};
 use crate::gait_problem::margins::Margins;
@@ -7,30 +7,32 @@ use crate::nlp::{NonlinearProgram, WarmPoint};
 use crate::settings::Mesh;
 use serde::{Deserialize, Serialize};
 
-/// Primal-dual point of an earlier solve of a problem of the same variant, on this mesh or another.
+/// The primal-dual point of a solve of the same variant, on any mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WarmStart {
-    /// Variant it belongs to.
+    /// Variant of the solve.
     pub muscles: bool,
-    /// Mesh it belongs to.
+    /// Mesh of the solve.
     pub mesh: Mesh,
     /// Scaled primal variables and all multipliers.
     pub point: WarmPoint,
-    /// Bounds that were tightened for the sake of the gait between its nodes.
+    /// Bounds that were tightened because of violations between nodes.
     #[serde(default, skip_serializing_if = "Margins::is_empty")]
     pub margins: Margins,
 }
 
-/// A start on the mesh of a problem.
+/// A starting point on the mesh of a problem.
 pub(super) struct Start {
     pub(super) point: WarmPoint,
     pub(super) margins: Margins,
     pub(super) strategy: &'static str,
 }
 
-/// The start on the mesh of `programme`; margins are of a mesh and do not come along to another. Refuses one of another
-/// variant or size.
+/// Converts a warm start to the mesh of `programme`. Margins belong to a mesh and are dropped on another one.
+///
+/// # Errors
+/// [`SolveError::WarmStartShape`] if variant or dimensions differ.
 pub(super) fn on_mesh_of(
     problem: &GaitProblem,
     programme: &GaitProgramme,
@@ -38,7 +40,7 @@ pub(super) fn on_mesh_of(
 ) -> Result<Start, SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
-            "it is {} muscles, the problem is {} muscles",
+            "it is {} muscles, but the problem is {} muscles",
             if warm.muscles { "with" } else { "without" },
             if problem.muscles { "with" } else { "without" }
         )));
@@ -75,7 +77,9 @@ fn check_shape(programme: &GaitProgramme, warm: &WarmStart) -> Result<(), SolveE
         }
     }
     if !warm.margins.fit(n, m) {
-        return Err(SolveError::WarmStartShape("its margins are not of its variables and rows, or below 0".to_owned()));
+        return Err(SolveError::WarmStartShape(
+            "its margins must be non-negative and belong to its variables and rows".to_owned(),
+        ));
     }
     Ok(())
 }

@@ -1,17 +1,17 @@
 //! Bezier (Bernstein) basis of degree 5 with its first four derivatives.
 
-/// Degree of the desired outputs.
+/// Degree of the curves of the outputs.
 pub const BEZIER_DEGREE: usize = 5;
-/// Coefficients per output.
+/// Number of coefficients of an output.
 pub const BEZIER_COEFFICIENTS: usize = BEZIER_DEGREE + 1;
 
-/// `basis(s)[r][i]` is the r-th derivative by s of `C(5, i) s^i (1 - s)^(5 - i)`, r = 0..4.
+/// `basis(s)[r][i]` is the r-th derivative with respect to s of `C(5, i) s^i (1 - s)^(5 - i)`, r = 0 to 4.
 ///
-/// Any s: outside \[0, 1\] the polynomial continues.
+/// Outside \[0, 1\] the polynomials continue.
 #[inline]
 pub fn basis(s: f64) -> [[f64; BEZIER_COEFFICIENTS]; 5] {
     let mut result = [[0.0; BEZIER_COEFFICIENTS]; 5];
-    // Bernstein polynomials of degree 5 - r, raised by r differentiations:
+    // From Bernstein polynomials of degree 5 - r by r differentiations,
     // B'_{i,n} = n (B_{i-1,n-1} - B_{i,n-1}).
     for (r, row) in result.iter_mut().enumerate() {
         let low = BEZIER_DEGREE - r;
@@ -30,7 +30,7 @@ pub fn basis(s: f64) -> [[f64; BEZIER_COEFFICIENTS]; 5] {
     result
 }
 
-/// Bernstein polynomials of degree n at s into `values[..=n]`.
+/// Writes the Bernstein polynomials of degree n at s to `values[..=n]`.
 #[inline]
 fn bernstein(n: usize, s: f64, values: &mut [f64; BEZIER_COEFFICIENTS]) {
     values[0] = 1.0;
@@ -51,7 +51,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn derivatives_match_differences_and_partition_unity(s in -0.2..1.2_f64) {
+        fn derivatives_match_differences_and_values_sum_to_one(s in -0.2..1.2_f64) {
             let h = 1e-5;
             let (low, mid, high) = (basis(s - h), basis(s), basis(s + h));
             prop_assert!((mid[0].iter().sum::<f64>() - 1.0).abs() < 1e-12);
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn interpolates_its_end_coefficients() {
+    fn curve_passes_through_its_end_coefficients() {
         assert_eq!(basis(0.0)[0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(basis(1.0)[0], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
         assert_eq!(basis(0.0)[1], [-5.0, 5.0, 0.0, 0.0, 0.0, 0.0]);

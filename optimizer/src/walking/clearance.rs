@@ -1,4 +1,5 @@
-//! How high the swing foot is kept: `z >= c (4 w (1 - w))^2` for heel and toe over the share w of the swing that is over.
+//! Swing-foot clearance: `z >= c (4 w (1 - w))^2` for heel and toe, with w from 0 at the start to 1 at the end of the
+//! swing.
 
 use super::domain::{CYCLE, DomainKind};
 use super::stick_figure::stick_figure;
@@ -6,17 +7,17 @@ use crate::body::WalkerModel;
 use crate::gait::{Gait, Side};
 use crate::subject::ModelError;
 
-/// `(4 w (1 - w))^2` and its first two derivatives.
+/// The profile `(4 w (1 - w))^2` with its first two derivatives.
 pub(crate) fn clearance_profile(w: f64) -> [f64; 3] {
     let bump = 4.0 * w * (1.0 - w);
     let slope = 4.0 * (1.0 - 2.0 * w);
     [bump * bump, 2.0 * bump * slope, 2.0 * slope * slope - 16.0 * bump]
 }
 
-/// The largest clearance `c` that a gait keeps at every node of both swings, m; none of a gait without a swing.
+/// The largest clearance `c` that a gait satisfies at every node of both swings, m. `None` for a gait without a swing.
 ///
 /// # Errors
-/// [`ModelError`] when the gait's subject or device is invalid.
+/// [`ModelError`] if subject or device of the gait is invalid.
 pub fn kept_clearance_m(gait: &Gait) -> Result<Option<f64>, ModelError> {
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
     let mut kept: Option<f64> = None;
@@ -28,7 +29,7 @@ pub fn kept_clearance_m(gait: &Gait) -> Result<Option<f64>, ModelError> {
         let points = [first, second].into_iter().flat_map(|part| part.time_s.iter().zip(&part.q));
         for (&time_s, q) in points {
             let [profile, ..] = clearance_profile((time_s - begin) / duration);
-            // At the ends of the swing any height will do.
+            // The profile vanishes at the ends of the swing.
             if profile < 1e-6 {
                 continue;
             }
@@ -49,7 +50,7 @@ mod tests {
     use super::clearance_profile;
 
     #[test]
-    fn the_profile_is_one_at_mid_swing_and_nothing_at_its_ends() {
+    fn profile_is_one_at_mid_swing_and_zero_at_the_ends() {
         assert_eq!([0.0, 0.5, 1.0].map(|w| clearance_profile(w)[0]), [0.0, 1.0, 0.0]);
     }
 }

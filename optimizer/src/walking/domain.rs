@@ -1,44 +1,48 @@
 //! The eight domains of the stride and their cycle.
 //!
-//! Edges (guard, reset): DS2 -> DS3 stance toe lands (impact); DS3 -> SS2 trailing toe unloads (identity);
-//! SS2 -> SS1 stance heel unloads (identity); SS1 -> DS2 swing heel lands (impact, sides swap).
+//! Transitions with guard and reset:
+//!
+//! - DS2 to DS3: the stance toe lands (impact)
+//! - DS3 to SS2: the force of the trailing toe vanishes (identity)
+//! - SS2 to SS1: the force of the stance heel vanishes (identity)
+//! - SS1 to DS2: the swing heel lands (impact, the legs exchange roles)
 
 use crate::gait::{Axis, FootPoint, Side};
 
-/// Contact situation.
+/// The contact configuration of a domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DomainKind {
-    /// Stance heel and trailing toe on the ground.
+    /// Double support on stance heel and trailing toe.
     Ds2,
-    /// Flat stance foot and trailing toe on the ground.
+    /// Double support on the flat stance foot and the trailing toe.
     Ds3,
-    /// Flat stance foot on the ground.
+    /// Single support on the flat stance foot.
     Ss2,
-    /// Stance toe on the ground: one degree of underactuation.
+    /// Single support on the stance toe, with one degree of underactuation.
     Ss1,
 }
 
-/// A domain: its contact situation and the leg that is (becoming) the stance leg.
+/// A domain: its contact configuration and its stance leg, in double support the leg that becomes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Domain {
-    /// Contact situation.
+    /// Contact configuration.
     pub kind: DomainKind,
-    /// Stance side.
+    /// Side of the stance leg.
     pub stance: Side,
 }
 
-/// One component of one contact point.
+/// A component of the force on a contact point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContactRow {
     /// Heel or toe.
     pub point: FootPoint,
-    /// Which foot.
+    /// Foot.
     pub side: Side,
-    /// Forward or up.
+    /// Component.
     pub axis: Axis,
 }
 
-/// The directed cycle, from right heel strike.
+/// The cycle of domains, from right heel strike.
 pub const CYCLE: [Domain; 8] = {
     const fn domain(kind: DomainKind, stance: Side) -> Domain {
         Domain { kind, stance }
@@ -65,7 +69,7 @@ impl Side {
         }
     }
 
-    /// Index in q of this leg's hip; knee and ankle follow.
+    /// Index in q of the hip angle of this leg; knee and ankle follow.
     pub const fn hip(self) -> usize {
         match self {
             Self::Left => 3,
@@ -75,7 +79,7 @@ impl Side {
 }
 
 impl Domain {
-    /// `DS2_R`, ...
+    /// Name: `DS2_R`, ...
     pub fn name(self) -> &'static str {
         match (self.kind, self.stance) {
             (DomainKind::Ds2, Side::Right) => "DS2_R",
@@ -89,8 +93,8 @@ impl Domain {
         }
     }
 
-    /// Independent contact rows, in the order of the contact forces. A flat foot is three rows: its heel x would be
-    /// redundant.
+    /// Independent contact rows, in the order of the contact forces. A flat foot has three rows, because the x
+    /// component of its heel would be redundant.
     pub fn contact_rows(self) -> Vec<ContactRow> {
         let row = |point, side, axis| ContactRow { point, side, axis };
         let (st, sw) = (self.stance, self.stance.other());
@@ -109,7 +113,7 @@ impl Domain {
         }
     }
 
-    /// Coordinates (indices into q) driven by the relative-degree-2 virtual constraints.
+    /// Coordinates that the virtual constraints of relative degree 2 drive, as indices into q.
     pub fn outputs(self) -> Vec<usize> {
         let (st, sw) = (self.stance.hip(), self.stance.other().hip());
         match self.kind {
@@ -120,12 +124,12 @@ impl Domain {
         }
     }
 
-    /// Whether the relative-degree-1 hip-velocity output is present (the fully actuated domains).
+    /// Whether the hip velocity is an output, of relative degree 1: in the fully actuated domains.
     pub fn has_hip_velocity(self) -> bool {
         self.kind != DomainKind::Ss1
     }
 
-    /// Which of the four hip velocities (one per impact-free run of domains) applies.
+    /// Index of the hip velocity of the domain. There are four, one for each sequence of domains without impact.
     pub fn hip_velocity_index(self) -> Option<usize> {
         let step = match self.stance {
             Side::Right => 0,
@@ -138,12 +142,12 @@ impl Domain {
         }
     }
 
-    /// Whether the domain is entered through an impact.
+    /// Whether the domain begins with an impact.
     pub fn opens_with_impact(self) -> bool {
         matches!(self.kind, DomainKind::Ds2 | DomainKind::Ds3)
     }
 
-    /// Index among [`Self::contact_rows`] of the vertical row whose point lands at the opening impact.
+    /// Index in [`Self::contact_rows`] of the vertical row of the point that lands in the impact.
     pub fn landing_row(self) -> Option<usize> {
         match self.kind {
             DomainKind::Ds2 => Some(1),
@@ -152,7 +156,7 @@ impl Domain {
         }
     }
 
-    /// Index among [`Self::contact_rows`] of the vertical force that vanishes at the end of the domain.
+    /// Index in [`Self::contact_rows`] of the vertical force that vanishes at the end of the domain.
     pub fn unloading_row(self) -> Option<usize> {
         match self.kind {
             DomainKind::Ds3 => Some(4),
@@ -161,8 +165,8 @@ impl Domain {
         }
     }
 
-    /// Indices among [`Self::contact_rows`] of all forces that vanish at the end of the domain: that one, and with the last
-    /// vertical force of a foot its friction.
+    /// Indices in [`Self::contact_rows`] of all forces that vanish at the end of the domain: that of
+    /// [`Self::unloading_row`], and the friction if the foot leaves the ground.
     pub fn unloaded_rows(self) -> &'static [usize] {
         match self.kind {
             DomainKind::Ds3 => &[3, 4],

@@ -1,4 +1,4 @@
-//! The plastic impact: velocities after a landing and the impulses that make them.
+//! The plastic impact: velocities after a landing, and contact impulses.
 
 use super::domain::Domain;
 use crate::body::{InverseDynamics, PointState, WalkerModel};
@@ -8,14 +8,14 @@ use nalgebra::{DMatrix, DVector};
 /// Velocities after an impact and the impulses of the contact rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Impact {
-    /// m/s and rad/s.
+    /// Velocities, m/s and rad/s.
     pub velocity_after: [f64; 9],
-    /// N s, one per contact row of the new domain.
+    /// Impulse of each contact row of the new domain, N s.
     pub impulse: Vec<f64>,
 }
 
-/// `[M -J^T; J 0] [qd+; Lambda] = [M qd-; 0]` with the contact rows of the domain that the impact opens; position is
-/// continuous. `None` when the contact rows are dependent at this posture.
+/// Solves `[M -J^T; J 0] [qd+; Lambda] = [M qd-; 0]` with the contact rows of the domain after the impact. Positions
+/// are continuous. `None` if the contact rows are linearly dependent in this posture.
 pub fn impact(model: &WalkerModel, opens: Domain, q: &[f64; 9], velocity_before: &[f64; 9]) -> Option<Impact> {
     let mass = InverseDynamics::new(model).mass_matrix(q);
     let rows = opens.contact_rows();

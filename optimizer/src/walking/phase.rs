@@ -1,13 +1,13 @@
-//! The phase variable: linearised forward position of the hip over the stance toe.
+//! The phase variable: the linearised forward position of the hip relative to the stance toe.
 
 use crate::body::coordinates::to_generalised;
 use crate::body::{WalkerModel, point::first_link};
 use crate::gait::Side;
 
-/// `dp(q) = gradient . q[2..]`, m: the linearisation of hip minus stance toe,
-/// `-(L_shank psi_shank + L_thigh psi_thigh + h psi_foot)` of the stance leg with its own lengths.
+/// Gradient of the phase variable `dp(q) = gradient . q[2..]` in m, the linearisation of hip minus stance toe:
+/// `-(L_shank psi_shank + L_thigh psi_thigh + h psi_foot)` of the stance leg.
 ///
-/// The foot term keeps the phase meaningful when the stance heel is up.
+/// The term of the foot makes the phase valid with a raised stance heel.
 pub fn phase_gradient(model: &WalkerModel, stance: Side) -> [f64; 7] {
     let leg = model.leg(stance);
     let first = first_link(stance);

@@ -1,23 +1,23 @@
-//! How a gait progresses: the phase variable of its domains, and the hip velocity that the virtual constraints hold.
+//! Phase variable and hip velocity of a gait at its nodes.
 
 use super::{CYCLE, phase_gradient};
 use crate::body::WalkerModel;
 use crate::gait::Gait;
 use crate::subject::ModelError;
 
-/// Progress at a node.
+/// Phase and hip velocity at a node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// Phase of the domain: 0 at its planned start, 1 at its planned end.
+    /// Phase of the domain: 0 at its start, 1 at its end.
     pub phase: f64,
-    /// Velocity of the linearised position of the hip over the stance toe, m/s.
+    /// Rate of the linearised hip position, m/s.
     pub hip_velocity_m_s: f64,
 }
 
-/// Progress at the nodes of all domains, in time.
+/// Phase and hip velocity at the nodes of all domains, in order of time.
 ///
 /// # Errors
-/// [`ModelError`] when the gait's subject or device is invalid.
+/// [`ModelError`] if subject or device of the gait is invalid.
 pub fn progress(gait: &Gait) -> Result<Vec<Progress>, ModelError> {
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
     let of_domain = |(domain, trajectory): (_, &crate::gait::DomainTrajectory)| {

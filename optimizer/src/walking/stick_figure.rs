@@ -1,4 +1,4 @@
-//! Where the joints are: for drawing a gait.
+//! Joint positions, for drawings of a gait.
 
 use crate::body::{PointState, WalkerModel};
 use crate::gait::{FootPoint, Gait, Side};
@@ -33,10 +33,10 @@ pub struct LegPoints {
     pub toe: [f64; 2],
 }
 
-/// Stick figures of a gait at its nodes, in time order.
+/// Stick figures of a gait at its nodes, in order of time.
 ///
 /// # Errors
-/// [`ModelError`] when the gait's subject or device is invalid.
+/// [`ModelError`] if subject or device of the gait is invalid.
 pub fn stick_figures(gait: &Gait) -> Result<Vec<StickFigure>, ModelError> {
     let model = WalkerModel::new(&gait.subject, &gait.device)?;
     Ok(gait
@@ -47,7 +47,7 @@ pub fn stick_figures(gait: &Gait) -> Result<Vec<StickFigure>, ModelError> {
         .collect())
 }
 
-/// One stick figure.
+/// The stick figure of one instant.
 pub fn stick_figure(model: &WalkerModel, time_s: f64, q: &[f64; 9]) -> StickFigure {
     let state = PointState::new(q, &[0.0; 9], &[0.0; 9]);
     let leg = |side: Side| {

@@ -1,5 +1,5 @@
-//! Production against the second implementation: values, Jacobian, gradient, Hessian of the Lagrangian, away from any
-//! solution, with and without muscles, for both subjects and several meshes.
+//! The gait problem matches a second implementation with dual numbers: values, Jacobian, gradient and Hessian of the
+//! Lagrangian, away from solutions, with and without muscles, for both subjects and several meshes.
 
 use crate::objective::{self, Weights};
 use crate::random::Random;
@@ -22,7 +22,7 @@ struct Pair {
     weights: Weights,
     reference: Vec<Vec<[f64; 7]>>,
     muscles: bool,
-    /// For each row as written by the second implementation, its index in production.
+    /// For each row of the second implementation, its index in the gait problem.
     row_of: Vec<usize>,
 }
 
@@ -72,7 +72,9 @@ impl Pair {
         let (written, _) = pair.second(&vec![0.5; pair.production.variables()]);
         pair.row_of = written
             .iter()
-            .map(|(name, _)| *indices.get(name).unwrap_or_else(|| panic!("production lacks {}", name.label())))
+            .map(|(name, _)| {
+                *indices.get(name).unwrap_or_else(|| panic!("the gait problem has no row {}", name.label()))
+            })
             .collect();
         let mut once = pair.row_of.clone();
         once.sort_unstable();
@@ -89,7 +91,7 @@ impl Pair {
         (rows::all(&self.problem, &gait), value)
     }
 
-    /// The rows in production's order, and the objective.
+    /// The rows in the order of the gait problem, and the objective.
     fn ordered<D: Scalar>(&self, x: &[D]) -> (Vec<D>, D) {
         let (written, value) = self.second(x);
         let mut result = vec![value; written.len()];
@@ -103,7 +105,7 @@ impl Pair {
         &self.production.rows.names
     }
 
-    /// A point far from any gait: everything of order one, durations and phase widths positive.
+    /// A point far from any gait: variables of order one, positive durations and phase widths.
     fn anywhere(&self, random: &mut Random) -> Vec<f64> {
         let mut x = random.vector(self.production.variables());
         let layout = &self.production.layout;
@@ -153,7 +155,7 @@ fn tracked_angles(table: &[[f64; 5]], intervals: [usize; 4]) -> Vec<Vec<[f64; 7]
                     let (from, to) = (boundaries[d % 4], boundaries[d % 4 + 1]);
                     let fraction = if d < 4 { 0.0 } else { 0.5 } + from + sigma * (to - from);
                     let own = [0, 1, 2, 3, 4].map(|column| at(fraction, column));
-                    // No reference of an intact person has a right knee and ankle: the left ones half a stride later.
+                    // Right knee and ankle are the left ones shifted by half a stride.
                     [own[0], own[1], own[2], own[3], own[4], at(fraction + 0.5, 2), at(fraction + 0.5, 3)]
                 })
                 .collect()
@@ -161,7 +163,7 @@ fn tracked_angles(table: &[[f64; 5]], intervals: [usize; 4]) -> Vec<Vec<[f64; 7]
         .collect()
 }
 
-/// The problems and points that every comparison runs on.
+/// The problems and points of all comparisons.
 fn each_case(mut check: impl FnMut(&Pair, &[f64], &mut Random)) {
     let mut random = Random::new(20220917);
     for (subject, intervals, muscles, a5) in [
@@ -215,7 +217,7 @@ fn values() {
 }
 
 #[test]
-fn jacobian_and_gradient() {
+fn jacobian_and_gradient_match_dual_numbers() {
     each_case(|pair, x, random| {
         let (n, m) = (pair.production.variables(), pair.production.rows());
         let pattern = pair.production.jacobian_pattern().clone();
@@ -249,7 +251,7 @@ fn jacobian_and_gradient() {
     });
 }
 
-/// d' H e of production, and the sum of the absolute values of its terms.
+/// d' H e of the gait problem, and the sum of the absolute values of its terms.
 fn curvature(
     pair: &Pair,
     x: &[f64],
@@ -270,7 +272,7 @@ fn curvature(
     (sum, size)
 }
 
-/// Where a group of rows belongs, for messages and for splitting the Hessian.
+/// The domain of a group of rows, for messages and for parts of the Hessian.
 fn group(name: RowName) -> (String, u8) {
     let domain = match name.place {
         Place::Point { domain, .. } | Place::Transition { domain } => domain,
@@ -279,8 +281,8 @@ fn group(name: RowName) -> (String, u8) {
     (format!("{:?}", name.kind), domain)
 }
 
-/// Rows whose second derivatives are not all zero: everything that turns links, follows a phase or a muscle curve, or
-/// multiplies by a duration. Only in SS1 does the phase of the Bezier curves follow the walker.
+/// Rows with second derivatives that are not all zero: rows with rotations, phases, muscle curves or products with a
+/// duration. The phase of the Bezier curves depends on the state in SS1 only.
 fn is_curved(kind: RowKind, domain: u8) -> bool {
     let ss1 = domain % 4 == 3;
     match kind {
@@ -304,7 +306,7 @@ fn is_curved(kind: RowKind, domain: u8) -> bool {
 }
 
 #[test]
-fn hessian_of_the_lagrangian() {
+fn hessian_of_the_lagrangian_matches_dual_numbers() {
     each_case(|pair, x, random| {
         let (n, m) = (pair.production.variables(), pair.production.rows());
         let mut values = vec![0.0; pair.production.hessian_pattern().row_indices.len()];
@@ -318,12 +320,12 @@ fn hessian_of_the_lagrangian() {
             let sigma = 1.7;
             let hyper: Vec<HyperDual64> = (0..n).map(|i| HyperDual64::new(x[i], d[i], e[i], 0.0)).collect();
             let (expected, objective) = pair.ordered(&hyper);
-            // The whole Lagrangian at once.
+            // The whole Lagrangian.
             let second: f64 = sigma * objective.eps1eps2
                 + expected.iter().zip(&multipliers).map(|(row, lambda)| lambda * row.eps1eps2).sum::<f64>();
             let (ours, size) = curvature(pair, x, sigma, &multipliers, &d, &e, &mut values);
             assert!((ours - second).abs() <= 1e-10 * size, "{}: Lagrangian {ours} {second}", pair.name);
-            // The objective alone, then each kind of row in each domain alone, so that nothing hides behind the largest.
+            // The objective, then each kind of row in each domain, so that large terms do not hide small errors.
             let (ours, size) = curvature(pair, x, 1.0, &vec![0.0; m], &d, &e, &mut values);
             let second = objective.eps1eps2;
             assert!((ours - second).abs() <= 1e-9 * size, "{}: objective {ours} {second}", pair.name);
@@ -346,9 +348,9 @@ fn hessian_of_the_lagrangian() {
     });
 }
 
-/// The comparison must be able to fail: one wrong derivative entry is far outside the tolerances.
+/// The comparison can fail: one wrong derivative is far outside the tolerances.
 #[test]
-fn a_wrong_entry_would_be_seen() {
+fn comparison_detects_a_wrong_entry() {
     let pair = Pair::new(1, [1, 1, 1, 1], true, 0.0);
     let mut random = Random::new(3);
     let x = pair.anywhere(&mut random);
@@ -356,7 +358,7 @@ fn a_wrong_entry_would_be_seen() {
     let (d, e, multipliers) = (random.vector(n), random.vector(n), random.vector(m));
     let mut values = vec![0.0; pair.production.hessian_pattern().row_indices.len()];
     let (right, size) = curvature(&pair, &x, 1.0, &multipliers, &d, &e, &mut values);
-    // One multiplier of one contact acceleration row changed by a thousandth.
+    // The multiplier of one contact acceleration row, changed by 0.1 %.
     let row = pair.names().iter().position(|name| name.kind == RowKind::ContactAcceleration).unwrap();
     let mut changed = multipliers.clone();
     changed[row] += 1e-3;

@@ -1,4 +1,4 @@
-//! The eight domains of a stride: who touches the ground where, and which joints follow a Bezier curve.
+//! The eight domains of a stride: contacts, and joints that follow a Bezier curve.
 
 use crate::Scalar;
 use crate::walker::Walker;
@@ -22,7 +22,7 @@ pub(crate) struct Domain {
     pub(crate) contacts: Vec<Contact>,
     /// Indices into q.
     pub(crate) outputs: Vec<usize>,
-    /// Which of the four hip velocities.
+    /// Index of the hip velocity.
     pub(crate) hip_velocity: Option<usize>,
 }
 
@@ -72,8 +72,8 @@ pub(crate) fn stride(intervals: [usize; 4]) -> Vec<Domain> {
     result
 }
 
-/// Where a contact row holds its foot: the right toe at 0, the left toe at x_L - D in the right step and at x_L in the
-/// left step; heels behind their toes; the ground at 0.
+/// Target of a contact row: the right toe at 0, the left toe at x_L - D in the right step and at x_L in the left step,
+/// heels behind their toes, the ground at 0.
 pub(crate) fn target<D: Scalar>(
     walker: &Walker,
     domain: &Domain,

@@ -1,4 +1,4 @@
-//! Single elements against dual numbers, over random arguments.
+//! Property tests: elements of the gait problem match dual numbers for random arguments.
 
 use crate::muscles;
 use crate::rows::bezier;
@@ -45,7 +45,7 @@ proptest! {
     fn muscle_curves(x in 0.2..1.8_f64, nu in -1.2..1.2_f64, strain in -0.2..0.12_f64) {
         curve("force over length", force_length(x), muscles::force_length(variable(x)));
         curve("force over velocity", force_velocity(nu), muscles::force_velocity(variable(nu)));
-        // The plain form loses digits below the slack length: compared where it keeps them, and for size elsewhere.
+        // The plain form loses digits below the slack length, so derivatives are compared above it only.
         let dual = muscles::tendon_force(variable(strain));
         if strain > -0.02 {
             curve("tendon force", tendon_force(strain), dual);
@@ -154,7 +154,7 @@ proptest! {
                 close("by rate", jacobian.rate[i][j], by_rate[i].eps, 1e-10);
             }
         }
-        // Nothing depends on where the walker is or on how fast the hip moves.
+        // The dynamics do not depend on position and velocity of the hip.
         for j in 0..2 {
             let (by_base, by_base_rate) = (along(unit(j), zero, zero), along(zero, unit(j), zero));
             for i in 0..9 {
@@ -162,7 +162,7 @@ proptest! {
                 prop_assert_eq!(by_base_rate[i].eps, 0.0);
             }
         }
-        // Second derivatives in posture, by posture and by rates.
+        // Second derivatives with respect to posture and rates.
         let mut link = LinkHessian::default();
         dynamics.add_hessian(&state, &multipliers, &mut link);
         let hessian = link.generalised();

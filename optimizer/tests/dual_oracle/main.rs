@@ -1,20 +1,19 @@
-//! The whole gait programme written a second time, over dual numbers.
+//! A second implementation of the gait problem with dual numbers.
 //!
-//! Production derives every Jacobian and Hessian entry by hand. Here the same mathematics is written again from its
-//! definition, in the plainest form (chains of links, one body after another, no common factors), generically over
-//! `num_dual`: evaluated with plain numbers it checks the values, with first-order duals the Jacobian and the gradient,
-//! with hyper-dual numbers the Hessian of the Lagrangian. It shares no formula with production, only the vocabulary of
-//! row names (`RowName`), by which the two are matched.
+//! The crate has hand-written Jacobians and Hessians. These tests implement the same mathematics from its definition,
+//! in the simplest form (chains of links, body by body, without common factors), generic over `num_dual`. Plain numbers
+//! check values, first-order dual numbers the Jacobian and the gradient, hyper-dual numbers the Hessian of the
+//! Lagrangian. The two implementations have only the names of rows (`RowName`) in common.
 //!
-//! | file | what it writes again |
+//! | file | subject |
 //! |---|---|
 //! | `walker` | bodies, kinematics of chains, inverse dynamics body by body |
 //! | `domains` | the eight domains: contacts, outputs, targets |
 //! | `variables` | the order and the scales of the variables |
 //! | `muscles` | muscle table, length, lever arms, curves |
-//! | `rows` | every row of the programme |
+//! | `rows` | the rows of the gait problem |
 //! | `objective` | cost of transport, regularisation, tracking |
-//! | `comparison` | tests: values, Jacobian, gradient, Hessian against production |
+//! | `comparison` | tests: values, Jacobian, gradient and Hessian |
 //! | `elements` | property tests: single elements against dual numbers |
 //! | `physics` | tests: energy, momentum, statics |
 
@@ -33,7 +32,7 @@ mod walker;
 
 use num_dual::DualNum;
 
-/// Numbers that the second implementation runs on: `f64`, dual, second-order dual, hyper-dual.
+/// Number types of the second implementation: `f64`, dual, second-order dual, hyper-dual.
 pub(crate) trait Scalar: DualNum<Primitive = f64> + Copy {}
 impl<T: DualNum<Primitive = f64> + Copy> Scalar for T {}
 

@@ -1,4 +1,4 @@
-//! The objective by its definition.
+//! The objective from its definition.
 
 use crate::rows::Problem;
 use crate::variables::GaitVariables;

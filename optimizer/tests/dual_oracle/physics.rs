@@ -1,4 +1,4 @@
-//! What must hold of any walker, whatever its formulas: energy, momentum, statics.
+//! Tests of energy, momentum and statics, independent of formulas.
 
 use crate::random::Random;
 use crate::walker::{GRAVITY, State, Walker};
@@ -13,7 +13,7 @@ use num_dual::Dual64;
 type Vector9 = SVector<f64, 9>;
 type Matrix9 = SMatrix<f64, 9, 9>;
 
-/// Production's model beside the plain walker that measures energy and momentum.
+/// The model of the crate, and the second implementation that measures energy and momentum.
 struct Twin {
     model: WalkerModel,
     walker: Walker,
@@ -58,7 +58,7 @@ impl Twin {
         result
     }
 
-    /// Accelerations without any torque, with the listed foot points held: `M qdd + h = J^T lambda`,
+    /// Accelerations without torques, with the listed foot points fixed: `M qdd + h = J^T lambda`,
     /// `J qdd + Jdot qd = 0`.
     fn unforced(&self, q: &[f64; 9], qd: &[f64; 9], held: &[(usize, usize)]) -> [f64; 9] {
         let jacobian = self.contact_jacobian(q, held);
@@ -81,7 +81,7 @@ impl Twin {
         std::array::from_fn(|i| solution[i])
     }
 
-    /// Runge-Kutta of order 4 over `seconds`.
+    /// Integrates by the classical Runge-Kutta method of order 4.
     fn integrate(
         &self,
         mut q: [f64; 9],
@@ -193,7 +193,7 @@ fn free_flight_conserves_energy_and_momentum() {
 }
 
 #[test]
-fn unforced_swing_about_a_held_toe_conserves_energy() {
+fn unforced_motion_about_a_fixed_toe_conserves_energy() {
     for twin in twins() {
         // Stance on the right toe (point 3): velocities projected onto the contact.
         let held = [(3, 0), (3, 1)];
@@ -286,7 +286,7 @@ fn impacts_are_plastic_lose_energy_and_balance_momentum() {
             let moment = heel[0] * impulse[1] - heel[1] * impulse[0] + toe[0] * impulse[3] - toe[1] * impulse[2];
             close("moment of the impulses", p1[2] - p0[2], moment, 1e-8);
 
-            // The programme's rows say the same, and notice a wrong impulse.
+            // The rows of the gait problem vanish, and detect a wrong impulse.
             let layout = &programme.layout;
             let mut x = vec![0.0; layout.variables];
             for domain in &layout.domains {
@@ -320,7 +320,7 @@ fn impacts_are_plastic_lose_energy_and_balance_momentum() {
 }
 
 #[test]
-fn standing_straight_the_ground_carries_the_weight() {
+fn ground_carries_the_weight_in_upright_standing() {
     for (subject, twin) in (1..).zip(twins()) {
         let programme = programme(subject);
         let height = [1.727, 1.803][subject as usize - 1];
@@ -331,7 +331,7 @@ fn standing_straight_the_ground_carries_the_weight() {
         for foot in 0..4 {
             close("height", state.position(&twin.walker.foot_point(foot))[1], 0.0, 1e-12);
         }
-        // SS2 of the right step: one flat foot carries everything.
+        // SS2 of the right step: one flat foot carries the whole weight.
         let contacts = [(3, 0), (2, 1), (3, 1)];
         let jacobian = twin.contact_jacobian(&point.q, &contacts);
         let bias = twin.bias(&point.q, &point.qd);
@@ -354,9 +354,9 @@ fn standing_straight_the_ground_carries_the_weight() {
         let along = |foot: usize| state.position(&twin.walker.foot_point(foot))[0];
         let pressure = (point.force[1] * along(2) + point.force[2] * along(3)) / weight;
         close("centre of pressure", pressure, twin.walker.centre_of_mass(&state)[0], 1e-12);
-        // The swing leg hangs straight: its knee and ankle hold only its own small offsets.
+        // The swing leg hangs straight: its knee and ankle torques are due to small offsets only.
         assert!(point.u[1].abs() < 10.0 && point.u[2].abs() < 10.0, "{:?}", point.u);
-        // The programme's equation of motion agrees, and misses a newton.
+        // The equation of motion of the gait problem vanishes, and detects an error of 1 N.
         let layout = &programme.layout;
         let mut x = vec![0.5; layout.variables];
         layout.set_point_variables(&mut x, 2, 1, &point);

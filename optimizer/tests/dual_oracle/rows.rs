@@ -1,4 +1,4 @@
-//! Every row of the programme, as (name, value).
+//! The rows of the gait problem, as name and value.
 
 use crate::domains::{Domain, Kind, target};
 use crate::muscles::{self, Muscle};
@@ -8,7 +8,7 @@ use crate::{Scalar, constant};
 use gait_optimizer::gait_problem::rows::Place;
 use gait_optimizer::gait_problem::{RowKind, RowName};
 
-/// What the rows need beside the variables.
+/// Parameters of the rows.
 pub(crate) struct Problem {
     pub(crate) walker: Walker,
     pub(crate) domains: Vec<Domain>,
@@ -18,7 +18,7 @@ pub(crate) struct Problem {
     pub(crate) clearance: f64,
 }
 
-/// Rows in the order in which they are written here.
+/// Rows in the order of this implementation.
 pub(crate) struct Rows<D> {
     pub(crate) list: Vec<(RowName, D)>,
     place: Place,
@@ -91,7 +91,7 @@ fn motion<D: Scalar>(problem: &Problem, domain: &Domain, point: &Point<D>, state
     }
 }
 
-/// Contact points stay where they are.
+/// Contact points are fixed.
 fn contacts<D: Scalar>(
     problem: &Problem,
     gait: &GaitVariables<D>,
@@ -163,12 +163,12 @@ fn outputs<D: Scalar>(
     let point = &variables.points[k];
     let phase = |q: &[D; 9]| problem.walker.hip_phase(domain.stance, q);
     let (s, sd, sdd) = match variables.phase_end {
-        // The phase follows the walker.
+        // The phase depends on the state.
         Some(end) => {
             let width = end - variables.phase_start;
             ((phase(&point.q) - variables.phase_start) / width, phase(&point.qd) / width, phase(&point.qdd) / width)
         }
-        // Exact on the partial zero dynamics: the phase is time.
+        // On the zero dynamics the phase is the relative time.
         None => (
             constant::<D>(k as f64 / (domain.points() - 1) as f64),
             constant::<D>(1.0) / variables.duration,
@@ -244,7 +244,7 @@ fn friction<D: Scalar>(problem: &Problem, domain: &Domain, point: &Point<D>, row
     }
 }
 
-/// Heights of the points in the air; vertical speed of the point that is about to land.
+/// Heights of the points in the air, and vertical velocity of the point that lands next.
 fn heights<D: Scalar>(
     problem: &Problem,
     gait: &GaitVariables<D>,
@@ -332,7 +332,7 @@ fn integration_rows<D: Scalar>(problem: &Problem, gait: &GaitVariables<D>, d: us
     }
 }
 
-/// Resets into the next domain.
+/// Resets to the next domain.
 fn transition_rows<D: Scalar>(problem: &Problem, gait: &GaitVariables<D>, d: usize, rows: &mut Rows<D>) {
     let next = (d + 1) % 8;
     let before = &gait.domains[d].points[problem.domains[d].points() - 1];

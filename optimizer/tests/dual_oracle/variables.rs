@@ -1,4 +1,4 @@
-//! The variables in their order, read one after another and brought to physical units.
+//! Reads the variables in their order and converts them to physical units.
 
 use crate::domains::{Domain, Kind};
 use crate::{Scalar, constant};
@@ -18,7 +18,7 @@ pub(crate) struct DomainVariables<D> {
     pub(crate) duration: D,
     pub(crate) phase_start: D,
     pub(crate) phase_end: Option<D>,
-    /// By output.
+    /// For each output.
     pub(crate) bezier: Vec<[D; 6]>,
     pub(crate) impulse: Vec<D>,
 }

@@ -1,14 +1,15 @@
-//! The walker from its definition: seven bodies on chains of links, summed one after another.
+//! The walker from its definition: sums over seven bodies on chains of links.
 
 use crate::{Scalar, constant};
 
 pub(crate) const GRAVITY: f64 = 9.81;
 
-/// (link, ux, uz): vectors in link frames from the hip outwards. Links: torso, thigh, shank, foot of the left leg, thigh,
-/// shank, foot of the right leg.
+/// (link, ux, uz): vectors in link frames from the hip outwards. Links: torso, thigh, shank, foot of the left leg,
+/// thigh, shank, foot of the right leg.
 pub(crate) type Chain = Vec<(usize, f64, f64)>;
 
-/// Absolute angle of each link (rows) by torso, hip, knee, ankle left, hip, knee, ankle right: counter-clockwise positive.
+/// Absolute angle of each link (rows) by torso, hip, knee, ankle left, hip, knee, ankle right: counter-clockwise
+/// positive.
 const LINK_ANGLES: [[f64; 7]; 7] = [
     [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [-1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],

@@ -1,6 +1,6 @@
-//! The golden gaits (`tests/data/README.md`) as points of this crate's programme.
+//! The golden gaits (`tests/data/README.md`) as points of the gait problem.
 
-#![allow(dead_code)] // each test file uses its part
+#![allow(dead_code)] // Each test file uses some of it.
 
 use gait_optimizer::gait_problem::{GaitProgramme, PointVariables, gait_of};
 use gait_optimizer::{Device, Gait, GaitProblem, GaitSettings, ReferenceGait, Subject, TunedBounds};

@@ -1,6 +1,6 @@
-//! Noise of recordings.
+//! Reproducible noise for recordings.
 
-/// Normal noise of standard deviation 1, always the same: sums of twelve numbers of a linear congruential generator.
+/// Approximately normal noise of standard deviation 1: sums of twelve numbers of a linear congruential generator.
 pub(crate) fn noise(samples: usize) -> Vec<f64> {
     let mut state = 1_u64;
     let mut uniform = || {

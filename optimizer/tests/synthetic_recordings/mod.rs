@@ -1,11 +1,11 @@
-//! Recordings of walking, made up.
+//! Synthetic recordings of walking.
 
-#![allow(dead_code)] // not every test that includes this uses all of it
+#![allow(dead_code)] // Each test file uses some of it.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
-/// `strides` strides of 1.1 s at 100 Hz as an OpenSim file in degrees, knee and hip in antiphase left and right.
+/// An OpenSim file in degrees with `strides` strides of 1.1 s at 100 Hz; the legs are in antiphase.
 pub(crate) fn opensim(strides: usize) -> String {
     format!(
         "synthetic\nversion=1\nnRows={}\nnColumns=10\ninDegrees=yes\nendheader\ntime\tpelvis_tilt\thip_flexion_r\t\
@@ -15,7 +15,7 @@ pub(crate) fn opensim(strides: usize) -> String {
     )
 }
 
-/// The rows of such a file, angles in a unit of so many degrees to one.
+/// The rows of such a file, with angles multiplied by `scale`.
 pub(crate) fn opensim_rows(strides: usize, scale: f64) -> String {
     let mut text = String::new();
     for k in 0..=110 * strides {
@@ -39,7 +39,7 @@ pub(crate) fn camargo(strides: usize) -> String {
     names.to_owned() + &opensim_rows(strides, 1.0).replace('\t', ",")
 }
 
-/// Two strides as our own table, a comment before them.
+/// Two strides as Gaitwright's table, after a comment.
 pub(crate) fn own_table() -> String {
     let mut text = "# one adult\ntime_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
     for k in 0..=220 {
@@ -50,7 +50,7 @@ pub(crate) fn own_table() -> String {
     text
 }
 
-/// Two channels and a switch under the heel, 1 s at 1000 Hz.
+/// Two EMG channels and a heel switch, 1 s at 1000 Hz.
 pub(crate) fn electromyogram() -> String {
     let mut text = "time_s,TA_L,BF_L,heel\n".to_owned();
     for k in 0..1000 {

@@ -57,7 +57,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.free_hip_return_map {
         lines.push(format!(
-            "  zero dynamics (hip velocity left alone): multiplier {:.4} (by differences {:.4})",
+            "  zero dynamics (free hip velocity): multiplier {:.4} (by differences {:.4})",
             map.largest, map.largest_by_differences
         ));
     }

@@ -1,30 +1,30 @@
-//! Whether a mean stride is a walker's: what none does is refused, what is odd is said.
+//! Plausibility of a mean stride: impossible curves are errors, unusual ones are warnings in the provenance.
 
 use super::super::REFERENCE_COLUMNS;
 use super::{Recording, ReferenceGait};
 use crate::subject::ModelError;
 
-/// Places among the reference's angles.
+/// Indices among the angles of a reference gait.
 const TRUNK: usize = 0;
 const KNEE: usize = 2;
 const ANKLE: usize = 3;
-/// A trunk leans no more over a stride, either way, degrees.
+/// Largest magnitude of the mean trunk lean, degrees.
 const LARGEST_LEAN_DEG: f64 = 45.0;
-/// A knee that walks bends at least so far once in a stride, degrees: legs that swing nearly straight bend to 30.
+/// Smallest peak of knee flexion, degrees. Nearly straight swing legs reach 30.
 const SMALLEST_KNEE_PEAK_DEG: f64 = 20.0;
-/// And once it is straighter than this, degrees.
+/// Largest minimum of knee flexion, degrees.
 const LARGEST_LEAST_FLEXION_DEG: f64 = 40.0;
-/// An ankle is no more bent over a stride, either way, degrees.
+/// Largest magnitude of the mean ankle angle, degrees.
 const LARGEST_ANKLE_MEAN_DEG: f64 = 30.0;
-/// An ankle that walks moves at least over this, degrees: one in radians that is read as degrees does over about half.
+/// Smallest range of motion of the ankle, degrees. Radians taken for degrees give about 0.5.
 const SMALLEST_ANKLE_RANGE_DEG: f64 = 2.0;
-/// Curves that are held against the built-in reference, in words. The trunk's has no shape that all walkers share.
+/// Curves that are compared with the built-in reference gait. The shape of the trunk curve differs between people.
 const COMPARED: [(usize, &str); 4] = [(1, "left hip"), (KNEE, "left knee"), (ANKLE, "left ankle"), (4, "right hip")];
-/// Curves of walkers correlate more with the built-in ones: those of 24 young adults by .88 and more, ankles of single
-/// strides by .7; a tenth of a stride too late leaves .4 of the ankle.
+/// Smallest usual correlation with the built-in curves. Means of 24 young adults reach 0.88 or more, ankles of single
+/// strides 0.7; a shift by a tenth of a stride gives 0.4 for the ankle.
 const LEAST_CORRELATION: f64 = 0.5;
 
-/// Why this mean stride is no walker's.
+/// The reason why a mean stride is impossible, if any.
 pub(super) fn no_walker(mean: &[[f64; 5]]) -> Option<String> {
     trunk(&curve(mean, TRUNK))
         .map(|reason| (TRUNK, reason))
@@ -36,20 +36,23 @@ pub(super) fn no_walker(mean: &[[f64; 5]]) -> Option<String> {
 fn trunk(degrees: &[f64]) -> Option<String> {
     let lean = average(degrees);
     (lean.abs() > LARGEST_LEAN_DEG).then(|| {
-        let reason = format!("is {lean:.0}° on average over the stride, beyond {LARGEST_LEAN_DEG}° either way");
-        format!("{reason}: are sign and upright right?")
+        let reason = format!(
+            "is {lean:.0}° on average over the stride; at most {LARGEST_LEAN_DEG}° in either direction is plausible"
+        );
+        format!("{reason}; check the sign and the upright position")
     })
 }
 
 fn knee(degrees: &[f64]) -> Option<String> {
     let (least, peak) = Recording::extremes(degrees);
     if peak < SMALLEST_KNEE_PEAK_DEG {
-        let reason = format!("never bends beyond {SMALLEST_KNEE_PEAK_DEG}° in the stride, at most to {peak:.1}°");
-        return Some(format!("{reason}: are sign and unit right?"));
+        let reason =
+            format!("bends to at most {peak:.1}° in the stride; at least {SMALLEST_KNEE_PEAK_DEG}° is plausible");
+        return Some(format!("{reason}; check sign and unit"));
     }
     (least > LARGEST_LEAST_FLEXION_DEG).then(|| {
-        let straight = format!("a knee that walks is below {LARGEST_LEAST_FLEXION_DEG}° once in a stride");
-        format!("is never less bent than {least:.0}°, {straight}")
+        let straight = format!("its minimum must be at most {LARGEST_LEAST_FLEXION_DEG}°");
+        format!("is bent by at least {least:.0}° in the whole stride; {straight}")
     })
 }
 
@@ -57,15 +60,17 @@ fn ankle(degrees: &[f64]) -> Option<String> {
     let (lowest, highest) = Recording::extremes(degrees);
     let (mean, range) = (average(degrees), highest - lowest);
     if mean.abs() > LARGEST_ANKLE_MEAN_DEG {
-        let reason = format!("is {mean:.0}° on average over the stride, beyond {LARGEST_ANKLE_MEAN_DEG}° either way");
-        return Some(format!("{reason}: is it 0° where foot and shank are at right angles?"));
+        let reason = format!(
+            "is {mean:.0}° on average over the stride; at most {LARGEST_ANKLE_MEAN_DEG}° in either direction is plausible"
+        );
+        return Some(format!("{reason}; check that 0° is the right angle between foot and shank"));
     }
     (range < SMALLEST_ANKLE_RANGE_DEG).then(|| {
-        format!("moves over {range:.2}° only in the stride, less than {SMALLEST_ANKLE_RANGE_DEG}°; is the unit right?")
+        format!("moves by only {range:.2}° in the stride, less than {SMALLEST_ANKLE_RANGE_DEG}°; check the unit")
     })
 }
 
-/// What is said of a mean stride whose curves have another shape than those of the built-in reference.
+/// A warning if curves differ in shape from those of the built-in reference gait.
 pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelError> {
     let builtin = ReferenceGait::builtin()?.angles_rad;
     let unlike: Vec<String> = COMPARED
@@ -73,20 +78,19 @@ pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelE
         .filter_map(|(place, name)| match ReferenceGait::correlation(&curve(mean, place), &curve(&builtin, place)) {
             Some(correlation) if correlation >= LEAST_CORRELATION => None,
             Some(correlation) => Some(format!("{name} (correlation {:.2})", hundredths(correlation))),
-            None => Some(format!("{name} (it does not move)")),
+            None => Some(format!("{name} (constant)")),
         })
         .collect();
-    let remark =
-        || format!("unlike the built-in reference: {}: are sign, side and heel strikes right?", unlike.join(", "));
+    let remark = || format!("unlike the built-in reference: {}; check sign, side and heel strikes", unlike.join(", "));
     Ok((!unlike.is_empty()).then(remark))
 }
 
-/// One angle over the stride, degrees.
+/// One angle over the stride, in degrees.
 fn curve(mean: &[[f64; 5]], place: usize) -> Vec<f64> {
     mean.iter().map(|row| row[place].to_degrees()).collect()
 }
 
-/// Without the sign of a zero.
+/// Rounds to hundredths, without a negative zero.
 fn hundredths(value: f64) -> f64 {
     (100.0 * value).round() / 100.0 + 0.0
 }
@@ -96,7 +100,7 @@ fn average(values: &[f64]) -> f64 {
 }
 
 impl ReferenceGait {
-    /// Pearson's correlation of two curves over the cycle; none where one of them is constant.
+    /// Pearson correlation of two curves over the cycle; `None` if one of them is constant.
     pub(crate) fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
         let (mean_a, mean_b) = (average(a), average(b));
         let product: f64 = a.iter().zip(b).map(|(x, y)| (x - mean_a) * (y - mean_b)).sum();

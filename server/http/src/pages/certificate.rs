@@ -39,7 +39,7 @@ impl InWords {
         }
         if let Some(free) = &certificate.free_hip_return_map {
             let words = format!("{:.3} (by differences {:.3})", free.largest, free.largest_by_differences);
-            figures.push(("Multiplier of the zero dynamics (hip velocity left alone)", words));
+            figures.push(("Multiplier of the zero dynamics (free hip velocity)", words));
         }
         if let Some(pushes) = certificate.pushes {
             let words = format!(
