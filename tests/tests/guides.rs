@@ -18,6 +18,10 @@ fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
+/// The packages whose programs the documents run, with their folders.
+const PACKAGES: [(&str, &str); 3] =
+    [("gait-optimizer", "optimizer"), ("gait-learner", "learner"), ("gaitwright-tests", "tests")];
+
 /// Every Markdown file of the repository, with its text.
 fn documents() -> BTreeMap<PathBuf, String> {
     let folders = [
@@ -121,6 +125,35 @@ fn every_command_and_flag_exists() {
     }
     assert!(tried > 30, "{tried}");
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_benchmark_names_an_existing_program() {
+    let (mut missing, mut tried) = (Vec::new(), 0);
+    for (path, text) in documents() {
+        for line in
+            commands(&text).into_iter().flat_map(|line| line.split(" && ").map(str::to_owned).collect::<Vec<_>>())
+        {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let after = |flag: &str| words.windows(2).find(|pair| pair[0] == flag).map(|pair| pair[1]);
+            let Some(package) = after("-p") else { continue };
+            let folder =
+                PACKAGES.iter().find(|(name, _)| *name == package).map(|(_, folder)| repository().join(folder));
+            let programs = [("--example", "examples"), ("--bench", "benches"), ("--test", "tests")];
+            for (program, sources) in programs.into_iter().filter_map(|(flag, sources)| Some((after(flag)?, sources))) {
+                tried += 1;
+                let exists = folder.as_ref().is_some_and(|folder| {
+                    let sources = folder.join(sources);
+                    sources.join(format!("{program}.rs")).exists() || sources.join(program).join("main.rs").exists()
+                });
+                if !exists {
+                    missing.push(format!("{}: {line}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(tried > 10, "{tried}");
+    assert!(missing.is_empty(), "{missing:#?}");
 }
 
 /// An address with every identifier replaced: `/studies/STUDY/ask` is `/studies/{}/ask`.
