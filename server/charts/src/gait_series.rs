@@ -15,7 +15,7 @@ pub const FORCE_NAMES: [&str; 8] = [
     "toe_right_z",
 ];
 
-/// The ten muscles, in the order of the optimizer.
+/// Names of the ten muscles, in the order of the optimizer.
 pub const MUSCLES: [&str; 10] =
     ["HAM_L", "GLU_L", "HFL_L", "GAS_L", "VAS_L", "SOL_L", "TA_L", "HAM_R", "GLU_R", "HFL_R"];
 
@@ -40,8 +40,8 @@ pub struct Point<'a> {
     pub fibre_length: Option<&'a [f64; 10]>,
 }
 
-/// The nodes of all domains, in time. A domain's last point and the next one's first have the same time:
-/// between them velocities and forces may jump.
+/// The nodes of all domains, by time. The last node of a domain and the first one of the next have the same time,
+/// because velocities and forces may jump there.
 pub fn points(gait: &Gait) -> Vec<Point<'_>> {
     let mut points = Vec::new();
     for domain in &gait.domains {

@@ -7,7 +7,8 @@ use gait_optimizer::Gait;
 const COORDINATES: [&str; 9] = ["px", "pz", "torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
 const JOINTS: [&str; 6] = ["hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
 
-/// Time, domain, q, qd, torques, ground forces (the four points, zero where there is no contact), activations, as CSV.
+/// The CSV table of time, domain, coordinates, velocities, torques, ground forces (zero without contact) and
+/// activations.
 pub fn gait_csv(gait: &Gait) -> String {
     let unit = |name: &str| if name.starts_with('p') { "m" } else { "rad" };
     let mut header = vec!["time_s".to_owned(), "domain".to_owned()];

@@ -9,10 +9,10 @@ pub const COMPUTING: i32 = 5;
 pub const SOLVER: i32 = 10;
 /// Of threads that look into what was solved: they give way to every solve, too.
 pub const AFTERWARDS: i32 = 19;
-/// Stack of threads that solve: block factorisations recurse deeper than the default leaves room for.
+/// Stack size of solver threads. Block factorisations recurse deeper than the default allows.
 pub const STACK_BYTES: usize = 16 << 20;
 
-/// Lowers the priority of this thread alone; where that is not possible it stays as it is.
+/// Lowers the priority of the calling thread, if the system allows it.
 pub fn stand_back(niceness: i32) {
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::setpriority_process(None, niceness) {
@@ -26,7 +26,7 @@ pub fn stand_back(niceness: i32) {
 /// abandons the thread.
 ///
 /// # Errors
-/// When there is no thread to be had.
+/// If no thread can be started.
 pub fn behind_solves<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,

@@ -72,9 +72,10 @@ fn client_address(extensions: &Extensions) -> ClientAddress {
     ClientAddress::new(peer.unwrap_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED)))
 }
 
-/// Puts the [`ClientAddress`] and [`Secure`] into the request, and the host that the browser asked for into its Host
-/// header: from the connection, or where that is of a trusted proxy, as the proxy says. Everything behind this, the checks
-/// of host and origin too, sees the request as the client sent it. What goes to a browser through TLS stays there.
+/// Adds [`ClientAddress`] and [`Secure`] to the request, and sets the Host header to the host that the browser
+/// requested: from the connection, or from the headers of a trusted proxy. Later layers, such as the checks of host and
+/// origin, see the request as the client sent it. With TLS, cookies become secure and browsers are told to keep using
+/// TLS.
 pub(super) async fn note(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Refusal> {
     let peer = client_address(request.extensions());
     let believed = app.proxies.believe(peer.ip(), request.headers())?;

@@ -42,11 +42,12 @@ fn address_in(host: &str) -> Option<IpAddr> {
     bare.parse().ok().or_else(|| host.parse().ok().map(|address: SocketAddr| address.ip()))
 }
 
-/// Refuses a request for another name, and one that does not say clearly which name it means.
+/// Refuses a request for another host, or with an ambiguous host.
 pub(super) async fn check(State(hosts): State<Hosts>, request: Request, next: Next) -> Result<Response, Refusal> {
     match named(&request)? {
         Some(host) if !hosts.answers_to(host) => {
-            let reason = format!("this service does not answer to the name {host:?}; `serve --host-name` makes it");
+            let reason =
+                format!("The host {host:?} is not a name of this service. Add it with `gaitwright serve --host-name`.");
             Err(Error::Forbidden(reason).into())
         }
         _ => Ok(next.run(request).await),

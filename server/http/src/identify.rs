@@ -23,8 +23,8 @@ const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AnsweredTo(pub(super) Option<Role>);
 
-/// Puts the [`Caller`] into the request, and the caller's role into the answer. A token that is not good is refused; a
-/// session that is not, is nobody.
+/// Adds the [`Caller`] to the request, and the caller's role to the response. Refuses an invalid token; ignores an
+/// invalid session.
 pub(super) async fn identify(
     State(app): State<AppState>,
     mut request: Request,

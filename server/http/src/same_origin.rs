@@ -12,12 +12,12 @@ use axum::middleware::Next;
 use axum::response::Response;
 use gaitwright_service::error::Error;
 
-/// Refuses a change that a page of another origin sends.
+/// Refuses a change sent by a page of another origin.
 pub(super) async fn check(request: Request, next: Next) -> Result<Response, Refusal> {
     let reads = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
     let secure = request.extensions().get::<Secure>().copied().unwrap_or_default();
     if !reads && !is_ours(request.headers(), secure) {
-        return Err(Error::Forbidden("a page of another origin may not change anything here".to_owned()).into());
+        return Err(Error::Forbidden("Pages of another origin cannot change anything here.".to_owned()).into());
     }
     Ok(next.run(request).await)
 }

@@ -22,7 +22,7 @@ const SHOWN_VALUE: usize = 80;
 /// Reads a document.
 ///
 /// # Errors
-/// [`Error::Unreadable`] with the field, [`Error::Malformed`] where there is none.
+/// [`Error::Unreadable`] naming the field, [`Error::Malformed`] if the error has no field.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|e| unreadable(e, bytes))?;

@@ -11,7 +11,7 @@ const TURNING: [char; 12] = [
 /// The name, trimmed.
 ///
 /// # Errors
-/// [`Error::Invalid`] for nothing, for more than `longest` characters, and for characters that do not print.
+/// [`Error::Invalid`] for an empty name, more than `longest` characters, or a character that does not print.
 pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, Error> {
     let trimmed = text.trim();
     let prints = |c: char| !c.is_control() && !TURNING.contains(&c);

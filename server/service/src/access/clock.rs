@@ -71,7 +71,7 @@ mod tests {
     use std::sync::atomic::{AtomicI64, Ordering};
 
     #[test]
-    fn a_clock_that_is_set_back_goes_on_from_where_it_was() {
+    fn clock_that_is_set_back_continues_from_the_latest_instant() {
         let start = gaitwright_store::now();
         let offset = Arc::new(AtomicI64::new(0));
         let clock = Clock::over({

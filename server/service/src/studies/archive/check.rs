@@ -152,7 +152,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
 /// Checks a definition against its stored name and hash.
 fn of_definition(table: &str, name: &str, written: &Definition) -> Result<(), Error> {
     if written.name != name || written.sha256 != gaitwright_store::sha256(written.text.as_bytes()) {
-        return Err(refuse(format!("{table}: name, definition and hash do not agree")));
+        return Err(refuse(format!("{table}: name, definition and hash do not match")));
     }
     Ok(())
 }

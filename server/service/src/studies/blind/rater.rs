@@ -226,7 +226,7 @@ pub async fn take_back(writer: &mut Writer, caller: &Caller, token: &str) -> Res
     Ok(Answered { number: shown.number })
 }
 
-/// Whether an answer stands that may go: the rater's last one, and not about safety.
+/// Whether the answer can be retracted: it is the rater's last one and not a safety report.
 ///
 /// # Errors
 /// What the record reports.
@@ -240,7 +240,7 @@ pub async fn can_be_taken_back(db: &mut Connection, shown: &Presentation) -> Res
     Ok(last && stands)
 }
 
-/// The pair of a token with its sides, if it is this rater's and the rater reaches its study.
+/// The pair of a token with its sides, if it belongs to this rater and the rater can access its study.
 ///
 /// # Errors
 /// What the record reports, and [`Error::NotFound`] for a token that is not of this rater.
