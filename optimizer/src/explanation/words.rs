@@ -378,7 +378,7 @@ mod tests {
             assert!(words.contains("so a gait may exist"), "{words}");
         }
         for status in [SolveStatus::Stalled, SolveStatus::IterationLimit, SolveStatus::TimeLimit] {
-            assert!(verdict(status).unwrap().contains("no proof"), "{status:?}");
+            assert!(verdict(status).unwrap().contains("does not prove"), "{status:?}");
         }
         assert_eq!(verdict(SolveStatus::Converged), None);
     }
