@@ -7,20 +7,20 @@
 mod arguments;
 
 use arguments::argument;
-use gait_optimizer::{CancelToken, ColdGuess, GaitProblem, SolveOptions, Subject, solve_from_guesses};
+use gait_optimizer::{CancelToken, GaitProblem, InitialGuess, SolveOptions, Subject, solve_from_guesses};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let threads: usize = argument("--threads", "2").parse()?;
     let muscles = argument("--muscles", "on") == "on";
-    let mut guesses = ColdGuess::first(argument("--guesses", "14").parse()?, muscles);
+    let mut guesses = InitialGuess::first(argument("--guesses", "14").parse()?, muscles);
     if argument("--grid", "off") == "on" {
         guesses.clear();
-        for base in [ColdGuess::NATURAL, ColdGuess::EARLY_RISE] {
+        for base in [InitialGuess::NATURAL, InitialGuess::EARLY_RISE] {
             for knee_flexion in [0.7, 1.0] {
                 for (stride_time_s, stride_length_m) in [(1.2, 1.15), (1.1, 1.25), (1.0, 1.0)] {
                     for barrier in [1e-5, 1e-3] {
-                        guesses.push(ColdGuess { knee_flexion, stride_time_s, stride_length_m, barrier, ..base });
+                        guesses.push(InitialGuess { knee_flexion, stride_time_s, stride_length_m, barrier, ..base });
                     }
                 }
             }

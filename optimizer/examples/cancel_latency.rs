@@ -11,7 +11,7 @@ const SPACING: Duration = Duration::from_millis(37);
 
 fn main() -> Result<(), Box<dyn Error>> {
     let problem = GaitProblem::new(Subject::builtin(1)?, true)?;
-    let options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
+    let options = SolveOptions { initial_guesses: 1, ..SolveOptions::default() };
     let mut longest = Duration::ZERO;
     for instant in 0..INSTANTS {
         let token = CancelToken::new();

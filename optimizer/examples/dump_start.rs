@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p gait-optimizer --example dump_start -- [--subject 1|2] [--a5 0.013] [--guess 1]`
 
-use gait_optimizer::{ColdGuess, GaitProblem, Subject};
+use gait_optimizer::{GaitProblem, InitialGuess, Subject};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -20,8 +20,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             other => return Err(format!("unknown argument {other}").into()),
         }
     }
-    let Some(guess) = ColdGuess::numbered(guess) else {
-        return Err(format!("--guess: 1 to {}", ColdGuess::MOST).into());
+    let Some(guess) = InitialGuess::numbered(guess) else {
+        return Err(format!("--guess: 1 to {}", InitialGuess::MOST).into());
     };
     let mut problem = GaitProblem::new(Subject::builtin(subject)?, false)?;
     problem.bounds.a5 = a5;

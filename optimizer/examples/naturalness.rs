@@ -1,4 +1,4 @@
-//! What each optional wish for a natural gait does: Gait RMSE, cost, solve time, and what a clinician looks at.
+//! What each naturalness term does: Gait RMSE, cost, solve time, and what a clinician looks at.
 //!
 //! `cargo run --release -p gait-optimizer --example naturalness -- [--subject 1] [--muscles off] [--folder FOLDER]`: one CSV
 //! row per set of settings, each solved cold with the default bounds; with a folder every gait as a file, for
@@ -7,58 +7,59 @@
 mod arguments;
 
 use arguments::argument;
-use gait_optimizer::gait::{Axis, DomainTrajectory, Side};
+use gait_optimizer::body::{Axis, Side};
+use gait_optimizer::gait::DomainTrajectory;
 use gait_optimizer::{BasinChoice, CancelToken, Gait, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve};
 use std::error::Error;
 use std::path::Path;
 
-/// A wish for a natural gait: what of a solve it changes.
-struct Wish {
+/// What a naturalness term changes in a solve.
+struct Variant {
     name: &'static str,
     settings: GaitSettings,
     basin_choice: BasinChoice,
-    cold_guesses: usize,
+    initial_guesses: usize,
     /// Then solved on a mesh twice as fine.
     finer: bool,
 }
 
-impl Wish {
+impl Variant {
     fn new(name: &'static str, change: impl Fn(&mut GaitSettings)) -> Self {
         let mut settings = GaitSettings::default();
         change(&mut settings);
-        let SolveOptions { basin_choice, cold_guesses, .. } = SolveOptions::default();
-        Self { name, settings, basin_choice, cold_guesses, finer: false }
+        let SolveOptions { basin_choice, initial_guesses, .. } = SolveOptions::default();
+        Self { name, settings, basin_choice, initial_guesses, finer: false }
     }
 
-    /// Of four cold guesses the gait nearest to the reference among those that cost at most 3 % more than the cheapest.
+    /// Of four initial guesses the gait nearest to the reference among those that cost at most 3 % more than the cheapest.
     fn of_the_natural_basin(self) -> Self {
-        Self { cold_guesses: 4, basin_choice: BasinChoice::NearestToReference { within_percent: 3.0 }, ..self }
+        Self { initial_guesses: 4, basin_choice: BasinChoice::NearestToReference { within_percent: 3.0 }, ..self }
     }
 }
 
-fn wishes() -> Vec<Wish> {
+fn variants() -> Vec<Variant> {
     let fast = |s: &mut GaitSettings| (s.limits.speed_min_m_s, s.limits.speed_max_m_s) = (1.2, 1.3);
     // Perry and Burnfield 2010: double support of about 12 % of the stride per step, 0.13 s of 1.1 s.
     let long_double_support =
         |s: &mut GaitSettings| (s.limits.duration_min_s.ds2, s.limits.duration_min_s.ds3) = (0.06, 0.06);
     let loaded = |s: &mut GaitSettings| s.naturalness.trailing_load_share = 0.5;
     let tracking = |weight: f64| move |s: &mut GaitSettings| s.naturalness.reference_weight = weight;
-    let plain = || Wish::new("none", |_| {});
+    let plain = || Variant::new("none", |_| {});
     vec![
         plain(),
-        Wish { name: "nearest of four guesses within 3 %", ..plain().of_the_natural_basin() },
-        Wish { name: "mesh twice as fine", finer: true, ..plain() },
-        Wish::new("speed 1.2 to 1.3 m/s", fast),
-        Wish::new("double support of 0.12 s", long_double_support),
-        Wish::new("gradual weight transfer", loaded),
-        Wish::new("gradual transfer in 0.12 s", |s| {
+        Variant { name: "nearest of four guesses within 3 %", ..plain().of_the_natural_basin() },
+        Variant { name: "mesh twice as fine", finer: true, ..plain() },
+        Variant::new("speed 1.2 to 1.3 m/s", fast),
+        Variant::new("double support of 0.12 s", long_double_support),
+        Variant::new("gradual weight transfer", loaded),
+        Variant::new("gradual transfer in 0.12 s", |s| {
             long_double_support(s);
             loaded(s);
         }),
-        Wish::new("reference weight 0.01", tracking(0.01)),
-        Wish::new("reference weight 0.1", tracking(0.1)),
-        Wish::new("reference weight 1", tracking(1.0)),
-        Wish::new("all, reference weight 0.1", |s| {
+        Variant::new("reference weight 0.01", tracking(0.01)),
+        Variant::new("reference weight 0.1", tracking(0.1)),
+        Variant::new("reference weight 1", tracking(1.0)),
+        Variant::new("all, reference weight 0.1", |s| {
             fast(s);
             long_double_support(s);
             loaded(s);
@@ -94,12 +95,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let muscles = argument("--muscles", "off") == "on";
     let folder = argument("--folder", "");
     println!(
-        "wish,status,gait_rmse_rad,cost_of_transport,iterations,seconds,speed_m_s,double_support_percent,\
+        "variant,status,gait_rmse_rad,cost_of_transport,iterations,seconds,speed_m_s,double_support_percent,\
          trailing_share_percent,left_knee_peak_deg,right_knee_peak_deg"
     );
-    for Wish { name, settings, basin_choice, cold_guesses, finer } in wishes() {
+    for Variant { name, settings, basin_choice, initial_guesses, finer } in variants() {
         let mut problem = GaitProblem { settings, ..GaitProblem::new(subject, muscles)? };
-        let options = SolveOptions { threads: 2, basin_choice, cold_guesses, ..SolveOptions::default() };
+        let options = SolveOptions { threads: 2, basin_choice, initial_guesses, ..SolveOptions::default() };
         let solve_from = |problem: &GaitProblem, warm| solve(problem, warm, &options, &mut |_| {}, &CancelToken::new());
         let mut outcome = solve_from(&problem, None)?;
         let (mut iterations, mut seconds) = (outcome.report.iterations, outcome.report.seconds_total);

@@ -9,7 +9,7 @@
 mod peak_memory;
 
 use gait_optimizer::{
-    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, TunedBounds, solve_from_guesses,
+    CancelToken, GaitProblem, GaitSettings, InitialGuess, Mesh, SolveOptions, Subject, TunedBounds, solve_from_guesses,
 };
 use peak_memory::peak_resident_mb;
 use std::error::Error;
@@ -47,8 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let problem = GaitProblem { settings, bounds, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
-    let Some(guess) = ColdGuess::numbered(guess) else {
-        return Err(format!("--guess: 1 to {}", ColdGuess::MOST).into());
+    let Some(guess) = InitialGuess::numbered(guess) else {
+        return Err(format!("--guess: 1 to {}", InitialGuess::MOST).into());
     };
     let outcome = solve_from_guesses(
         &problem,

@@ -16,8 +16,8 @@ mod tuned_actions;
 
 use arguments::argument;
 use gait_optimizer::{
-    CancelToken, GaitProblem, IterationRecord, Phase, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
-    WarmStart, solve,
+    CancelToken, GaitProblem, IterationRecord, SolveOptions, SolveOutcome, SolvePhase, SolveStatus, Subject,
+    TunedBounds, WarmStart, solve,
 };
 use median::median;
 use splitmix::SplitMix;
@@ -106,7 +106,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let problem = GaitProblem { bounds, ..base.clone() };
         let (mut iterations, mut own) = (Vec::new(), true);
         let warm = run(&problem, Some(&start.warm_start), threads, &mut |record| {
-            own &= record.guess == 0 && matches!(record.phase, Phase::Cost | Phase::BetweenPoints);
+            own &= record.guess == 0 && matches!(record.phase, SolvePhase::Cost | SolvePhase::InterNode);
             if own {
                 iterations.push(*record);
             }

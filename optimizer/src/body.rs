@@ -6,15 +6,17 @@
 //! `psi = (torso, thigh_L, shank_L, foot_L, thigh_R, shank_R, foot_R)` are counter-clockwise in the (x forward, z up)
 //! plane: `psi = A q[2..]` with the constant matrix A of [`coordinates`].
 
+mod anatomy;
 pub mod anthropometry;
 pub mod coordinates;
 pub mod dynamics;
 pub mod point;
 
-pub use anthropometry::{Body, LegGeometry, WalkerModel};
+pub use anatomy::{Axis, FootPoint, Side};
+pub use anthropometry::{Body, WalkerModel};
 pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, relative_angles, to_generalised};
 pub use dynamics::{InverseDynamics, PointState};
-pub use point::{Chain, ContactPoint};
+pub use point::{Chain, ContactPoint, LegGeometry};
 
 /// Gravitational acceleration of the model, m/s².
 pub const GRAVITY: f64 = 9.81;

@@ -7,13 +7,13 @@
 
 mod activity;
 mod cycle;
-mod model;
-mod recording;
+mod emg_recording;
+mod model_activity;
 
 pub use activity::Activity;
 pub use cycle::{CycleActivity, EmgRmse, emg_rmse};
-pub use model::{ModelActivity, model_activity};
-pub use recording::EmgRecording;
+pub use emg_recording::EmgRecording;
+pub use model_activity::{ModelActivity, model_activity};
 
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,10 @@
-//! Infeasibility explanations: which tuned bounds conflict, which constraint they make infeasible, and which relaxations of one
-//! or several bounds give a gait. All statements are about bounds for which a solve was done.
+//! Infeasibility explanations: which tuned bounds conflict, which constraint they make infeasible, and which
+//! relaxations of one or several bounds give a gait. All statements are about bounds for which a solve was done.
 
-use crate::bounds::TunedBounds;
-use crate::nlp::NonlinearProgram;
-use crate::solve::{
-    CancelToken, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus, Violation, WarmStart,
-};
+use crate::gait_problem::GaitProblem;
+use crate::solve::{CancelToken, SolveError, SolveOptions, SolveOutcome, SolveStatus, Violation, WarmStart};
+use crate::tuned_bounds::TunedBounds;
+use interior_point::NonlinearProgram;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 
@@ -67,21 +66,21 @@ pub struct GivenBound {
     pub value: f64,
 }
 
-/// A conflict of tuned bounds: with the other tuned bounds at their loosest values, no gait was found with all of them, and a
-/// gait was found without any one of them.
+/// A conflict of tuned bounds: with the other tuned bounds at their loosest values, no gait was found with all of
+/// them, and a gait was found without any one of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conflict {
-    /// The conflicting bounds. Empty if no gait was found with every tuned bound at its loosest value: then fixed constraints
-    /// conflict.
+    /// The conflicting bounds. Empty if no gait was found with every tuned bound at its loosest value: then fixed
+    /// constraints conflict.
     pub bounds: Vec<GivenBound>,
     /// Bounds of other conflicts that were relaxed when this conflict remained.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
-    /// Wishes that are part of what is fixed, where that contradicts itself.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub wishes: Vec<String>,
-    /// Violations of the nearest motion with these bounds and the other tuned bounds relaxed, worst first. Stationary points of
-    /// the violation are preferred.
+    /// Naturalness terms that take part, if fixed constraints conflict.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", alias = "wishes")] // the name in older records
+    pub naturalness_terms: Vec<String>,
+    /// Violations of the nearest motion with these bounds and the other tuned bounds relaxed, worst first. Stationary
+    /// points of the violation are preferred.
     pub violations: Vec<Violation>,
     /// Number of starts of the search.
     pub starts: usize,
@@ -123,15 +122,15 @@ pub struct RelaxedBound {
     pub meaning: String,
     /// The given value.
     pub from: f64,
-    /// The nearest value, together with the others, with which a gait converged; `None` if no gait converged with the loosest
-    /// values.
+    /// The nearest value, together with the others, with which a gait converged; `None` if no gait converged with the
+    /// loosest values.
     pub to: Option<f64>,
     /// The loosest value, together with the others, with which no gait converged.
     pub not_with: f64,
 }
 
-/// The effect of relaxing several tuned bounds together, if no single one is sufficient: each by the same fraction of the way to
-/// its loosest value.
+/// The effect of relaxing several tuned bounds together, if no single one is sufficient: each by the same fraction of
+/// the way to its loosest value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointRelaxation {
     /// The bounds, one of each conflict.
@@ -162,8 +161,8 @@ pub struct Explanation {
     pub gait_found: bool,
     /// The bounds that the last iterate reaches.
     pub at_limit: Vec<BoundAtLimit>,
-    /// Relaxations of each bound of the first conflict; no other bound can resolve it. The smallest one, as a factor or a share of
-    /// the range, is first. Insufficient ones are last.
+    /// Relaxations of each bound of the first conflict; no other bound can resolve it. The smallest one, as a factor
+    /// or a share of the range, is first. Insufficient ones are last.
     pub relaxations: Vec<Relaxation>,
     /// Joint relaxations, if no single one is sufficient, smallest first.
     #[serde(default)]
@@ -233,9 +232,9 @@ impl Search<'_> {
     }
 
     fn described(&self, set: BoundSet, without: BoundSet) -> Result<Conflict, Stop> {
-        let wished = self.problem.settings.naturalness.trailing_load_share;
-        let wishes = if set == BoundSet::EMPTY && wished > 0.0 {
-            vec![format!("at least {wished} of the weight on the trailing foot at heel strike")]
+        let share = self.problem.settings.naturalness.trailing_load_share;
+        let naturalness_terms = if set == BoundSet::EMPTY && share > 0.0 {
+            vec![format!("at least {share} of the weight on the trailing foot at heel strike")]
         } else {
             Vec::new()
         };
@@ -246,7 +245,7 @@ impl Search<'_> {
         Ok(Conflict {
             bounds: self.given(set),
             without: without.bounds().map(|bound| TunedBounds::NAMES[bound].to_owned()).collect(),
-            wishes,
+            naturalness_terms,
             violations,
             starts: unmet.iter().map(|unmet| unmet.starts).sum(),
             undecided: unmet.iter().any(|unmet| unmet.undecided),
@@ -311,7 +310,8 @@ fn alone(joint: JointRelaxation) -> Option<Relaxation> {
     Some(Relaxation { bound, meaning, from, to, not_with, undecided, solves, starts, warm_start })
 }
 
-/// Bounds in order of suspicion: those that the last iterate reaches first, and tightened ones before those at their defaults.
+/// Bounds in order of suspicion: those that the last iterate reaches first, and tightened ones before those at their
+/// defaults.
 fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
     let (own, usual) = (bounds.to_array(), TunedBounds::default().to_array());
     let tightened = |bound: usize| step(bound, own[bound], loosest(bound)) > step(bound, usual[bound], loosest(bound));
@@ -320,11 +320,11 @@ fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
     order
 }
 
-/// Explains a solve that did not converge: finds an irreducible conflict among its tuned bounds, and the smallest relaxations that
-/// give a gait, by solves with other bounds.
+/// Explains a solve that did not converge: finds an irreducible conflict among its tuned bounds, and the smallest
+/// relaxations that give a gait, by solves with other bounds.
 ///
-/// It takes dozens of solves; `progress` receives each step. `None` if it was cancelled, or if the solve converged or was
-/// cancelled.
+/// It takes dozens of solves; `progress` receives each step. `None` if it was cancelled, or if the solve converged or
+/// was cancelled.
 ///
 /// # Errors
 /// [`SolveError`] if the problem is invalid or the last iterate belongs to another problem.

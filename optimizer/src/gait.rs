@@ -1,13 +1,14 @@
 //! A gait: a walking trajectory over one stride, in SI units and radians.
 
-use crate::bounds::TunedBounds;
+use crate::body::{Axis, FootPoint, Side};
 use crate::device::Device;
 use crate::settings::GaitSettings;
 use crate::subject::Subject;
+use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
 
 pub(crate) mod motion;
-mod shape;
+mod validation;
 
 /// Version of the layout of [`Gait`].
 pub(crate) const FORMAT_VERSION: u32 = 1;
@@ -51,36 +52,6 @@ pub struct ContactRowName {
     pub side: Side,
     /// `x` forward, `z` up.
     pub axis: Axis,
-}
-
-/// A contact point of a foot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FootPoint {
-    /// Heel.
-    Heel,
-    /// Toe (ball of the foot).
-    Toe,
-}
-
-/// A side of the body. The prosthesis is on the right.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Side {
-    /// Intact leg.
-    Left,
-    /// Prosthetic leg.
-    Right,
-}
-
-/// A component in the sagittal plane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// Forward.
-    X,
-    /// Up.
-    Z,
 }
 
 /// The trajectory in one domain, at equidistant nodes.

@@ -5,32 +5,37 @@
 //! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`outputs`], [`hip_velocity`], [`transitions`] |
 //! | C3 physical limits: friction, unilateral contact, clearance, touchdown | [`contact_limits`] |
-//! | C4 bounds of the gait: a1 to a8, joints, torques, speed, steps | [`limits`], [`stride`] |
+//! | C4 bounds of the gait: a1 to a8, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
 //! | C8 fibre kinematics | [`fibres`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
 
-mod answer;
 pub mod contact_limits;
 mod elimination_tree;
 pub mod entries;
+mod evaluation;
 pub mod fibres;
+mod gait_of_variables;
 pub mod hip_velocity;
+pub mod inter_node_check;
 pub mod layout;
-pub mod limits;
 pub mod margins;
 pub mod mechanics;
 pub mod mesh_transfer;
 pub mod muscle_forces;
 pub mod objective;
 pub mod outputs;
+mod problem_definition;
 pub mod programme;
 pub mod rows;
 pub mod stride;
 pub mod transitions;
+pub mod variable_bounds;
 pub mod zero_dynamics;
 
-pub use answer::gait_of;
+pub use evaluation::RowViolation;
+pub use gait_of_variables::gait_of;
 pub use layout::{Layout, PointVariables};
+pub use problem_definition::GaitProblem;
 pub use programme::{GaitProgramme, ObjectiveWeights};
 pub use rows::{RowKind, RowName, RowTable};

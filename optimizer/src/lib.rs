@@ -5,38 +5,40 @@
 //! the gait, explains bounds without a gait, and reads recordings. It does no learning, storage or HTTP.
 
 pub mod body;
-pub mod bounds;
 pub mod certificate;
-pub mod cold_start;
 pub mod device;
 pub mod emg;
 pub mod explanation;
 pub mod export;
-mod filter;
 pub mod gait;
 pub mod gait_problem;
 mod in_words;
+pub mod initial_guess;
 pub mod metrics;
 pub mod muscle;
-pub mod nlp;
 mod opensim;
 pub mod phase_portrait;
 pub mod reference;
 pub mod settings;
+mod signal_filter;
 pub mod solve;
+mod statistics;
 pub mod subject;
 mod table;
+pub mod tuned_bounds;
 pub mod walking;
 
-pub use bounds::TunedBounds;
 pub use device::{Device, DeviceField};
 pub use gait::{DomainTrajectory, Gait};
+pub use gait_problem::GaitProblem;
 pub use gait_problem::margins::Margins;
+pub use interior_point::{NlpSettings, WarmPoint};
 pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
-    Attempt, BasinChoice, CancelToken, ColdGuess, ColdRoute, GaitProblem, GuessTiming, IterationRecord, LinearAlgebra,
-    OtherBasin, Phase, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+    BasinChoice, CancelToken, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, MuscleRoute, OtherBasin,
+    SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus, StartedFrom, Violation,
     WarmStart, solve, solve_from_guesses,
 };
 pub use subject::{ModelError, Subject};
+pub use tuned_bounds::TunedBounds;

@@ -4,9 +4,10 @@
 //! differences. Unevenly spaced rows are first interpolated linearly on an even grid. The first and last samples have
 //! no central difference and are omitted.
 
-use crate::filter::{extension, filter, low_pass};
 use crate::opensim::{AngleUnit, StorageFile};
-use crate::reference::{LARGEST_ANGLE_RAD, Recording};
+use crate::reference::{LARGEST_ANGLE_RAD, MotionRecording};
+use crate::signal_filter::{extension, filter, low_pass};
+use crate::statistics::extremes;
 use crate::subject::ModelError;
 use crate::table::{Clock, Separator, Table, lines_of};
 use serde::{Deserialize, Serialize};
@@ -123,7 +124,7 @@ impl JointRecording {
     pub fn check_walking(&self, what: &str) -> Result<(), ModelError> {
         let refused = self.too_short().or_else(|| self.still()).or_else(|| {
             self.joints.iter().find_map(|(joint, angles)| {
-                let knee = if joint.starts_with("knee") { Recording::no_knee(angles) } else { None };
+                let knee = if joint.starts_with("knee") { MotionRecording::no_knee(angles) } else { None };
                 knee.or_else(|| self.jump(angles)).map(|reason| format!("{joint} {reason}"))
             })
         });
@@ -139,7 +140,7 @@ impl JointRecording {
 
     fn still(&self) -> Option<String> {
         let range = |angles: &[f64]| {
-            let (lowest, highest) = Recording::extremes(angles);
+            let (lowest, highest) = extremes(angles);
             highest - lowest
         };
         let most = self.joints.iter().map(|(_, angles)| range(angles)).fold(0.0, f64::max);
@@ -151,7 +152,7 @@ impl JointRecording {
     /// The reason why an evenly sampled angle is implausible: it jumps.
     fn jump(&self, angles: &[f64]) -> Option<String> {
         let times: Vec<f64> = (0..angles.len()).map(|row| row as f64 / self.rate_hz).collect();
-        let (row, jump_rad) = Recording::jump(&times, angles)?;
+        let (row, jump_rad) = MotionRecording::jump(&times, angles)?;
         Some(format!(
             "jumps by {jump_rad:.2} rad in {:.4} s, {:.3} s after the first row",
             1.0 / self.rate_hz,

@@ -324,9 +324,9 @@ mod tests {
     fn disabled_options_are_not_serialised() {
         let text = serde_json::to_string(&GaitSettings::default()).unwrap();
         assert!(!text.contains("naturalness") && !text.contains("muscles"), "{text}");
-        let wished: GaitSettings = serde_json::from_str(r#"{"naturalness": {"trailing_load_share": 0.3}}"#).unwrap();
-        let again: GaitSettings = serde_json::from_str(&serde_json::to_string(&wished).unwrap()).unwrap();
-        assert_eq!(wished, again);
+        let given: GaitSettings = serde_json::from_str(r#"{"naturalness": {"trailing_load_share": 0.3}}"#).unwrap();
+        let again: GaitSettings = serde_json::from_str(&serde_json::to_string(&given).unwrap()).unwrap();
+        assert_eq!(given, again);
         let refused: GaitSettings = serde_json::from_str(r#"{"naturalness": {"reference_weight": -1}}"#).unwrap();
         let refusal = refused.validate().unwrap_err().to_string();
         assert_eq!(refusal, "naturalness.reference_weight = -1 is outside the allowed range [0, 100]");

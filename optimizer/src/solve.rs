@@ -1,55 +1,42 @@
 //! Solving a gait problem: attempts from initial guesses or a warm start, and the outcome.
 
-use crate::nlp::NlpError;
+use crate::gait_problem::GaitProblem;
 use crate::subject::ModelError;
 use std::time::Instant;
-use thiserror::Error;
 
 mod attempts;
-mod cold_guesses;
+mod error;
+mod multi_start;
 mod options;
-mod problem;
+mod outcome;
+mod phases;
 mod progress;
 mod report;
-mod run;
 mod solver_settings;
 mod warm_start;
 
-pub use attempts::CONVERGED_VIOLATION;
-use attempts::{Tried, choose, keep_between_points, number_basins, try_catalogue, try_guesses, try_warm};
-pub use cold_guesses::{ColdGuess, ColdRoute, CostStrategy, GuessTiming};
+use attempts::{Tried, choose, enforce_between_nodes, number_basins, try_guesses, try_multi_start, try_warm};
+pub use error::SolveError;
+pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use options::{BasinChoice, SolveOptions};
-pub use problem::GaitProblem;
-pub use progress::{CancelToken, IterationRecord, Phase};
+use outcome::{SolveTally, other_basin, outcome};
+use phases::SolveContext;
+pub use progress::{CancelToken, IterationRecord, SolvePhase};
 pub use report::{
-    Attempt, LinearAlgebra, Optimality, OtherBasin, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus,
+    StartedFrom, Violation,
 };
-use report::{Tally, other_basin, outcome};
-use run::Context;
 pub use warm_start::WarmStart;
 use warm_start::on_mesh_of;
 
-/// The reason why a solve could not start.
-#[derive(Debug, Error)]
-pub enum SolveError {
-    /// The problem or an option is invalid.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The warm start belongs to another problem.
-    #[error("the warm start belongs to another problem: {0}")]
-    WarmStartShape(String),
-    /// The interior-point solver rejected its input.
-    #[error(transparent)]
-    Solver(#[from] NlpError),
-}
-
 /// Solves a gait problem. Equal inputs give equal bits.
 ///
-/// A cold start solves from [`SolveOptions::cold_guesses`] initial guesses and chooses a gait by
-/// [`SolveOptions::basin_choice`]. If none converges, it tries further guesses until one does ([`SolveOptions::retry`]). If a
-/// warm start does not converge, a cold start follows. Without a converged attempt, the outcome is the attempt with the smallest
-/// violation. If the gait violates bounds between its nodes, the solve continues with tightened bounds
-/// ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on the calling thread.
+/// A cold start solves from [`SolveOptions::initial_guesses`] initial guesses and chooses a gait by
+/// [`SolveOptions::basin_choice`]. If none converges, it tries further guesses until one does
+/// ([`SolveOptions::retry`]). If a warm start does not converge, a cold start follows. Without a converged attempt,
+/// the outcome is the attempt with the smallest violation. If the gait violates bounds between its nodes, the solve
+/// continues with tightened bounds ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on
+/// the calling thread.
 ///
 /// A solve without a gait is an `Ok` outcome with a status other than `Converged`.
 ///
@@ -65,13 +52,13 @@ pub fn solve(
     options.validate()?;
     let programme = problem.programme(problem.muscles)?;
     let start = warm_start.map(|warm| on_mesh_of(problem, &programme, warm)).transpose()?;
-    let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
     let mut tried = Vec::new();
     if let Some(start) = start {
         tried.push(try_warm(&context, start, observer)?);
     }
     if !tried.iter().any(Tried::is_final) {
-        tried.extend(try_catalogue(&context, observer)?);
+        tried.extend(try_multi_start(&context, observer)?);
     }
     number_basins(&mut tried);
     let chosen = choose(&tried, options.basin_choice);
@@ -80,7 +67,7 @@ pub fn solve(
         (Some(_), 0) => StartedFrom::Warm,
         (Some(_), _) => StartedFrom::ColdAfterWarm,
     };
-    let chosen = keep_between_points(&context, &mut tried, chosen, observer)?;
+    let chosen = enforce_between_nodes(&context, &mut tried, chosen, observer)?;
     finish(&context, tried, chosen, started_from)
 }
 
@@ -97,19 +84,19 @@ pub(crate) fn solve_from_warm_start(
     options.validate()?;
     let programme = problem.programme(problem.muscles)?;
     let start = on_mesh_of(problem, &programme, warm_start)?;
-    let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
     let tried = try_warm(&context, start, &mut |_| {})?;
     finish(&context, vec![tried], 0, StartedFrom::Warm)
 }
 
-/// Solves a gait problem from the given initial guesses only, without checks between nodes: for studies of local optima and of
-/// the solver.
+/// Solves a gait problem from the given initial guesses only, without checks between nodes: for studies of local
+/// optima and of the solver.
 ///
 /// # Errors
 /// [`SolveError`] if the input is invalid or there is no guess.
 pub fn solve_from_guesses(
     problem: &GaitProblem,
-    guesses: &[ColdGuess],
+    guesses: &[InitialGuess],
     options: &SolveOptions,
     observer: &mut dyn FnMut(&IterationRecord),
     cancel: &CancelToken,
@@ -120,7 +107,7 @@ pub fn solve_from_guesses(
     }
     ModelError::check_range("number of guesses", guesses.len() as f64, 1.0, 1e3)?;
     let programme = problem.programme(problem.muscles)?;
-    let context = Context { problem, programme: &programme, options, cancel, started: Instant::now() };
+    let context = SolveContext { problem, programme: &programme, options, cancel, started: Instant::now() };
     let mut tried = try_guesses(&context, guesses, 0, observer)?;
     number_basins(&mut tried);
     let chosen = choose(&tried, options.basin_choice);
@@ -129,12 +116,12 @@ pub fn solve_from_guesses(
 
 /// The outcome of the attempts.
 fn finish(
-    context: &Context<'_>,
+    context: &SolveContext<'_>,
     tried: Vec<Tried>,
     chosen: usize,
     started_from: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
-    let mut tally = Tally::default();
+    let mut tally = SolveTally::default();
     let (mut answer, mut others) = (None, Vec::<OtherBasin>::new());
     let chosen_basin = tried.get(chosen).and_then(|one| one.attempt.basin);
     for (index, mut one) in tried.into_iter().enumerate() {
@@ -143,17 +130,17 @@ fn finish(
         tally.evaluation_s += one.evaluation_s;
         tally.linear_algebra.add(&one.linear_algebra);
         if index == chosen {
-            answer = Some((one.choice, one.margins));
+            answer = Some((one.candidate, one.margins));
         } else if let Some(basin) = one.attempt.basin.filter(|basin| Some(*basin) != chosen_basin)
             && others.iter().all(|other| other.basin != basin)
         {
-            others.push(other_basin(context, one.choice, &one.attempt, basin));
+            others.push(other_basin(context, one.candidate, &one.attempt, basin));
         }
         tally.attempts.push(one.attempt);
     }
     match answer {
-        Some((choice, margins)) => {
-            let outcome = outcome(context, choice, &margins, tally, started_from);
+        Some((candidate, margins)) => {
+            let outcome = outcome(context, candidate, &margins, tally, started_from);
             Ok(SolveOutcome { other_basins: others, ..outcome })
         }
         None => {

@@ -4,7 +4,7 @@
 
 use allocation_counter::measure;
 use gait_optimizer::{
-    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, Subject, solve_from_guesses,
+    CancelToken, GaitProblem, GaitSettings, InitialGuess, Mesh, SolveOptions, Subject, solve_from_guesses,
 };
 
 /// Numbers of allocations and of iterations of a cold solve that ends at its iteration limit.
@@ -13,7 +13,7 @@ fn allocations(problem: &GaitProblem, max_iterations: usize) -> (u64, usize) {
     let mut iterations = 0;
     let counted = measure(|| {
         let outcome =
-            solve_from_guesses(problem, &[ColdGuess::NATURAL], &options, &mut |_| {}, &CancelToken::new()).unwrap();
+            solve_from_guesses(problem, &[InitialGuess::NATURAL], &options, &mut |_| {}, &CancelToken::new()).unwrap();
         iterations = outcome.report.iterations;
     });
     (counted.count_total, iterations)

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
-use gait_optimizer::body::{InverseDynamics, PointState, WalkerModel};
-use gait_optimizer::gait::{FootPoint, Side};
+use gait_optimizer::body::{FootPoint, InverseDynamics, PointState, Side, WalkerModel};
 use gait_optimizer::muscle::{MUSCLES, force_length, force_velocity, tendon_force};
 use gait_optimizer::walking::{CYCLE, impact, kinetic_energy};
 use gait_optimizer::{Device, Subject};

@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
-use gait_optimizer::gait_problem::rows::Place;
+use gait_optimizer::gait_problem::rows::RowPlace;
 use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
-use gait_optimizer::nlp::NonlinearProgram;
 use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
+use interior_point::NonlinearProgram;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -36,7 +36,7 @@ const DOMAINS: [&str; 8] = ["DS2_R", "DS3_R", "SS2_R", "SS1_R", "DS2_L", "DS3_L"
 fn group(name: RowName) -> String {
     use RowKind as K;
     match name.place {
-        Place::Point { domain, point } => {
+        RowPlace::Point { domain, point } => {
             let domain = DOMAINS[usize::from(domain)];
             let suffix = match name.kind {
                 K::Friction | K::Height | K::Clearance | K::PhaseRate => "ineq",
@@ -53,7 +53,7 @@ fn group(name: RowName) -> String {
             };
             format!("{domain}:{suffix}")
         }
-        Place::Transition { domain } => {
+        RowPlace::Transition { domain } => {
             let (from, to) = (usize::from(domain), (usize::from(domain) + 1) % 8);
             let suffix = match name.kind {
                 K::PositionReset => "q",
@@ -64,7 +64,7 @@ fn group(name: RowName) -> String {
             };
             format!("{}->{}:{suffix}", DOMAINS[from], DOMAINS[to])
         }
-        Place::Stride => if name.kind == K::Speed { "speed" } else { "step" }.to_owned(),
+        RowPlace::Stride => if name.kind == K::Speed { "speed" } else { "step" }.to_owned(),
     }
 }
 
@@ -118,7 +118,7 @@ fn gait_problem_matches_independent_sums() {
 }
 
 /// Product of a compressed-column matrix with a vector.
-fn multiply(pattern: &gait_optimizer::nlp::SparsityPattern, values: &[f64], v: &[f64], symmetric: bool) -> Vec<f64> {
+fn multiply(pattern: &interior_point::SparsityPattern, values: &[f64], v: &[f64], symmetric: bool) -> Vec<f64> {
     let mut result = vec![0.0; pattern.rows];
     for column in 0..pattern.columns {
         for slot in pattern.column_starts[column]..pattern.column_starts[column + 1] {

@@ -6,12 +6,12 @@ mod golden_gaits;
 
 use gait_optimizer::gait_problem::gait_of;
 use gait_optimizer::metrics::{activation_alternations, gait_rmse};
-use gait_optimizer::nlp::{self, BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
 use gait_optimizer::walking::{CYCLE, kept_clearance_m, progress};
 use gait_optimizer::{
-    CancelToken, ColdGuess, GaitProblem, GaitSettings, SolveOptions, SolveStatus, Subject, solve_from_guesses,
+    CancelToken, GaitProblem, GaitSettings, InitialGuess, SolveOptions, SolveStatus, Subject, solve_from_guesses,
 };
 use golden_gaits::{golden, golden_gait, golden_with, numbers};
+use interior_point::{BoundMultiplierStart, NlpSettings, NlpStatus, NonlinearProgram, StartPoint};
 
 #[test]
 fn golden_gaits_satisfy_all_rows() {
@@ -66,9 +66,14 @@ fn solver_stays_at_the_golden_gaits() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let golden = golden(subject, muscles);
         let settings = NlpSettings { max_iterations: HANDFUL, ..from_a_golden_gait() };
-        let result =
-            nlp::solve(&golden.programme, &StartPoint::Cold(golden.x.clone()), &settings, &mut |_| {}, &|| false)
-                .unwrap();
+        let result = interior_point::solve(
+            &golden.programme,
+            &StartPoint::Cold(golden.x.clone()),
+            &settings,
+            &mut |_| {},
+            &|| false,
+        )
+        .unwrap();
         println!(
             "s{subject} {muscles} {:?} {} iterations {:?} {:?}",
             result.status, result.iterations, result.timing, result.counts
@@ -123,7 +128,8 @@ fn activations_do_not_alternate_with_the_default_weights() {
         let golden = golden_with(&problem.settings, subject, true);
         let settings = from_a_golden_gait();
         let result =
-            nlp::solve(&golden.programme, &StartPoint::Cold(golden.x), &settings, &mut |_| {}, &|| false).unwrap();
+            interior_point::solve(&golden.programme, &StartPoint::Cold(golden.x), &settings, &mut |_| {}, &|| false)
+                .unwrap();
         assert_eq!(result.status, NlpStatus::Converged);
         let gait = gait_of(&problem, &golden.programme, &result.x);
         assert_eq!(activation_alternations(&gait), 0, "after {} iterations", result.iterations);
@@ -137,14 +143,14 @@ fn activations_do_not_alternate_with_the_default_weights() {
 #[test]
 fn cold_starts_take_at_most_the_expected_iterations() {
     let known = [
-        ((1, false, ColdGuess::NATURAL), 92),
-        ((1, false, ColdGuess::EARLY_RISE), 97),
-        ((2, false, ColdGuess::NATURAL), 84),
-        ((2, false, ColdGuess::EARLY_RISE), 101),
-        ((1, true, ColdGuess::NATURAL), 147),
-        ((1, true, ColdGuess::EARLY_RISE), 160),
-        ((2, true, ColdGuess::NATURAL), 166),
-        ((2, true, ColdGuess::EARLY_RISE), 167),
+        ((1, false, InitialGuess::NATURAL), 92),
+        ((1, false, InitialGuess::EARLY_RISE), 97),
+        ((2, false, InitialGuess::NATURAL), 84),
+        ((2, false, InitialGuess::EARLY_RISE), 101),
+        ((1, true, InitialGuess::NATURAL), 147),
+        ((1, true, InitialGuess::EARLY_RISE), 160),
+        ((2, true, InitialGuess::NATURAL), 166),
+        ((2, true, InitialGuess::EARLY_RISE), 167),
     ];
     let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
     let (mut taken, mut expected) = (0, 0);

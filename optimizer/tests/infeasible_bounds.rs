@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use gait_optimizer::{
-    CancelToken, ColdGuess, GaitProblem, GaitSettings, Mesh, SolveOptions, SolveStatus, Subject, TunedBounds,
+    CancelToken, GaitProblem, GaitSettings, InitialGuess, Mesh, SolveOptions, SolveStatus, Subject, TunedBounds,
     solve_from_guesses,
 };
 use std::io::Write;
@@ -33,7 +33,7 @@ fn infeasible_solves_end_at_stationary_points_of_the_violation() {
     let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
     let options = SolveOptions { threads: 2, ..SolveOptions::default() };
     let mut gave_up = Vec::new();
-    let guesses = [ColdGuess::NATURAL, ColdGuess::EARLY_RISE];
+    let guesses = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE];
     let starts = WITHOUT_A_GAIT.into_iter().flat_map(|words| guesses.map(|guess| (words, guess)));
     for (words, guess) in if long { starts.take(24) } else { starts.take(6) } {
         let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
@@ -78,7 +78,7 @@ fn long_nearly_infeasible_solve_ends_before_its_iteration_limit() {
     // The boundary of feasibility is between 14 and 15.
     for (bound, has_gaits) in [("a2=14", false), ("a2=15", true)] {
         problem.bounds = TunedBounds::parse(bound).unwrap();
-        let ends = [ColdGuess::NATURAL, ColdGuess::EARLY_RISE].map(|guess| {
+        let ends = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE].map(|guess| {
             let outcome = solve_from_guesses(&problem, &[guess], &options, &mut |_| {}, &CancelToken::new()).unwrap();
             println!("{bound}, {}: {:?}", guess.label(), outcome.report.status);
             outcome.report.status

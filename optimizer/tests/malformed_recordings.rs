@@ -8,7 +8,7 @@ mod synthetic_recordings;
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::EmgRecording;
 use gait_optimizer::phase_portrait::JointRecording;
-use gait_optimizer::reference::Recording;
+use gait_optimizer::reference::MotionRecording;
 use synthetic_recordings::{camargo, electromyogram, opensim, own_table};
 
 /// A malformed file: description, text and error message.
@@ -53,7 +53,7 @@ fn in_radians(whole: &str) -> String {
 #[test]
 fn malformed_opensim_files_are_rejected_with_place_and_reason() {
     let whole = opensim(2);
-    let read = |text: &str| Recording::from_opensim("walk.mot", text, None, Some("right_vy")).err();
+    let read = |text: &str| MotionRecording::from_opensim("walk.mot", text, None, Some("right_vy")).err();
     assert_eq!(read(&whole), None);
     let change = |from: &str, to: &str| changed(&whole, from, to);
     let row = line(&whole, 11);
@@ -179,7 +179,7 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
 #[test]
 fn malformed_tables_are_rejected_with_place_and_reason() {
     let (whole, own) = (camargo(2), own_table());
-    let read = |text: &str| Recording::from_camargo_csv("AB06.csv", text).err();
+    let read = |text: &str| MotionRecording::from_camargo_csv("AB06.csv", text).err();
     assert_eq!(read(&whole), None);
     let row = line(&whole, 100);
     check(
@@ -210,7 +210,7 @@ fn malformed_tables_are_rejected_with_place_and_reason() {
             ),
         ],
     );
-    let read = |text: &str| Recording::from_csv("own.csv", text).err();
+    let read = |text: &str| MotionRecording::from_csv("own.csv", text).err();
     assert_eq!(read(&own), None);
     check(
         "own table",

@@ -7,7 +7,7 @@ mod noise;
 mod synthetic_recordings;
 
 use gait_optimizer::export::motion_file;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, VerticalForce, Walker, distance, nearest};
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, VerticalForce, Walker, distance, nearest};
 use gait_optimizer::{ModelError, ReferenceGait, Subject};
 use golden_gaits::golden_gait;
 use noise::noise;
@@ -15,8 +15,8 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use synthetic_recordings::{opensim, opensim_rows};
 
-fn read(text: &str) -> Result<Recording, ModelError> {
-    Recording::from_opensim("walk.mot", text, None, Some("right_vy"))
+fn read(text: &str) -> Result<MotionRecording, ModelError> {
+    MotionRecording::from_opensim("walk.mot", text, None, Some("right_vy"))
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn every_variant_of_opensim_files_gives_the_same_recording() {
     let rows = opensim_rows(2, 1.0);
     let whole = read(&opensim(2)).unwrap();
     let same = |form: &str, text: &str, unit: Option<AngleUnit>| {
-        let found = Recording::from_opensim(form, text, unit, Some("right_vy")).unwrap();
+        let found = MotionRecording::from_opensim(form, text, unit, Some("right_vy")).unwrap();
         for (ours, theirs) in found.angles_rad.iter().flatten().zip(whole.angles_rad.iter().flatten()) {
             assert!((ours - theirs).abs() < 1e-7, "{form}: {ours} {theirs}");
         }
@@ -93,14 +93,15 @@ fn every_variant_of_opensim_files_gives_the_same_recording() {
     same("states by path", &table.replace(names, &paths.join("\t")), None);
     // SIMM: the header has no unit.
     let simm = format!("name walk.mot\ndatacolumns 10\ndatarows 221\nrange 0 2.2\nendheader\n{names}\n{rows}");
-    assert!(Recording::from_opensim("walk.mot", &simm, None, None).is_err());
+    assert!(MotionRecording::from_opensim("walk.mot", &simm, None, None).is_err());
     same("motion file of SIMM", &simm, Some(AngleUnit::Degrees));
     // A unit that contradicts the header is an error.
-    let refused = Recording::from_opensim("walk.mot", &opensim(2), Some(AngleUnit::Radians), None);
+    let refused = MotionRecording::from_opensim("walk.mot", &opensim(2), Some(AngleUnit::Radians), None);
     let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("the header gives angles in degrees, but the unit given is radians"), "{refused}");
     let half = simm.replace("datarows 221", "datarows 220");
-    let refused = Recording::from_opensim("walk.mot", &half, Some(AngleUnit::Degrees), None).unwrap_err().to_string();
+    let refused =
+        MotionRecording::from_opensim("walk.mot", &half, Some(AngleUnit::Degrees), None).unwrap_err().to_string();
     assert!(refused.contains("line 3: the header has datarows=220, but the file has 221"), "{refused}");
 }
 
@@ -116,7 +117,7 @@ fn forces_from_a_separate_file_have_their_own_rate() {
         let force = if (time / 1.1).rem_euclid(1.0) < 0.6 { 700.0 } else { 0.0 };
         writeln!(forces, "{time:.3}\t0\t{force}\t{}", 700.0 - force).unwrap();
     }
-    let motion = Recording::from_opensim("walk.mot", &opensim(5), None, None).unwrap();
+    let motion = MotionRecording::from_opensim("walk.mot", &opensim(5), None, None).unwrap();
     let recording = motion.clone().with_force_file("walk_grf.mot", &forces, "ground_force_vy").unwrap();
     let strikes = recording.heel_strikes(&HeelStrikes::Force).unwrap();
     assert_eq!(strikes.len(), 5, "those within the motion: {strikes:?}");
@@ -139,7 +140,7 @@ fn camargo_forces_segment_the_strides() {
         let force = if (time / 1.1).rem_euclid(1.0) < 0.6 { 700.0 } else { 0.0 };
         writeln!(forces, "{time:.3},0,{force}").unwrap();
     }
-    let motion = Recording::from_camargo_csv("ik.csv", &synthetic_recordings::camargo(5)).unwrap();
+    let motion = MotionRecording::from_camargo_csv("ik.csv", &synthetic_recordings::camargo(5)).unwrap();
     let recording = motion.with_camargo_forces("fp.csv", &forces, "Treadmill_R_vy").unwrap();
     let strikes = recording.heel_strikes(&HeelStrikes::Force).unwrap();
     for (k, strike) in strikes.iter().enumerate() {
@@ -221,7 +222,7 @@ fn exported_gait_is_imported_with_the_same_curves() {
     for (subject, muscles) in [(1, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
         let text = motion_file(&gait, 2000.0).unwrap();
-        let recording = Recording::from_opensim("gait.mot", &text, None, None).unwrap();
+        let recording = MotionRecording::from_opensim("gait.mot", &text, None, None).unwrap();
         // Linear interpolation has an error of h²/8 qdd = 3e-6 rad at 90 rad/s². An impact that changes a velocity by
         // 10 rad/s between two rows gives h/4 times that: 1.3e-3 rad.
         let end = recording.time_s[recording.time_s.len() - 1];
@@ -251,7 +252,7 @@ fn exported_gait_is_imported_with_the_same_curves() {
     }
 }
 
-fn recording_at(recording: &Recording, time: f64) -> [f64; 5] {
+fn recording_at(recording: &MotionRecording, time: f64) -> [f64; 5] {
     let after = recording.time_s.partition_point(|&t| t < time).clamp(1, recording.time_s.len() - 1);
     let (t0, t1) = (recording.time_s[after - 1], recording.time_s[after]);
     let share = (time - t0) / (t1 - t0);
@@ -270,13 +271,13 @@ fn columns_of_tables_are_found_by_name() {
         camargo.extend([format!("{time},{},-10,20,5,3,4,-2,-6\n", k - 37)]);
         own.extend([format!("{time},0.1,0.2,{},0.4,0.5\n", f64::from(k) / 100.0)]);
     }
-    let recording = Recording::from_camargo_csv("AB06.csv", &camargo).unwrap();
+    let recording = MotionRecording::from_camargo_csv("AB06.csv", &camargo).unwrap();
     let wanted = [8.0, 26.0, 30.0, 3.0, 11.0_f64].map(f64::to_radians);
     for (found, wanted) in recording.angles_rad[7].iter().zip(wanted) {
         assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
     }
-    let marked = Recording::from_csv("own.csv", &format!("\u{feff}{own}")).unwrap();
-    let recording = Recording::from_csv("own.csv", &own).unwrap();
+    let marked = MotionRecording::from_csv("own.csv", &format!("\u{feff}{own}")).unwrap();
+    let recording = MotionRecording::from_csv("own.csv", &own).unwrap();
     assert_eq!(marked, recording, "with a byte order mark as without");
     assert_eq!(recording.angles_rad[39], [0.1, 0.2, 0.39, 0.4, 0.5]);
     assert_eq!(recording.steps[0], "one adult");
@@ -359,12 +360,12 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
     assert!(refused(vec![0.5, 9.0]).contains("heel strike (s) = 9 is outside"));
     // Forces that end before the first stride.
     let force = VerticalForce { time_s: vec![0.0, 0.1, 0.2], force_n: vec![0.0; 3] };
-    let early = Recording { right_force: Some(force), ..recording.clone() };
+    let early = MotionRecording { right_force: Some(force), ..recording.clone() };
     let early = early.reference("x", &HeelStrikes::Force, Walker::default()).unwrap_err().to_string();
     let expected =
         "0 right heel strikes found (angles from 0.000 to 2.200 s, forces from 0.000 to 0.200 s); a stride needs two";
     assert!(early.contains(expected), "{early}");
-    let unforced = Recording::from_opensim("x", &opensim(2), None, None).unwrap();
+    let unforced = MotionRecording::from_opensim("x", &opensim(2), None, None).unwrap();
     assert!(unforced.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string().contains("no force"));
     let short = Walker { height_m: Some(0.5), ..Walker::default() };
     let error = recording.reference("x", &HeelStrikes::Given(vec![0.0, 1.1]), short).unwrap_err();
@@ -373,23 +374,23 @@ fn recordings_without_a_stride_are_rejected_with_the_reason() {
 
 /// Five strides of 1.1 s of the built-in reference as a recording, with angles modified by `change` and delayed by the
 /// fraction `late` of a stride after the heel strikes at 0 s, 1.1 s, ...
-fn walk(late: f64, change: impl Fn([f64; 7]) -> [f64; 7]) -> Recording {
+fn walk(late: f64, change: impl Fn([f64; 7]) -> [f64; 7]) -> MotionRecording {
     let builtin = ReferenceGait::builtin().unwrap();
     of_fractions(|fraction| change(builtin.seven_angles(fraction + late)))
 }
 
-fn of_fractions(angles_at: impl Fn(f64) -> [f64; 7]) -> Recording {
+fn of_fractions(angles_at: impl Fn(f64) -> [f64; 7]) -> MotionRecording {
     let mut text = "time_s,torso_rad,hip_L_rad,knee_L_rad,ankle_L_rad,hip_R_rad,knee_R_rad\n".to_owned();
     for k in 0..=550 {
         let time_s = f64::from(k) / 100.0;
         let angles = angles_at(time_s / 1.1).map(|angle| format!("{angle:.6}"));
         writeln!(text, "{time_s},{}", angles[..6].join(",")).unwrap();
     }
-    Recording::from_csv("walk.csv", &text).unwrap()
+    MotionRecording::from_csv("walk.csv", &text).unwrap()
 }
 
 /// The error or the warning for a recording that is segmented at 0 s, 1.1 s, ...; empty if there is neither.
-fn said_of(recording: &Recording) -> String {
+fn said_of(recording: &MotionRecording) -> String {
     let given = HeelStrikes::Given((0..5).map(|k| 1.1 * f64::from(k)).collect());
     match recording.reference("walk", &given, Walker::default()) {
         Ok(reference) => remark(&reference),
@@ -528,7 +529,8 @@ fn unusual_mean_strides_get_a_warning() {
 fn computed_gaits_can_become_reference_gaits() {
     for (subject, muscles) in [(1, false), (1, true), (2, false), (2, true)] {
         let (_, gait) = golden_gait(subject, muscles);
-        let recording = Recording::from_opensim("gait.mot", &motion_file(&gait, 200.0).unwrap(), None, None).unwrap();
+        let recording =
+            MotionRecording::from_opensim("gait.mot", &motion_file(&gait, 200.0).unwrap(), None, None).unwrap();
         let reference = recording.reference("gait", &HeelStrikes::Ends, Walker::default()).unwrap();
         println!("| subject {subject}, muscles {muscles} | {} |", remark(&reference));
     }
@@ -551,7 +553,7 @@ fn noise_and_offset_of_a_force_plate_cause_no_heel_strikes() {
     let normal = noise(5500);
     for (offset_n, noise_n) in [(0.0, 0.0), (0.0, 8.0), (0.0, 10.0), (15.0, 4.0)] {
         let force = plate(|k| offset_n + noise_n * normal[k]);
-        let recording = Recording { right_force: Some(force), ..read(&opensim(5)).unwrap() };
+        let recording = MotionRecording { right_force: Some(force), ..read(&opensim(5)).unwrap() };
         let strikes = recording.heel_strikes(&HeelStrikes::Force).unwrap();
         assert_eq!(strikes.len(), 4, "{offset_n} N, noise of {noise_n} N: {strikes:?}");
         for (k, strike) in strikes.iter().enumerate() {
@@ -560,7 +562,7 @@ fn noise_and_offset_of_a_force_plate_cause_no_heel_strikes() {
         }
     }
     // With an offset above the threshold the contact never ends.
-    let lifted = Recording { right_force: Some(plate(|_| 25.0)), ..read(&opensim(5)).unwrap() };
+    let lifted = MotionRecording { right_force: Some(plate(|_| 25.0)), ..read(&opensim(5)).unwrap() };
     let refused = lifted.heel_strikes(&HeelStrikes::Force).unwrap_err().to_string();
     assert!(refused.starts_with("walk.mot: 0 right heel strikes"), "{refused}");
 }

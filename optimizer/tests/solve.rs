@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
+use gait_optimizer::body::{Axis, Side};
 use gait_optimizer::certificate::certify;
 use gait_optimizer::explanation::explain;
-use gait_optimizer::gait::{Axis, Side};
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{
@@ -94,10 +94,10 @@ fn trailing_force(outcome: &SolveOutcome, domain: usize) -> (f64, f64) {
 }
 
 #[test]
-fn wishes_beyond_the_paper_are_met() {
-    let mut wished = problem("");
-    wished.settings.naturalness = Naturalness { reference_weight: 0.1, trailing_load_share: 0.4 };
-    let found = solved(&wished, Some(&COLD.warm_start), 400);
+fn naturalness_terms_are_met() {
+    let mut natural = problem("");
+    natural.settings.naturalness = Naturalness { reference_weight: 0.1, trailing_load_share: 0.4 };
+    let found = solved(&natural, Some(&COLD.warm_start), 400);
     assert_eq!(found.report.status, SolveStatus::Converged);
     assert!(found.report.gait_rmse_rad < COLD.report.gait_rmse_rad, "nearer to the reference");
     assert!(found.report.cost_of_transport > COLD.report.cost_of_transport, "nothing is for free");
@@ -163,7 +163,7 @@ fn cold_start_without_retry_tries_its_guesses_only() {
     let options = SolveOptions { max_iterations: 3, retry: false, ..SolveOptions::default() };
     let outcome = solve(&problem(""), None, &options, &mut |_| {}, &CancelToken::new()).unwrap();
     assert_ne!(outcome.report.status, SolveStatus::Converged);
-    assert_eq!(outcome.report.attempts.len(), options.cold_guesses);
+    assert_eq!(outcome.report.attempts.len(), options.initial_guesses);
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn warm_start_is_transferred_between_meshes() {
     let fine = solved(&finer, Some(&COLD.warm_start), 400);
     assert_eq!((fine.report.status, fine.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
     assert_eq!(fine.report.attempts[0].strategy, "warm start from another mesh");
-    let guesses = &COLD.report.attempts[..SolveOptions::default().cold_guesses];
+    let guesses = &COLD.report.attempts[..SolveOptions::default().initial_guesses];
     let cold: usize = guesses.iter().map(|a| a.iterations).min().unwrap();
     let moved = fine.report.attempts[0].iterations;
     assert!(moved < cold, "{moved} {cold}");
@@ -247,7 +247,7 @@ fn explanation_names_relaxations_that_give_a_gait() {
 fn one_and_two_threads_give_the_same_bits_within_the_expected_iterations() {
     let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
     let with = |threads: usize| {
-        let options = SolveOptions { threads, cold_guesses: 1, ..SolveOptions::default() };
+        let options = SolveOptions { threads, initial_guesses: 1, ..SolveOptions::default() };
         solve(&problem, None, &options, &mut |_| {}, &CancelToken::new()).unwrap()
     };
     let (one, two) = (with(1), with(2));
@@ -265,7 +265,7 @@ fn one_and_two_threads_give_the_same_bits_within_the_expected_iterations() {
 fn tightest_allowed_tolerance_is_reached() {
     let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
     for tolerance in [1e-8, 1e-10] {
-        let options = SolveOptions { tolerance, cold_guesses: 1, retry: false, ..SolveOptions::default() };
+        let options = SolveOptions { tolerance, initial_guesses: 1, retry: false, ..SolveOptions::default() };
         let report = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new()).unwrap().report;
         assert_eq!(report.status, SolveStatus::Converged, "{tolerance}");
         assert!(report.max_violation < 1e-7, "{tolerance}: {}", report.max_violation);

@@ -2,12 +2,12 @@
 //!
 //! It exists for tests of the service alone; nothing it says is about walking.
 
-use gait_optimizer::gait::{Axis, ContactRowName, FootPoint, MuscleTrajectory, Side};
-use gait_optimizer::nlp::WarmPoint;
-use gait_optimizer::solve::{Phase, StartedFrom};
+use gait_optimizer::body::{Axis, FootPoint, Side};
+use gait_optimizer::gait::{ContactRowName, MuscleTrajectory};
+use gait_optimizer::solve::{SolvePhase, StartedFrom};
 use gait_optimizer::{
     CancelToken, DomainTrajectory, Gait, IterationRecord, LinearAlgebra, Margins, SolveOutcome, SolveReport,
-    SolveStatus, Violation, WarmStart,
+    SolveStatus, Violation, WarmPoint, WarmStart,
 };
 use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::TrialId;
@@ -67,7 +67,7 @@ impl Evaluate for Analytic {
             let decay = 0.5_f64.powi(i32::try_from(iteration).unwrap_or(0));
             observer(&IterationRecord {
                 iteration,
-                phase: Phase::Cost,
+                phase: SolvePhase::Cost,
                 objective: 0.2 + decay,
                 constraint_violation: decay,
                 dual_infeasibility: decay,
@@ -126,7 +126,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             stride_length_m: 1.3,
             durations_s: [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1],
             vhip_m_s: [1.0; 4],
-            attempts: vec![gait_optimizer::Attempt {
+            attempts: vec![gait_optimizer::SolveAttempt {
                 strategy: "analytic".to_owned(),
                 status: SolveStatus::Converged,
                 iterations: 3,

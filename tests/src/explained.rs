@@ -83,7 +83,7 @@ pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Viol
     let conflict = Conflict {
         bounds: vec![GivenBound { bound, meaning, value: bounds[CLEARANCE] }],
         without: Vec::new(),
-        wishes: Vec::new(),
+        naturalness_terms: Vec::new(),
         violations: violations.to_vec(),
         starts: 5,
         undecided: false,

@@ -255,7 +255,7 @@ async fn the_real_explanation_is_that_of_the_command_line() {
         .study(|new| {
             (new.muscles, new.trial_budget) = (false, 1);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
-            (new.solve_options.retry, new.solve_options.cold_guesses) = (false, 1);
+            (new.solve_options.retry, new.solve_options.initial_guesses) = (false, 1);
             new.base_bounds = TunedBounds { a2: 10.0, ..TunedBounds::default() };
             let first = json!({"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0});
             new.search_space = Some(serde_json::from_value(json!({"dimensions": [first]})).unwrap());

@@ -19,8 +19,12 @@ fn repository() -> PathBuf {
 }
 
 /// The packages whose programs the documents run, with their folders.
-const PACKAGES: [(&str, &str); 3] =
-    [("gait-optimizer", "optimizer"), ("gait-learner", "learner"), ("gaitwright-tests", "tests")];
+const PACKAGES: [(&str, &str); 4] = [
+    ("gait-optimizer", "optimizer"),
+    ("interior-point", "optimizer/nlp"),
+    ("gait-learner", "learner"),
+    ("gaitwright-tests", "tests"),
+];
 
 /// Every Markdown file of the repository, with its text.
 fn documents() -> BTreeMap<PathBuf, String> {

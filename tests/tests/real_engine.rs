@@ -66,7 +66,7 @@ fn one_gait_cold_and_warm_and_a_table_of_them() {
     assert_eq!(warm["lineage"]["ancestors"], json!([ancestor(&cold)]));
 
     // Every basin that the guesses reach is kept, and can be started from.
-    let many = ["solve", "--json", "--cold-guesses", "4", "--out", "many.json"];
+    let many = ["solve", "--json", "--initial-guesses", "4", "--out", "many.json"];
     let many = json_of(&gaitwright(folder, &[&many[..], &COARSE].concat()));
     let attempts = many["attempts"].as_array().unwrap();
     let answer = attempts.iter().find(|attempt| attempt["chosen"] == true).unwrap()["basin"].as_u64().unwrap();
@@ -120,7 +120,7 @@ fn a_gait_names_those_it_came_from() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let solve = |arguments: &[&str]| {
-        json_of(&gaitwright(folder, &[&["solve", "--json", "--cold-guesses", "1"], arguments, &COARSE].concat()))
+        json_of(&gaitwright(folder, &[&["solve", "--json", "--initial-guesses", "1"], arguments, &COARSE].concat()))
     };
     let first = solve(&["--out", "first.json"]);
     assert_eq!((&first["lineage"]["basin"], &first["lineage"]["ancestors"]), (&json!(1), &json!([])));
@@ -167,7 +167,7 @@ fn settings_of_the_solver_are_taken_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01, "bound_fraction": 0.01}"#).unwrap();
-    let solve = ["solve", "--json", "--cold-guesses", "1"];
+    let solve = ["solve", "--json", "--initial-guesses", "1"];
     let gait = |flags: &[&str]| {
         let figures = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
         assert_eq!(figures["status"], "converged");

@@ -73,13 +73,13 @@ def main():
     parser.add_argument("--intervals", type=int, nargs="+", default=[100, 150, 200, 250, 300])
     parser.add_argument("--runs", type=int, default=5)
     arguments = parser.parse_args()
-    ours = example("cart_pole")
+    ours = example("cart_pole", "interior-point")
     print("intervals,ours,ours_iterations,ours_objective,ours_s,ipopt_iterations,ipopt_objective,ipopt_s,ratio")
     for intervals in arguments.intervals:
         solver, given = programme(intervals)
         ours_s, theirs_s = [], []
         for _ in range(arguments.runs):
-            output = subprocess.check_output([ours, "--intervals", str(intervals)], text=True)
+            output = subprocess.check_output([ours, str(intervals)], text=True)
             row = next(csv.DictReader(io.StringIO(output)))
             ours_s.append(float(row["seconds"]))
             started = time.perf_counter()

@@ -26,15 +26,11 @@ WORKSPACE = HERE.parent.parent.parent
 ENVIRONMENT = os.environ | {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
-def cargo(*arguments):
-    command = ["cargo", *arguments[:1], "--quiet", "--release", "-p", "gait-optimizer", *arguments[1:]]
-    return subprocess.run(command, cwd=WORKSPACE, check=True, stdout=subprocess.PIPE, text=True).stdout
-
-
-def example(name):
+def example(name, package="gait-optimizer"):
     """Path of an example that cargo has built."""
-    lines = cargo("build", "--example", name, "--message-format=json").splitlines()
-    for message in map(json.loads, lines):
+    command = ["cargo", "build", "--quiet", "--release", "-p", package, "--example", name, "--message-format=json"]
+    output = subprocess.run(command, cwd=WORKSPACE, check=True, stdout=subprocess.PIPE, text=True).stdout
+    for message in map(json.loads, output.splitlines()):
         if message.get("target", {}).get("name") == name and message.get("executable"):
             return message["executable"]
     raise RuntimeError(f"cargo built no {name}")

@@ -3,10 +3,10 @@
 //! Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009, tables 4.1 and figure 4.1 (masses and
 //! gyration radii as fractions of body mass and segment length, lengths as fractions of height).
 
+use super::anatomy::{FootPoint, Side};
 use super::coordinates::{LINKS, THIGH_L, THIGH_R, TORSO};
-use super::point::{Chain, ContactPoint};
+use super::point::{Chain, ContactPoint, LegGeometry};
 use crate::device::Device;
-use crate::gait::{FootPoint, Side};
 use crate::subject::{ModelError, Subject};
 
 /// Thigh length / height.
@@ -35,21 +35,6 @@ pub struct Body {
     pub inertia: f64,
     /// Chain from the hip to the centre of mass. The body rotates with the last link of the chain.
     pub com: Chain,
-}
-
-/// Lengths of one leg, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegGeometry {
-    /// Distance from hip to knee.
-    pub thigh_length_m: f64,
-    /// Distance from knee to ankle.
-    pub shank_length_m: f64,
-    /// Height of the ankle above the sole.
-    pub ankle_height_m: f64,
-    /// Distance of the heel behind the ankle.
-    pub heel_behind_m: f64,
-    /// Distance of the toe ahead of the ankle.
-    pub toe_ahead_m: f64,
 }
 
 /// The walker: bodies, legs, and the constant coefficients of the equations of motion.

@@ -1,8 +1,7 @@
 //! Points fixed to links, and the contact points of the feet: position, velocity and acceleration.
 
-use super::anthropometry::LegGeometry;
+use super::anatomy::{FootPoint, Side};
 use super::coordinates::{LINKS, THIGH_L, THIGH_R, link_angles};
-use crate::gait::{FootPoint, Side};
 
 /// A point as a chain of vectors fixed to links: `p = (px, pz) + sum_j R(psi_j) (ux_j, uz_j)`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -73,6 +72,21 @@ impl Chain {
 #[inline]
 pub fn angles_of(q: &[f64; 9]) -> [f64; LINKS] {
     [q[2], q[3], q[4], q[5], q[6], q[7], q[8]]
+}
+
+/// Lengths of one leg, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LegGeometry {
+    /// Distance from hip to knee.
+    pub thigh_length_m: f64,
+    /// Distance from knee to ankle.
+    pub shank_length_m: f64,
+    /// Height of the ankle above the sole.
+    pub ankle_height_m: f64,
+    /// Distance of the heel behind the ankle.
+    pub heel_behind_m: f64,
+    /// Distance of the toe ahead of the ankle.
+    pub toe_ahead_m: f64,
 }
 
 /// A contact point: heel or toe of one leg, with its vector on each link of the leg.

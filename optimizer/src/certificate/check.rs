@@ -15,7 +15,7 @@ pub struct Check {
     pub value: Option<f64>,
     /// Largest allowed value. `None` for a quantity without a limit.
     pub limit: Option<f64>,
-    /// Place of the worst value: domain and time of the stride.
+    /// Location of the worst value: domain and time of the stride.
     pub place: String,
 }
 
@@ -38,12 +38,12 @@ impl Check {
 
 /// The place of a value.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<'a> {
+pub(super) struct CheckLocation<'a> {
     pub(super) domain: &'a str,
     pub(super) time_s: f64,
 }
 
-impl<'a> Place<'a> {
+impl<'a> CheckLocation<'a> {
     /// At a fraction of the duration of a domain.
     pub(super) fn within(trajectory: &'a DomainTrajectory, share: f64) -> Self {
         let start = trajectory.time_s.first().copied().unwrap_or(0.0);
@@ -74,7 +74,7 @@ pub(super) struct Worst {
 
 impl Worst {
     /// Adds a value. A value that is not finite counts as undetermined and is the worst.
-    pub(super) fn note(&mut self, quantity: Quantity, value: f64, place: Place<'_>) {
+    pub(super) fn note(&mut self, quantity: Quantity, value: f64, place: CheckLocation<'_>) {
         let value = value.is_finite().then_some(value);
         let words = || format!("{}, {:.4} s", place.domain, place.time_s);
         match self.checks.iter_mut().find(|c| c.name == quantity.name) {

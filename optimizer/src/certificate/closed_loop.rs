@@ -1,9 +1,9 @@
 //! The closed loop: consecutive strides, and contacts, friction and torques over the periodic stride.
 
-use super::check::{Check, Place, Quantity, Worst};
+use super::check::{Check, CheckLocation, Quantity, Worst};
 use super::control::{State, split};
 use super::hybrid_walker::{Fall, HybridWalker, Passage};
-use super::limits::{CONTACT_THRESHOLD_N, FRICTION_THRESHOLD_N, Limits, depth_below_ground};
+use super::limit_excess::{AllowedRanges, CONTACT_THRESHOLD_N, FRICTION_THRESHOLD_N, depth_below_ground};
 use crate::body::PointState;
 use crate::gait::Gait;
 use crate::gait::motion::instant;
@@ -32,7 +32,7 @@ pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Chec
         x = walker.after_stride(&x)?;
         let distance = x - start;
         let name = format!("stride {stride}");
-        let place = Place { domain: &name, time_s: 0.0 };
+        let place = CheckLocation { domain: &name, time_s: 0.0 };
         worst.note(ORBIT_ANGLE, distance.rows(2, 7).amax(), place);
         worst.note(ORBIT_RATE, distance.rows(9, 9).amax(), place);
     }
@@ -51,11 +51,11 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
             Some(start)
         })
         .collect();
-    let limits = Limits::new(gait);
+    let limits = AllowedRanges::new(gait);
     let mut worst = Worst::default();
     for (d, time, x) in &samples {
         let control = &walker.controls[*d];
-        let place = Place { domain: control.domain.name(), time_s: starts[*d] + time };
+        let place = CheckLocation { domain: control.domain.name(), time_s: starts[*d] + time };
         let (q, qd) = split(x);
         let phase = control.constraints.phase(&q, &qd, &[0.0; 9]);
         let plan = instant(&gait.domains[*d], phase.s).u;
@@ -82,7 +82,7 @@ pub(super) fn periodic_stride(walker: &HybridWalker<'_>, gait: &Gait, periodic: 
     for (d, passage) in passages.iter().enumerate() {
         let opens = CYCLE[(d + 1) % CYCLE.len()];
         if let (Some(impact), Some(row)) = (&passage.impact, opens.landing_row()) {
-            let place = Place { domain: opens.name(), time_s: starts[d] + passage.duration };
+            let place = CheckLocation { domain: opens.name(), time_s: starts[d] + passage.duration };
             worst.note(IMPULSE, -impact.impulse[row], place);
         }
     }

@@ -5,8 +5,7 @@
 //! `a_x` (z).
 
 use crate::body::coordinates::{LINKS, congruence, to_generalised};
-use crate::body::{ContactPoint, PointState, WalkerModel};
-use crate::gait::Axis;
+use crate::body::{Axis, ContactPoint, PointState, WalkerModel};
 use crate::walking::{ContactRow, Domain};
 
 /// A component of a heel or toe.

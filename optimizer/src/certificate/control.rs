@@ -10,8 +10,8 @@ use super::contact::{Contact, force_by_angle};
 use super::dormand_prince::System;
 use super::guard::Guard;
 use super::virtual_constraints::VirtualConstraints;
-use crate::body::{InverseDynamics, PointState, WalkerModel};
-use crate::gait::{Axis, Gait};
+use crate::body::{Axis, InverseDynamics, PointState, WalkerModel};
+use crate::gait::Gait;
 use crate::walking::{CYCLE, Domain, DomainKind};
 use nalgebra::{SMatrix, SVector};
 
@@ -41,7 +41,7 @@ pub(super) struct Control<'a> {
     pub(super) domain: Domain,
     pub(super) contacts: Vec<Contact>,
     pub(super) constraints: VirtualConstraints,
-    pub(super) guard: Guard,
+    guard: Guard,
     /// Gain of the hip velocity if it is an output, 1/s; 0 for a free hip velocity.
     pub(super) hip_gain: f64,
     /// Planned duration, s.
@@ -239,8 +239,34 @@ impl<'a> Control<'a> {
     }
 
     /// d(contact force of a row)/d(state), if the motion determines it.
-    pub(super) fn force_by_state(&self, x: &State, row: usize) -> Option<State> {
+    fn force_by_state(&self, x: &State, row: usize) -> Option<State> {
         self.unknowns_by_state(x).map(|unknowns| unknowns.row(9 + row).transpose())
+    }
+
+    /// Value at a state; `None` if the motion is not determined.
+    pub(super) fn guard_value(&self, x: &State) -> Option<f64> {
+        let (q, qd) = split(x);
+        match &self.guard {
+            Guard::Landing(contact) => Some(contact.position(&PointState::new(&q, &qd, &[0.0; 9]))),
+            Guard::Unloading(row) => self.force(x, *row),
+            Guard::Plan => Some(1.0 - self.constraints.phase(&q, &qd, &[0.0; 9]).s),
+        }
+    }
+
+    /// Derivative with respect to the state.
+    pub(super) fn guard_gradient(&self, x: &State) -> Option<State> {
+        let (q, qd) = split(x);
+        match &self.guard {
+            Guard::Landing(contact) => {
+                let gradient = contact.gradient(&PointState::new(&q, &qd, &[0.0; 9]));
+                Some(State::from_fn(|i, _| if i < 9 { gradient[i] } else { 0.0 }))
+            }
+            Guard::Unloading(row) => self.force_by_state(x, *row),
+            Guard::Plan => {
+                let gradient = self.constraints.phase_gradient();
+                Some(State::from_fn(|i, _| if (2..9).contains(&i) { -gradient[i - 2] } else { 0.0 }))
+            }
+        }
     }
 }
 

@@ -11,9 +11,8 @@
 
 use super::control::{Control, State, split};
 use super::hybrid_walker::{Fall, HybridWalker};
-use super::return_map::{SECTION, Section, section, with_section};
-use crate::body::PointState;
-use crate::gait::Axis;
+use super::poincare_section::{SECTION, Section, section, with_section};
+use crate::body::{Axis, PointState};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Largest step of the differences, rad and rad/s. Each further step is half the previous one.

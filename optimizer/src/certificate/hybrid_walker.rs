@@ -147,7 +147,7 @@ impl<'a> HybridWalker<'a> {
             let (duration, end) = self.to_event(d, &system, &begin, &mut |_, _, _| {})?;
             let (before, flow) = split_variational(&end);
             let motion = control.derivative(&before).ok_or_else(singular)?;
-            let gradient = control.guard.gradient(control, &before).ok_or_else(singular)?;
+            let gradient = control.guard_gradient(&before).ok_or_else(singular)?;
             let projection = StateMatrix::identity() - motion * gradient.transpose() / gradient.dot(&motion);
             let opens = CYCLE[(d + 1) % CYCLE.len()];
             let jump = reset_by_state(self.model, opens, &before).ok_or_else(singular)?;
@@ -168,9 +168,8 @@ impl<'a> HybridWalker<'a> {
         let control = &self.controls[d];
         let name = control.domain.name();
         let failed = |e: StepError| not_integrable(name, &e.to_string());
-        let guard = |z: &SVector<f64, N>| {
-            control.guard.value(control, &walker_part(z)).ok_or_else(|| failed(StepError::Singular))
-        };
+        let guard =
+            |z: &SVector<f64, N>| control.guard_value(&walker_part(z)).ok_or_else(|| failed(StepError::Singular));
         let mut last = guard(start)?;
         if last <= 0.0 {
             return Err(Fall::BeginsBeyondGuard { domain: name, amount: -last });
@@ -213,8 +212,8 @@ fn refine<const N: usize, S: System<N>>(
     let mut length = guess.clamp(0.0, step.length);
     for _ in 0..EVENT_REFINEMENTS {
         let x = walker_part(&step.retake(system, length).map_err(failed)?.end);
-        let value = control.guard.value(control, &x).ok_or_else(singular)?;
-        let gradient = control.guard.gradient(control, &x).ok_or_else(singular)?;
+        let value = control.guard_value(&x).ok_or_else(singular)?;
+        let gradient = control.guard_gradient(&x).ok_or_else(singular)?;
         let rate = gradient.dot(&control.derivative(&x).ok_or_else(singular)?);
         if rate >= 0.0 {
             return Err(not_integrable(name, "the trajectory only grazes the event that ends the domain"));

@@ -1,7 +1,7 @@
 //! Residuals of C5 to C12.
 
-use super::check::{Place, Quantity, Worst};
-use super::residuals::{Findings, GridPoint, Measured};
+use super::check::{CheckLocation, Quantity, Worst};
+use super::findings::{Findings, GridPoint, Measured};
 use crate::gait::MuscleTrajectory;
 use crate::gait::motion::MuscleInstant;
 use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
@@ -59,7 +59,12 @@ pub(super) fn note_written(
 }
 
 /// Continuity of the fibre lengths from one domain to the next.
-pub(super) fn note_reset(before: &MuscleTrajectory, after: &MuscleTrajectory, place: Place<'_>, worst: &mut Worst) {
+pub(super) fn note_reset(
+    before: &MuscleTrajectory,
+    after: &MuscleTrajectory,
+    place: CheckLocation<'_>,
+    worst: &mut Worst,
+) {
     if let (Some(last), Some(first)) = (before.fibre_length.last(), after.fibre_length.first()) {
         let jump = last.iter().zip(first).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         worst.note(RESET, jump, place);

@@ -7,8 +7,7 @@
 
 use super::control::{State, join, split};
 use super::hybrid_walker::{COARSE, Fall, HybridWalker};
-use crate::body::InverseDynamics;
-use crate::body::PointState;
+use crate::body::{InverseDynamics, PointState};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 

@@ -1,33 +1,18 @@
 //! Residuals of C1 to C4 at the nodes and on a grid ten times finer.
 
-use super::check::{Check, Place, Quantity, Worst};
+use super::check::{Check, CheckLocation, Quantity, Worst};
 use super::contact::Contact;
-use super::limits::{FRICTION_THRESHOLD_N, Limits, depth_below_ground};
+use super::findings::{Findings, GridPoint, Measured};
+use super::limit_excess::{AllowedRanges, FRICTION_THRESHOLD_N, depth_below_ground};
 use super::muscle_residuals;
 use super::virtual_constraints::VirtualConstraints;
-use crate::body::{GRAVITY, InverseDynamics, PointState, WalkerModel};
+use crate::body::{Axis, FootPoint, GRAVITY, InverseDynamics, PointState, Side, WalkerModel};
+use crate::gait::Gait;
 use crate::gait::motion::{Instant, instant};
-use crate::gait::{Axis, FootPoint, Gait, Side};
 use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
 /// Number of grid points between adjacent nodes.
 pub(super) const REFINEMENT: usize = 10;
-
-/// A quantity with two limits: at the nodes, where the gait problem imposes the constraint, and between them, where the
-/// error depends on the mesh. Quantities of torques and muscle states have no limit between nodes (`None`), because no
-/// device executes these parabolas; the closed loop checks the torques of the controller.
-pub(super) struct Measured {
-    name: &'static str,
-    unit: &'static str,
-    at_points: f64,
-    between: Option<f64>,
-}
-
-impl Measured {
-    pub(super) const fn new(name: &'static str, unit: &'static str, at_points: f64, between: Option<f64>) -> Self {
-        Self { name, unit, at_points, between }
-    }
-}
 
 // At nodes: 1e-6, the tolerance of a converged gait, times the scale of the row in the gait problem.
 const FORCE: Measured = Measured::new("C1 equations of motion, forces", "N", 1e-4, None);
@@ -57,39 +42,6 @@ const RESET: Quantity = Quantity::judged("C2 continuity of the stride", "rad", 3
 const TOUCHDOWN: Quantity = Quantity::judged("C3 touchdown speed", "m/s", 1e-6);
 const STRIDE: Quantity = Quantity::judged("C4 hip velocity (a3, a4), steps, speed, durations", "m, s", 1e-6);
 
-/// A grid point.
-pub(super) struct GridPoint<'a> {
-    pub(super) instant: &'a Instant,
-    place: Place<'a>,
-    on_mesh: bool,
-}
-
-/// The worst values at the nodes, between them, and of quantities of the whole stride.
-#[derive(Default)]
-pub(super) struct Findings {
-    at_points: Worst,
-    between: Worst,
-    pub(super) other: Worst,
-}
-
-impl Findings {
-    pub(super) fn note(&mut self, point: &GridPoint<'_>, measured: &Measured, value: f64) {
-        let (worst, limit) = if point.on_mesh {
-            (&mut self.at_points, Some(measured.at_points))
-        } else {
-            (&mut self.between, measured.between)
-        };
-        worst.note(Quantity { name: measured.name, unit: measured.unit, limit }, value, point.place);
-    }
-
-    fn into_checks(self) -> Vec<Check> {
-        let mut checks = self.at_points.into_checks(", at nodes");
-        checks.extend(self.between.into_checks(", between nodes"));
-        checks.extend(self.other.into_checks(""));
-        checks
-    }
-}
-
 /// Largest absolute value.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.map(f64::abs).fold(0.0, f64::max)
@@ -97,7 +49,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Measures a well-formed gait without simulation.
 pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
-    let limits = Limits::new(gait);
+    let limits = AllowedRanges::new(gait);
     let table = gait.settings.muscles.muscles(&gait.subject);
     let mut worst = Findings::default();
     for (d, trajectory) in gait.domains.iter().enumerate() {
@@ -121,7 +73,7 @@ pub(super) fn residuals(model: &WalkerModel, gait: &Gait) -> Vec<Check> {
             if let (Some(muscles), Some(written)) = (&mut here.muscles, written) {
                 muscles.fibre_length = written;
             }
-            let point = GridPoint { instant: &here, place: Place::within(trajectory, share), on_mesh };
+            let point = GridPoint { instant: &here, place: CheckLocation::within(trajectory, share), on_mesh };
             if let (Some(written), Some(of_cubic)) = (written, of_cubic) {
                 muscle_residuals::note_written(&point, &written, &of_cubic, &mut worst);
             }
@@ -143,7 +95,7 @@ struct DomainResiduals<'a> {
     gait: &'a Gait,
     d: usize,
     domain: Domain,
-    limits: &'a Limits,
+    limits: &'a AllowedRanges,
     contacts: Vec<Contact>,
     constraints: VirtualConstraints,
 }
@@ -256,7 +208,7 @@ impl DomainResiduals<'_> {
     }
 
     /// Checks the impulses of an impact: their limit, and the friction cone at heel strike.
-    fn impulses(&self, kind: DomainKind, impulse: &[f64], place: Place<'_>, worst: &mut Worst) {
+    fn impulses(&self, kind: DomainKind, impulse: &[f64], place: CheckLocation<'_>, worst: &mut Worst) {
         let limits = &self.gait.settings.limits;
         worst.note(IMPULSE_SIZE, largest(impulse.iter().copied()) - limits.impulse_max_n_s, place);
         if let (DomainKind::Ds2, [tangential, normal, ..]) = (kind, impulse) {
@@ -281,7 +233,7 @@ impl DomainResiduals<'_> {
     fn reset(&self, worst: &mut Findings) {
         let next = (self.d + 1) % CYCLE.len();
         let (from, to) = (&self.gait.domains[self.d], &self.gait.domains[next]);
-        let place = Place::within(from, 1.0);
+        let place = CheckLocation::within(from, 1.0);
         let (Some(q), Some(qd)) = (from.q.last(), from.qd.last()) else { return };
         let mut position_jump: [f64; 9] = std::array::from_fn(|i| to.q[0][i] - q[i]);
         if next == 0 {
@@ -321,7 +273,7 @@ impl DomainResiduals<'_> {
 /// C4 over the whole stride.
 fn stride(gait: &Gait, worst: &mut Findings) {
     let (limits, bounds) = (&gait.settings.limits, &gait.bounds);
-    let place = Place { domain: "stride", time_s: 0.0 };
+    let place = CheckLocation { domain: "stride", time_s: 0.0 };
     let mut range = |value: f64, low: f64, high: f64| worst.other.note(STRIDE, (low - value).max(value - high), place);
     for velocity in gait.hip_velocity_m_s {
         range(velocity, bounds.a3, bounds.a4);

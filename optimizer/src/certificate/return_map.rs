@@ -6,14 +6,11 @@
 use super::control::{State, StateMatrix, split};
 use super::domain_differences::{ByDifferences, by_differences, possible_directions};
 use super::hybrid_walker::{Fall, HybridWalker};
+use super::poincare_section::{SECTION, Section, section, with_section};
 use nalgebra::linalg::Schur;
-use nalgebra::{DMatrix, SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Serialize};
 
-/// Dimension of the section.
-pub(super) const SECTION: usize = 17;
-/// A state without px.
-pub(super) type Section = SVector<f64, SECTION>;
 /// Derivative of the map.
 type SectionMatrix = SMatrix<f64, SECTION, SECTION>;
 
@@ -87,14 +84,6 @@ impl ReturnMap {
     pub fn is_stable(&self) -> bool {
         self.largest < 1.0
     }
-}
-
-pub(super) fn section(x: &State) -> Section {
-    Section::from_column_slice(&x.as_slice()[1..])
-}
-
-pub(super) fn with_section(x: &State, section: &Section) -> State {
-    State::from_fn(|i, _| if i == 0 { x[0] } else { section[i - 1] })
 }
 
 fn section_matrix(derivative: &StateMatrix) -> SectionMatrix {

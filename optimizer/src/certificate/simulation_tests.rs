@@ -3,7 +3,7 @@
 use super::control::{BANDWIDTH, Control, State, join, split};
 use super::dormand_prince::System;
 use super::hybrid_walker::HybridWalker;
-use super::limits::Limits;
+use super::limit_excess::AllowedRanges;
 use super::return_map::return_map;
 use crate::body::{Chain, GRAVITY, PointState, WalkerModel};
 use crate::gait::motion::instant;
@@ -16,7 +16,7 @@ fn gait() -> &'static Gait {
     GAIT.get_or_init(|| {
         let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
         problem.settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 2, ss1: 4 };
-        let options = SolveOptions { cold_guesses: 1, ..SolveOptions::default() };
+        let options = SolveOptions { initial_guesses: 1, ..SolveOptions::default() };
         let outcome = solve(&problem, None, &options, &mut |_| {}, &CancelToken::new()).unwrap();
         assert_eq!(outcome.report.status, SolveStatus::Converged);
         outcome.gait
@@ -67,15 +67,15 @@ fn derivatives_of_motion_and_guards_match_finite_differences() {
         for row in 0..18 {
             assert_derivative(&exact.row(row).transpose(), |x| control.derivative(x).unwrap()[row], &x);
         }
-        let gradient = control.guard.gradient(control, &x).unwrap();
-        assert_derivative(&gradient, |x| control.guard.value(control, x).unwrap(), &x);
+        let gradient = control.guard_gradient(&x).unwrap();
+        assert_derivative(&gradient, |x| control.guard_value(x).unwrap(), &x);
     }
 }
 
 #[test]
 fn accelerations_satisfy_contacts_and_output_dynamics() {
     let model = model();
-    let limits = Limits::new(gait());
+    let limits = AllowedRanges::new(gait());
     for (d, (control, x)) in controls(&model).iter().zip(states()).enumerate() {
         let (q, qd) = split(&x);
         let qdd = control.acceleration(&x).unwrap();
@@ -139,7 +139,7 @@ fn energy(model: &WalkerModel, x: &State) -> f64 {
 #[test]
 fn energy_changes_by_the_work_of_the_joints() {
     let model = model();
-    let limits = Limits::new(gait());
+    let limits = AllowedRanges::new(gait());
     let walker = HybridWalker::new(&model, gait());
     for (d, control) in walker.controls.iter().enumerate() {
         let domain = &gait().domains[d];

@@ -7,9 +7,8 @@
 //! motion may cross it slightly; the slack measures by how much.
 
 use super::control::{Control, State, split};
-use super::limits::Limits;
-use crate::body::{InverseDynamics, PointState};
-use crate::gait::{Axis, Side};
+use super::limit_excess::AllowedRanges;
+use crate::body::{Axis, InverseDynamics, PointState, Side};
 use crate::walking::DomainKind;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
@@ -39,7 +38,7 @@ struct Rows {
 
 impl Control<'_> {
     /// Torques and forces of an acceleration; `None` if no forces produce it. The caller checks the limits.
-    pub(super) fn effort(&self, x: &State, qdd: &[f64; 9], plan: &[f64; 6], limits: &Limits) -> Option<Effort> {
+    pub(super) fn effort(&self, x: &State, qdd: &[f64; 9], plan: &[f64; 6], limits: &AllowedRanges) -> Option<Effort> {
         let (q, qd) = split(x);
         let state = PointState::new(&q, &qd, qdd);
         let wanted = InverseDynamics::new(self.model).rows(&state);
@@ -64,7 +63,7 @@ impl Control<'_> {
         wanted: &[f64; 9],
         gradients: &[[f64; 9]],
         plan: &[f64; 6],
-        limits: &Limits,
+        limits: &AllowedRanges,
     ) -> Option<Vec<f64>> {
         let count = gradients.len();
         // u = offset + slope f, in the units of the programme.

@@ -20,7 +20,7 @@ pub(super) struct VirtualConstraints {
 
 /// The phase s with its first two time derivatives.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Phase {
+pub(super) struct PhaseVariable {
     pub(super) s: f64,
     pub(super) rate: f64,
     pub(super) acceleration: f64,
@@ -53,9 +53,9 @@ impl VirtualConstraints {
     }
 
     /// Phase with its time derivatives.
-    pub(super) fn phase(&self, q: &[f64; 9], qd: &[f64; 9], qdd: &[f64; 9]) -> Phase {
+    pub(super) fn phase(&self, q: &[f64; 9], qd: &[f64; 9], qdd: &[f64; 9]) -> PhaseVariable {
         let [position, velocity, acceleration] = self.hip(q, qd, qdd);
-        Phase {
+        PhaseVariable {
             s: (position - self.start) / self.width,
             rate: velocity / self.width,
             acceleration: acceleration / self.width,

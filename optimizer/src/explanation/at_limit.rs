@@ -2,9 +2,9 @@
 
 use super::bound::{Level, loosened};
 use super::conflict::BoundSet;
-use crate::gait_problem::GaitProgramme;
-use crate::nlp::NonlinearProgram;
-use crate::solve::{GaitProblem, SolveError};
+use crate::gait_problem::{GaitProblem, GaitProgramme};
+use crate::solve::SolveError;
+use interior_point::NonlinearProgram;
 
 /// Largest distance from a limit, in scaled units, at which it counts as reached.
 const AT_LIMIT: f64 = 1e-4;

@@ -1,8 +1,8 @@
 //! Relaxation of tuned bounds: direction, range and steps.
 
 use super::conflict::BoundSet;
-use crate::bounds::TunedBounds;
 use crate::subject::ModelError;
+use crate::tuned_bounds::TunedBounds;
 
 /// Number of significant digits of relaxed values.
 const DIGITS: i32 = 3;

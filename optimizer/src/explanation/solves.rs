@@ -1,15 +1,16 @@
 //! The solves of an explanation: tests whether bounds have a gait, with a memory of earlier results.
 
 use super::bound::{halfway, is_as_loose, way};
-use crate::bounds::TunedBounds;
+use crate::gait_problem::GaitProblem;
 use crate::solve::{
-    CONVERGED_VIOLATION, CancelToken, ColdGuess, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveStatus,
-    Violation, WarmStart, solve_from_guesses, solve_from_warm_start,
+    CONVERGED_VIOLATION, CancelToken, InitialGuess, SolveError, SolveOptions, SolveOutcome, SolveStatus, Violation,
+    WarmStart, solve_from_guesses, solve_from_warm_start,
 };
+use crate::tuned_bounds::TunedBounds;
 use std::cmp::Ordering;
 
 /// Initial guesses that are tried if the nearest gait leads to none: those that find gaits near the boundary of feasibility.
-const COLD: [ColdGuess; 3] = [ColdGuess::NATURAL, ColdGuess::EARLY_RISE, ColdGuess::CATALOGUE[2]];
+const COLD: [InitialGuess; 3] = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE, InitialGuess::MULTI_START[2]];
 /// Iteration limits of a phase in cold and warm solves. Solves that converge need fewer iterations.
 const MAX_ITERATIONS: usize = 400;
 const MAX_ITERATIONS_WARM: usize = 250;

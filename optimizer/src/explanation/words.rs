@@ -87,14 +87,14 @@ impl Conflict {
         };
         let (claim, tried, relief) = match quantities.as_slice() {
             [] => {
-                let wishes = if self.wishes.is_empty() {
+                let naturalness_terms = if self.naturalness_terms.is_empty() {
                     String::new()
                 } else {
-                    format!(", among them: {}", list(&self.wishes))
+                    format!(", among them: {}", list(&self.naturalness_terms))
                 };
                 (
                     format!(
-                        "The conflict does not depend on tuned bounds: fixed constraints conflict with each other{wishes}"
+                        "The conflict does not depend on tuned bounds: fixed constraints conflict with each other{naturalness_terms}"
                     ),
                     "with every tuned bound at its loosest value".to_owned(),
                     "",
@@ -220,7 +220,7 @@ impl Explanation {
 mod tests {
     use super::super::RelaxedBound;
     use super::*;
-    use crate::bounds::TunedBounds;
+    use crate::tuned_bounds::TunedBounds;
 
     fn named(bound: usize) -> (String, String) {
         (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned())
@@ -248,7 +248,7 @@ mod tests {
         Conflict {
             bounds: bounds.iter().map(given).collect(),
             without: Vec::new(),
-            wishes: Vec::new(),
+            naturalness_terms: Vec::new(),
             violations: missed("SS1_R point 12, C3 forward hip velocity"),
             starts: 5,
             undecided: false,
@@ -316,7 +316,7 @@ mod tests {
         let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words();
         assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5 °"), "{three}");
         assert!(three.ends_with("With any one of them at its loosest value as well, there is a gait."), "{three}");
-        let fixed = Conflict { wishes: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
+        let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
         assert_eq!(
             fixed,
             "The conflict does not depend on tuned bounds: fixed constraints conflict with each other, among them: a slow start: \

@@ -1,8 +1,8 @@
 //! The controller file: the data that the device needs to execute a gait. The file explains its own fields.
 
-use super::{RATE_RANGE_HZ, samples};
-use crate::body::WalkerModel;
-use crate::gait::{Gait, Side};
+use super::samples::{RATE_RANGE_HZ, samples};
+use crate::body::{Side, WalkerModel};
+use crate::gait::Gait;
 use crate::subject::ModelError;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE, DomainKind, basis, phase_gradient};
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 //! In OpenSim, pelvis_tilt and lumbar_extension are positive backwards and knee_angle is negative in flexion. The
 //! walker has one link for pelvis and trunk, so lumbar_extension is 0, and hip_flexion is the hip angle of the walker.
 
-use super::samples;
+use super::samples::samples;
 use crate::gait::Gait;
 use crate::subject::ModelError;
 use std::fmt::Write;

@@ -5,9 +5,8 @@ use super::layout::{FORCE, PointVariables, Q, QD};
 use super::mechanics::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
 use super::programme::{GaitProgramme, PointContext};
 use super::rows::{HeightRow, PointRows};
-use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
-use crate::gait::{Axis, Side};
+use crate::body::{Axis, PointState, Side};
 use crate::walking::{DomainKind, clearance_profile};
 
 /// Scale of a friction row, 1/N.

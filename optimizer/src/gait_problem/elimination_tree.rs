@@ -12,10 +12,10 @@
 //! * the root: durations, hip velocities, lengths and the transition that closes the stride.
 
 use super::layout::{Layout, QD, QDD};
-use super::rows::{Place, RowKind, RowTable};
+use super::rows::{RowKind, RowPlace, RowTable};
 use crate::muscle::MUSCLE_COUNT;
-use crate::nlp::EliminationBlocks;
 use crate::walking::{BEZIER_COEFFICIENTS, CYCLE};
+use interior_point::EliminationBlocks;
 
 /// Transitions in order of elimination, each with its parent; the last one is part of the root.
 const TRANSITION_PARENTS: [(usize, usize); 7] = [(0, 1), (2, 1), (4, 5), (6, 5), (1, 3), (5, 3), (3, ROOT)];
@@ -145,9 +145,9 @@ pub(super) fn elimination_tree(layout: &Layout, rows: &RowTable, activations_are
     }
     for (row, name) in rows.names.iter().enumerate() {
         tree.block_of_row[row] = match name.place {
-            Place::Stride => root,
-            Place::Transition { domain } => transitions[usize::from(domain)],
-            Place::Point { domain, point } => {
+            RowPlace::Stride => root,
+            RowPlace::Transition { domain } => transitions[usize::from(domain)],
+            RowPlace::Point { domain, point } => {
                 let (d, k) = (usize::from(domain), usize::from(point));
                 let blocks = &domains[d];
                 let into_impact = CYCLE[(d + 1) % CYCLE.len()].opens_with_impact();

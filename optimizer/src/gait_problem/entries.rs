@@ -1,6 +1,6 @@
 //! Sparse derivatives: the same traversal first records the sparsity structure and later writes the values.
 
-use crate::nlp::SparsityPattern;
+use interior_point::SparsityPattern;
 
 /// Receives entries (row, column, value) of a sparse matrix in a fixed order of calls.
 pub struct Entries<'a> {
@@ -63,33 +63,8 @@ pub struct Compressed {
 impl Compressed {
     /// Compresses recorded entries to columns with increasing unique rows.
     pub fn new(rows: usize, columns: usize, entries: &[(usize, usize)]) -> Self {
-        let mut order: Vec<u32> = (0..u32::try_from(entries.len()).unwrap_or(u32::MAX)).collect();
-        order.sort_unstable_by_key(|&e| {
-            let (row, column) = entries[e as usize];
-            (column, row)
-        });
-        let mut pattern = SparsityPattern {
-            rows,
-            columns,
-            column_starts: Vec::with_capacity(columns + 1),
-            row_indices: Vec::with_capacity(entries.len()),
-        };
-        let mut slots = vec![0; entries.len()];
-        let mut last = None;
-        for &e in &order {
-            let (row, column) = entries[e as usize];
-            if last != Some((row, column)) {
-                while pattern.column_starts.len() <= column {
-                    pattern.column_starts.push(pattern.row_indices.len());
-                }
-                pattern.row_indices.push(row);
-                last = Some((row, column));
-            }
-            slots[e as usize] = u32::try_from(pattern.row_indices.len() - 1).unwrap_or(u32::MAX);
-        }
-        while pattern.column_starts.len() <= columns {
-            pattern.column_starts.push(pattern.row_indices.len());
-        }
+        let (pattern, positions) = SparsityPattern::from_entries(rows, columns, entries);
+        let slots = positions.into_iter().map(|position| u32::try_from(position).unwrap_or(u32::MAX)).collect();
         Self { pattern, slots }
     }
 }

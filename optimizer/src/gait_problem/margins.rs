@@ -1,44 +1,21 @@
-//! Margins: tightened bounds at nodes, so that the gait satisfies the bounds between nodes too.
-//!
-//! A gait satisfies its constraints at nodes, but may violate a bound between two nodes at the bound. The violation is subtracted
-//! from the bound at both nodes, and the solve continues (an exchange method of semi-infinite programming, Hettich and Kortanek
-//! 1993, section 7).
+//! Margins by which bounds at nodes are tightened, so that the gait also satisfies them between the nodes.
 
-use super::contact_limits::{FRICTION_SCALE, HEIGHT_SCALE, height_row};
-use super::layout::{DomainLayout, FORCE, Q, QD, QDD, U};
 use super::programme::GaitProgramme;
-use crate::body::{COORDINATES, JOINTS, PointState};
-use crate::gait::motion::{Instant, instant};
-use crate::gait::{Axis, Gait};
-use crate::muscle::MUSCLE_COUNT;
-use crate::nlp::NonlinearProgram;
+use interior_point::NonlinearProgram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Number of parts into which the check divides the interval between adjacent nodes.
-const PARTS: usize = 10;
 /// Largest margin, as a share of the range.
 const LARGEST_SHARE: f64 = 0.25;
-
-// Tolerances between nodes: half of the limits of the certificate.
-const ANGLE_RAD: f64 = 0.005;
-const SPEED_RAD_S: f64 = 0.05;
-const ACCELERATION_RAD_S2: f64 = 2.5;
-const TORQUE_N_M: f64 = 1.0;
-const HEIGHT_M: f64 = 5e-4;
-const NORMAL_FORCE_N: f64 = 2.5;
-const FRICTION_N: f64 = 6.0;
-/// Share of the largest activation and of the largest fibre velocity.
-const MUSCLE_SHARE: f64 = 0.025;
 
 /// Margins of variables and rows, in scaled units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(into = "MarginLists", from = "MarginLists")]
 pub struct Margins {
     /// For each variable, the margins of the lower and the upper bound.
-    variables: BTreeMap<usize, [f64; 2]>,
+    pub(super) variables: BTreeMap<usize, [f64; 2]>,
     /// For each row, the margin of the lower bound.
-    rows: BTreeMap<usize, f64>,
+    pub(super) rows: BTreeMap<usize, f64>,
 }
 
 /// Serialised form: lists, because JSON keys are strings.
@@ -61,15 +38,6 @@ impl From<MarginLists> for Margins {
     }
 }
 
-/// Violations of a gait between its nodes.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Excess {
-    /// The violations, as margins of the adjacent nodes.
-    margins: Margins,
-    /// The largest violation, as a multiple of its tolerance.
-    pub worst: f64,
-}
-
 impl Margins {
     /// Whether no bound is tightened.
     pub fn is_empty(&self) -> bool {
@@ -84,14 +52,14 @@ impl Margins {
     }
 
     /// Adds violations to the margins.
-    pub fn grow(&mut self, excess: &Excess) {
-        for (&variable, by) in &excess.margins.variables {
+    pub fn grow(&mut self, by: &Self) {
+        for (&variable, by) in &by.variables {
             let margin = self.variables.entry(variable).or_default();
             for (margin, by) in margin.iter_mut().zip(by) {
                 *margin += by;
             }
         }
-        for (&row, by) in &excess.margins.rows {
+        for (&row, by) in &by.rows {
             *self.rows.entry(row).or_default() += by;
         }
     }
@@ -102,7 +70,8 @@ impl Margins {
         of_variables.count() + self.rows.len()
     }
 
-    /// The margins that are relevant at the point `x`: those with a distance to the tightened bound of at most the margin.
+    /// The margins that are relevant at the point `x`: those with a distance to the tightened bound of at most the
+    /// margin.
     #[must_use]
     pub fn bearing_on(&self, programme: &GaitProgramme, x: &[f64]) -> Self {
         let mut values = vec![0.0; programme.rows.names.len()];
@@ -123,7 +92,7 @@ impl Margins {
     }
 
     /// Tightens bounds: those of variables by at most a share of their range, those of fixed variables not at all.
-    pub(super) fn apply(&self, lower: &mut [f64], upper: &mut [f64], row_lower: &mut [f64]) {
+    fn apply(&self, lower: &mut [f64], upper: &mut [f64], row_lower: &mut [f64]) {
         for (&at, [low, high]) in &self.variables {
             let most = LARGEST_SHARE * (upper[at] - lower[at]);
             lower[at] += low.min(most);
@@ -135,213 +104,19 @@ impl Margins {
     }
 }
 
-impl Excess {
-    /// Adds a value of a variable between two nodes.
-    fn note_variable(&mut self, programme: &GaitProgramme, points: [usize; 2], value: f64, left_alone: f64) {
-        for variable in points {
-            let (low, high) = programme.variable_range(variable);
-            self.note_side(programme, variable, 0, low - value, left_alone);
-            self.note_side(programme, variable, 1, value - high, left_alone);
-        }
-    }
-
-    /// Adds a violation; `side` is 0 for the lower and 1 for the upper bound.
-    fn note_side(&mut self, programme: &GaitProgramme, variable: usize, side: usize, beyond: f64, left_alone: f64) {
-        if beyond > 0.5 * left_alone {
-            self.worst = self.worst.max(beyond / left_alone);
-            let margin = &mut self.margins.variables.entry(variable).or_default()[side];
-            *margin = margin.max(beyond / programme.layout.scale[variable]);
-        }
-    }
-
-    fn note_row(&mut self, row: usize, missing: f64, left_alone: f64) {
-        if missing > 0.5 * left_alone {
-            self.worst = self.worst.max(missing / left_alone);
-            let margin = self.margins.rows.entry(row).or_default();
-            *margin = margin.max(missing);
-        }
-    }
-}
-
-/// The violations between nodes of `gait`, the gait of the point `x` of `programme`: coordinates, torques, activations, fibre
-/// velocities, foot heights, normal forces and friction.
-pub fn excess_between_points(programme: &GaitProgramme, gait: &Gait, x: &[f64]) -> Excess {
-    let mut values = vec![0.0; programme.rows.names.len()];
-    programme.constraints(x, &mut values);
-    let mut excess = Excess::default();
-    for (d, layout) in programme.layout.domains.iter().enumerate() {
-        let gaps = layout.points - 1;
-        for gap in 0..gaps {
-            for part in 1..PARTS {
-                let share = (gap as f64 + part as f64 / PARTS as f64) / gaps as f64;
-                let now = instant(&gait.domains[d], share);
-                note_variables(programme, layout, gap, &now, &mut excess);
-                note_heights(programme, (d, gap, share), &now, x, &mut excess);
-                note_forces(programme, (d, gap, share), &now, &values, &mut excess);
-            }
-        }
-    }
-    excess
-}
-
-fn note_variables(programme: &GaitProgramme, layout: &DomainLayout, gap: usize, now: &Instant, excess: &mut Excess) {
-    let beside = |offset: usize| [layout.point(gap) + offset, layout.point(gap + 1) + offset];
-    for i in 0..COORDINATES {
-        // The bounds of the hip position are artificial.
-        if i >= 2 {
-            excess.note_variable(programme, beside(Q + i), now.q[i], ANGLE_RAD);
-        }
-        excess.note_variable(programme, beside(QD + i), now.qd[i], SPEED_RAD_S);
-        excess.note_variable(programme, beside(QDD + i), now.qdd[i], ACCELERATION_RAD_S2);
-    }
-    for i in 0..JOINTS {
-        excess.note_variable(programme, beside(U + i), now.u[i], TORQUE_N_M);
-    }
-    if let Some(muscles) = &now.muscles {
-        for m in 0..MUSCLE_COUNT {
-            let fastest = programme.muscles[m].max_speed;
-            let velocity = muscles.fibre_velocity[m];
-            excess.note_variable(programme, beside(layout.activation() + m), muscles.activation[m], MUSCLE_SHARE);
-            excess.note_variable(programme, beside(layout.fibre_velocity() + m), velocity, MUSCLE_SHARE * fastest);
-        }
-    }
-}
-
-fn note_heights(
-    programme: &GaitProgramme,
-    (d, gap, share): (usize, usize, f64),
-    now: &Instant,
-    x: &[f64],
-    excess: &mut Excess,
-) {
-    let state = PointState::new(&now.q, &now.qd, &now.qdd);
-    for k in [gap, gap + 1] {
-        for height in &programme.rows.domains[d].points[k].heights {
-            let value = height_row(programme, d, share, &state, *height, x);
-            excess.note_row(height.row, -value, HEIGHT_M * HEIGHT_SCALE);
-        }
-    }
-}
-
-fn note_forces(
-    programme: &GaitProgramme,
-    (d, gap, share): (usize, usize, f64),
-    now: &Instant,
-    values: &[f64],
-    excess: &mut Excess,
-) {
-    let layout = &programme.layout.domains[d];
-    for (c, _) in programme.contacts[d].iter().enumerate().filter(|(_, row)| row.axis == Axis::Z) {
-        for k in [gap, gap + 1] {
-            // The limit is 0, because some bounds at nodes are the load of a foot before lift-off.
-            excess.note_side(programme, layout.point(k) + FORCE + c, 0, -now.forces[c], NORMAL_FORCE_N);
-        }
-    }
-    // Forces are parabolas, and the edges of the cone are linear in them.
-    let points = &programme.rows.domains[d].points;
-    let first = gap - gap % 2;
-    let s = 0.5 * (share * (layout.points - 1) as f64 - first as f64);
-    let parabola = [(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)];
-    for edge in 0..points[gap].friction_edges {
-        let value: f64 = (0..3).map(|i| parabola[i] * values[points[first + i].friction + edge]).sum();
-        for k in [gap, gap + 1] {
-            excess.note_row(points[k].friction + edge, -value, FRICTION_N * FRICTION_SCALE);
-        }
+impl GaitProgramme {
+    /// The problem with tightened bounds.
+    #[must_use]
+    pub fn tightened(&self, margins: &Margins) -> Self {
+        let mut programme = self.clone();
+        margins.apply(&mut programme.bounds.lower, &mut programme.bounds.upper, &mut programme.rows.lower);
+        programme
     }
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::gait_problem::gait_of;
-    use crate::solve::GaitProblem;
-    use crate::subject::Subject;
-
-    /// A problem, and a posture at rest high above the ground that satisfies all bounds, with positive normal forces.
-    fn hanging() -> (GaitProblem, GaitProgramme, Vec<f64>) {
-        let problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
-        let programme = problem.programme(false).unwrap();
-        let mut x = vec![0.0; programme.layout.variables];
-        for (d, layout) in programme.layout.domains.iter().enumerate() {
-            x[layout.duration] = 1.0;
-            for k in 0..layout.points {
-                let mut point = programme.layout.point_variables(&x, d, k);
-                point.q[1] = 2.0;
-                (point.q[4], point.q[7]) = (0.3, 0.3);
-                for (force, row) in point.force.iter_mut().zip(&programme.contacts[d]) {
-                    *force = if row.axis == Axis::Z { 100.0 } else { 0.0 };
-                }
-                programme.layout.set_point_variables(&mut x, d, k, &point);
-            }
-        }
-        (problem, programme, x)
-    }
-
-    fn excess(problem: &GaitProblem, programme: &GaitProgramme, x: &[f64]) -> Excess {
-        excess_between_points(programme, &gait_of(problem, programme, x), x)
-    }
-
-    #[test]
-    fn joint_violation_between_nodes_is_found_at_its_place_only() {
-        let (problem, programme, mut x) = hanging();
-        assert_eq!(excess(&problem, &programme, &x), Excess::default());
-        let layout = &programme.layout.domains[2];
-        let knee = |k: usize, block: usize| layout.point(k) + block + 4;
-        let scale = &programme.layout.scale;
-        let (_, most) = programme.variable_range(knee(5, Q));
-        for (k, speed) in [(5, 3.0), (6, -3.0)] {
-            x[knee(k, Q)] = most / scale[knee(k, Q)];
-            x[knee(k, QD)] = speed / scale[knee(k, QD)];
-        }
-        let found = excess(&problem, &programme, &x);
-        assert!(found.worst > 1.0, "{}", found.worst);
-        let of_angles: Vec<_> =
-            found.margins.variables.iter().filter(|(at, _)| [4, 5, 6, 7].map(|k| knee(k, Q)).contains(at)).collect();
-        let found_at: Vec<usize> = of_angles.iter().map(|(at, _)| **at).collect();
-        assert_eq!(found_at, [knee(5, Q), knee(6, Q)]);
-        assert!(of_angles.iter().all(|(_, [low, high])| *low == 0.0 && *high > ANGLE_RAD), "{of_angles:?}");
-
-        let mut margins = Margins::default();
-        margins.grow(&found);
-        let tightened = programme.tightened(&margins);
-        let by = most - tightened.variable_range(knee(5, Q)).1;
-        assert!((by - of_angles[0].1[1] * scale[knee(5, Q)]).abs() < 1e-12);
-        assert_eq!(tightened.variable_range(knee(4, Q)), programme.variable_range(knee(4, Q)));
-        // Margins near their bound stay relevant; others do not.
-        let on = margins.bearing_on(&programme, &x);
-        assert!(on.variables.contains_key(&knee(5, Q)) && on.variables.contains_key(&knee(6, Q)));
-        x[knee(5, Q)] = 0.0;
-        assert!(!margins.bearing_on(&programme, &x).variables.contains_key(&knee(5, Q)));
-    }
-
-    #[test]
-    fn low_foot_and_pulling_force_between_nodes_are_found() {
-        let (problem, programme, mut x) = hanging();
-        let layout = &programme.layout.domains[0];
-        let [first, second, third] = [0, 1, 2].map(|k| layout.point(k) + FORCE);
-        let row = programme.contacts[0].iter().position(|row| row.axis == Axis::Z).unwrap();
-        x[first + row] = 1000.0 / programme.layout.scale[first + row];
-        (x[second + row], x[third + row]) = (0.0, 0.0);
-        let found = excess(&problem, &programme, &x);
-        // The minimum of the parabola is in the second interval: -125 N.
-        for at in [second + row, third + row] {
-            let missing = found.margins.variables[&at][0] * programme.layout.scale[at];
-            assert!((missing - 120.0).abs() < 6.0, "{missing}");
-        }
-        assert!(!found.margins.variables.contains_key(&(first + row)));
-
-        let (_, _, mut x) = hanging();
-        let swing = &programme.layout.domains[2];
-        for k in 3..=4 {
-            let height = swing.point(k) + Q + 1;
-            x[height] = 0.85;
-        }
-        let found = excess(&problem, &programme, &x);
-        let rows: Vec<usize> =
-            (2..=5).flat_map(|k| &programme.rows.domains[2].points[k].heights).map(|height| height.row).collect();
-        assert!(rows.iter().any(|row| found.margins.rows.contains_key(row)), "{:?}", found.margins.rows);
-    }
 
     #[test]
     fn margins_are_at_most_a_quarter_of_the_range_of_a_bound() {

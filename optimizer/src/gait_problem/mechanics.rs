@@ -11,8 +11,7 @@ use super::rows::PointRows;
 use crate::body::coordinates::{LINKS, link_angles, to_generalised, transform_rows};
 use crate::body::dynamics::LinkHessian;
 use crate::body::point::angles_of;
-use crate::body::{ContactPoint, InverseDynamics, PointState};
-use crate::gait::{Axis, Side};
+use crate::body::{Axis, ContactPoint, InverseDynamics, PointState, Side};
 use crate::walking::ContactRow;
 
 pub(super) const DYNAMICS_SCALE: f64 = 1.0 / 100.0;
@@ -38,6 +37,18 @@ pub(super) fn axis_index(axis: Axis) -> usize {
     match axis {
         Axis::X => 0,
         Axis::Z => 1,
+    }
+}
+
+impl GaitProgramme {
+    /// Position component of a foot point, and its gradient with respect to the nine coordinates.
+    pub fn foot_point_linearised(&self, state: &PointState, foot_point: usize, axis: Axis) -> (f64, [f64; 9]) {
+        let point = &self.foot_points[foot_point];
+        let index = axis_index(axis);
+        let mut gradient = [0.0; 9];
+        gradient[index] = 1.0;
+        gradient[2..].copy_from_slice(&position_gradient(state, point, axis));
+        (state.contact_position(point)[index], gradient)
     }
 }
 

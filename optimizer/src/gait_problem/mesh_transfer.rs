@@ -7,8 +7,8 @@
 
 use super::layout::DomainLayout;
 use super::programme::GaitProgramme;
-use super::rows::{Place, RowKind, RowName};
-use crate::nlp::WarmPoint;
+use super::rows::{RowKind, RowName, RowPlace};
+use interior_point::WarmPoint;
 use std::collections::HashMap;
 
 /// Transfers `point` from the mesh of `from` to that of `to`, a problem of the same variant. The solver initialises
@@ -91,20 +91,20 @@ fn transfer_rows(from: &GaitProgramme, to: &GaitProgramme, values: &[f64]) -> Ve
 
 fn whatever_the_point(name: RowName) -> RowName {
     match name.place {
-        Place::Point { domain, .. } => RowName { place: Place::Point { domain, point: 0 }, ..name },
-        Place::Transition { .. } | Place::Stride => name,
+        RowPlace::Point { domain, .. } => RowName { place: RowPlace::Point { domain, point: 0 }, ..name },
+        RowPlace::Transition { .. } | RowPlace::Stride => name,
     }
 }
 
 /// Position of a row in its domain, 0 to 1.
 fn sigma(programme: &GaitProgramme, name: RowName) -> f64 {
-    let Place::Point { domain, point } = name.place else { return 0.0 };
+    let RowPlace::Point { domain, point } = name.place else { return 0.0 };
     programme.layout.domains[usize::from(domain)].sigma(usize::from(point))
 }
 
 /// Simpson weight of the node of a row; 1 for an integration row.
 fn weight(programme: &GaitProgramme, name: RowName) -> f64 {
-    let Place::Point { domain, point } = name.place else { return 1.0 };
+    let RowPlace::Point { domain, point } = name.place else { return 1.0 };
     match name.kind {
         RowKind::MidpointPhase
         | RowKind::EndpointPhase
@@ -120,10 +120,10 @@ fn weight(programme: &GaitProgramme, name: RowName) -> f64 {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::nlp::NonlinearProgram;
+    use crate::gait_problem::GaitProblem;
     use crate::settings::Mesh;
-    use crate::solve::GaitProblem;
     use crate::subject::Subject;
+    use interior_point::NonlinearProgram;
 
     fn programme(mesh: Mesh) -> GaitProgramme {
         let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), true).unwrap();

@@ -108,6 +108,13 @@ pub(super) fn parts(programme: &GaitProgramme, x: &[f64]) -> ObjectiveParts {
     result
 }
 
+impl GaitProgramme {
+    /// Parts of the objective at x.
+    pub fn objective_parts(&self, x: &[f64]) -> ObjectiveParts {
+        parts(self, x)
+    }
+}
+
 /// Weighted objective.
 pub(super) fn value(programme: &GaitProgramme, x: &[f64]) -> f64 {
     let parts = parts(programme, x);

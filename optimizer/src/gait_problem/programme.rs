@@ -1,25 +1,19 @@
-//! The gait problem as a nonlinear programme for the solver: traversal of all rows for values, Jacobian and Hessian.
+//! Data of the gait problem as a nonlinear program: walker, variables, rows, weights and bounds, and the common data
+//! of the rows of a domain or a node.
 
-use super::elimination_tree::elimination_tree;
-use super::entries::{Compressed, Entries};
+use super::entries::Compressed;
 use super::layout::{DomainLayout, Layout, PointVariables};
-use super::limits::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
-use super::margins::Margins;
-use super::objective::ObjectiveParts;
 use super::rows::RowTable;
-use super::zero_dynamics;
-use super::{contact_limits, fibres, hip_velocity, mechanics, muscle_forces, objective, outputs, stride, transitions};
-use crate::body::dynamics::LinkHessian;
-use crate::body::{ContactPoint, GRAVITY, PointState, WalkerModel};
-use crate::bounds::TunedBounds;
+use super::variable_bounds::{ActiveLimits, VariableBounds, set_row_bounds, variable_bounds};
+use crate::body::{Axis, ContactPoint, FootPoint, GRAVITY, Side, WalkerModel};
 use crate::device::Device;
-use crate::gait::{Axis, FootPoint, Side};
 use crate::muscle::{MUSCLE_COUNT, Muscle};
-use crate::nlp::{EliminationBlocks, NonlinearProgram, SparsityPattern};
 use crate::reference::ReferenceGait;
 use crate::settings::{GaitSettings, Regularisation};
 use crate::subject::{ModelError, Subject};
+use crate::tuned_bounds::TunedBounds;
 use crate::walking::{CYCLE, ContactRow, phase_gradient};
+use interior_point::EliminationBlocks;
 use std::sync::Arc;
 
 /// Weights of the parts of the objective in a phase of the solve.
@@ -116,29 +110,18 @@ pub struct GaitProgramme {
     phases: [PhaseTerms; 2],
     /// Reference angles q[2..] of each domain and node, rad.
     pub(super) reference_angles: Vec<Vec<[f64; 7]>>,
-    bounds: VariableBounds,
+    pub(super) bounds: VariableBounds,
     settings: GaitSettings,
     reference: ReferenceGait,
     timing: StrideTiming,
-    structure: Arc<Structure>,
-}
-
-/// A violated row or variable bound.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RowViolation {
-    /// The row, if it is one.
-    pub row: Option<usize>,
-    /// The variable, if it is a bound.
-    pub variable: Option<usize>,
-    /// Violation, in scaled units.
-    pub amount: f64,
+    pub(super) structure: Arc<Structure>,
 }
 
 #[derive(Debug, Default)]
-struct Structure {
-    jacobian: Compressed,
-    hessian: Compressed,
-    blocks: EliminationBlocks,
+pub(super) struct Structure {
+    pub(super) jacobian: Compressed,
+    pub(super) hessian: Compressed,
+    pub(super) blocks: EliminationBlocks,
 }
 
 /// Stride fractions, 0 to 1, of the boundaries between domains in the initial guess and the tracked reference gait.
@@ -156,11 +139,8 @@ fn reference_points(layout: &Layout, reference: &ReferenceGait, timing: &StrideT
 }
 
 impl GaitProgramme {
-    /// The gait problem with the weights of the final phase: 1 for the cost of transport, and that of the settings for tracking.
-    ///
-    /// # Errors
-    /// [`ModelError`] with the field that is out of range.
-    pub fn new(
+    /// The program without the structure of its derivatives.
+    pub(super) fn without_structure(
         subject: &Subject,
         device: &Device,
         bounds: &TunedBounds,
@@ -191,7 +171,7 @@ impl GaitProgramme {
             .collect();
         let reference_angles = reference_points(&layout, reference, &EVEN_TIMING);
         let phases = [PhaseTerms::new(&model, Side::Left), PhaseTerms::new(&model, Side::Right)];
-        let mut programme = Self {
+        Ok(Self {
             limits: ActiveLimits::new(&settings.limits, bounds),
             regularisation: settings.regularisation,
             bounds: variable_bounds(&layout, bounds, settings, device, &muscle_table, model.total_mass * GRAVITY),
@@ -209,9 +189,7 @@ impl GaitProgramme {
             contact_targets,
             phases,
             reference_angles,
-        };
-        programme.structure = Arc::new(programme.record_structure());
-        Ok(programme)
+        })
     }
 
     /// The problem of a tracking phase: other weights, and landing points must only move downwards.
@@ -234,41 +212,6 @@ impl GaitProgramme {
     /// Stride fraction of a relative time of domain d, by the timing of the tracked reference gait.
     pub fn stride_fraction(&self, d: usize, sigma: f64) -> f64 {
         self.timing[d] + sigma * (self.timing[d + 1] - self.timing[d])
-    }
-
-    /// Parts of the objective at x.
-    pub fn objective_parts(&self, x: &[f64]) -> ObjectiveParts {
-        objective::parts(self, x)
-    }
-
-    /// Largest violation of a row or variable bound at x, in scaled units, with its row or variable.
-    pub fn violations(&self, x: &[f64]) -> Vec<RowViolation> {
-        let mut values = vec![0.0; self.rows.names.len()];
-        self.constraints(x, &mut values);
-        let mut result = Vec::new();
-        for (row, value) in values.iter().enumerate() {
-            let excess = (self.rows.lower[row] - value).max(value - self.rows.upper[row]);
-            // NaN is a violation.
-            if excess > 0.0 || excess.is_nan() {
-                result.push(RowViolation { row: Some(row), variable: None, amount: excess });
-            }
-        }
-        for (variable, value) in x.iter().enumerate() {
-            let excess = (self.bounds.lower[variable] - value).max(value - self.bounds.upper[variable]);
-            if excess > 0.0 || excess.is_nan() {
-                result.push(RowViolation { row: None, variable: Some(variable), amount: excess });
-            }
-        }
-        result.sort_by(|a, b| b.amount.total_cmp(&a.amount));
-        result
-    }
-
-    /// The problem with tightened bounds.
-    #[must_use]
-    pub fn tightened(&self, margins: &Margins) -> Self {
-        let mut programme = self.clone();
-        margins.apply(&mut programme.bounds.lower, &mut programme.bounds.upper, &mut programme.rows.lower);
-        programme
     }
 
     /// Lower and upper bounds of the stored variables.
@@ -312,16 +255,6 @@ impl GaitProgramme {
         self.contacts[d].iter().any(|row| row.side == contact.side && row.axis == contact.axis)
     }
 
-    /// Position component of a foot point, and its gradient with respect to the nine coordinates.
-    pub fn foot_point_linearised(&self, state: &PointState, foot_point: usize, axis: Axis) -> (f64, [f64; 9]) {
-        let point = &self.foot_points[foot_point];
-        let index = mechanics::axis_index(axis);
-        let mut gradient = [0.0; 9];
-        gradient[index] = 1.0;
-        gradient[2..].copy_from_slice(&mechanics::position_gradient(state, point, axis));
-        (state.contact_position(point)[index], gradient)
-    }
-
     /// dp of the stance leg of domain d in a posture, m.
     pub fn hip_phase_of(&self, d: usize, q: &[f64; 9]) -> f64 {
         self.phase_of_stance(self.layout.domains[d].domain.stance).along(q)
@@ -358,7 +291,7 @@ impl GaitProgramme {
         }
     }
 
-    fn domain_context(&self, x: &[f64], d: usize) -> DomainContext<'_> {
+    pub(super) fn domain_context(&self, x: &[f64], d: usize) -> DomainContext<'_> {
         let layout = &self.layout.domains[d];
         DomainContext {
             d,
@@ -368,7 +301,7 @@ impl GaitProgramme {
         }
     }
 
-    fn point_context(&self, x: &[f64], d: usize, k: usize) -> PointContext<'_> {
+    pub(super) fn point_context(&self, x: &[f64], d: usize, k: usize) -> PointContext<'_> {
         let layout = &self.layout.domains[d];
         PointContext {
             d,
@@ -381,73 +314,6 @@ impl GaitProgramme {
             hip_velocity: layout.hip_velocity.map_or(0.0, |i| self.layout.value(x, i)),
             right_step_length: self.layout.value(x, self.layout.right_step_length),
             stride_length: self.layout.value(x, self.layout.stride_length),
-        }
-    }
-
-    fn write_jacobian(&self, x: &[f64], out: &mut Entries<'_>) {
-        for (d, rows) in self.rows.domains.iter().enumerate() {
-            for (k, point_rows) in rows.points.iter().enumerate() {
-                let context = self.point_context(x, d, k);
-                let point = self.layout.point_variables(x, d, k);
-                let state = PointState::new(&point.q, &point.qd, &point.qdd);
-                let p = context.layout.point(k);
-                mechanics::jacobian(self, &context, point_rows, &point, &state, p, out);
-                outputs::jacobian(self, &context, point_rows, &point, x, p, out);
-                hip_velocity::jacobian(&context, point_rows, p, out);
-                contact_limits::jacobian(self, &context, point_rows, &state, x, p, out);
-                muscle_forces::jacobian(self, context.layout, point_rows, &point, p, out);
-            }
-            let context = self.domain_context(x, d);
-            zero_dynamics::jacobian(self, &context, rows, x, out);
-            fibres::jacobian(self, &context, rows, x, out);
-            transitions::jacobian(self, d, rows, x, out);
-        }
-        stride::jacobian(self, x, out);
-    }
-
-    fn write_hessian(&self, x: &[f64], sigma: f64, multipliers: &[f64], out: &mut Entries<'_>) {
-        for (d, rows) in self.rows.domains.iter().enumerate() {
-            for (k, point_rows) in rows.points.iter().enumerate() {
-                let context = self.point_context(x, d, k);
-                let point = self.layout.point_variables(x, d, k);
-                let state = PointState::new(&point.q, &point.qd, &point.qdd);
-                let p = context.layout.point(k);
-                let mut link = LinkHessian::default();
-                mechanics::hessian(self, &context, point_rows, &point, &state, p, multipliers, &mut link, out);
-                contact_limits::hessian(self, &context, point_rows, &state, x, multipliers, &mut link, out);
-                mechanics::write_link_hessian(&link, p, out);
-                outputs::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
-                hip_velocity::hessian(&context, point_rows, multipliers, out);
-                muscle_forces::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
-            }
-            let context = self.domain_context(x, d);
-            zero_dynamics::hessian(&context, rows, multipliers, out);
-            fibres::hessian(&context, rows, multipliers, out);
-            transitions::hessian(self, d, rows, x, multipliers, out);
-        }
-        stride::hessian(self, x, multipliers, out);
-        objective::hessian(self, x, sigma, out);
-    }
-
-    fn record_structure(&self) -> Structure {
-        // The structure does not depend on values; any point with positive durations and phase widths gives it.
-        let mut x = vec![0.5; self.layout.variables];
-        for domain in &self.layout.domains {
-            if let Some(end) = domain.phase_end {
-                x[end] = 1.0;
-            }
-        }
-        let (n, m) = (self.layout.variables, self.rows.names.len());
-        let mut entries = Vec::new();
-        self.write_jacobian(&x, &mut Entries::structure(&self.layout.scale, &mut entries));
-        let jacobian = Compressed::new(m, n, &entries);
-        entries.clear();
-        self.write_hessian(&x, 1.0, &vec![1.0; m], &mut Entries::structure(&self.layout.scale, &mut entries));
-        let hessian = Compressed::new(n, n, &entries);
-        Structure {
-            jacobian,
-            hessian,
-            blocks: elimination_tree(&self.layout, &self.rows, self.activations_are_coupled()),
         }
     }
 }
@@ -466,76 +332,5 @@ fn contact_target(model: &WalkerModel, stance: Side, row: ContactRow) -> [f64; 3
     match row.point {
         FootPoint::Toe => toe,
         FootPoint::Heel => [toe[0] - leg.heel_behind_m - leg.toe_ahead_m, toe[1], toe[2]],
-    }
-}
-
-impl NonlinearProgram for GaitProgramme {
-    fn variables(&self) -> usize {
-        self.layout.variables
-    }
-
-    fn rows(&self) -> usize {
-        self.rows.names.len()
-    }
-
-    fn variable_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
-        lower.copy_from_slice(&self.bounds.lower);
-        upper.copy_from_slice(&self.bounds.upper);
-    }
-
-    fn row_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
-        lower.copy_from_slice(&self.rows.lower);
-        upper.copy_from_slice(&self.rows.upper);
-    }
-
-    fn jacobian_pattern(&self) -> &SparsityPattern {
-        &self.structure.jacobian.pattern
-    }
-
-    fn hessian_pattern(&self) -> &SparsityPattern {
-        &self.structure.hessian.pattern
-    }
-
-    fn objective(&self, x: &[f64]) -> f64 {
-        objective::value(self, x)
-    }
-
-    fn gradient(&self, x: &[f64], gradient: &mut [f64]) {
-        objective::gradient(self, x, gradient);
-    }
-
-    fn constraints(&self, x: &[f64], values: &mut [f64]) {
-        for (d, rows) in self.rows.domains.iter().enumerate() {
-            for (k, point_rows) in rows.points.iter().enumerate() {
-                let context = self.point_context(x, d, k);
-                let point = self.layout.point_variables(x, d, k);
-                let state = PointState::new(&point.q, &point.qd, &point.qdd);
-                mechanics::values(self, &context, point_rows, &point, &state, values);
-                outputs::values(self, &context, point_rows, &point, x, values);
-                hip_velocity::values(self, &context, point_rows, &point, x, values);
-                contact_limits::values(self, &context, point_rows, &point, &state, x, values);
-                muscle_forces::values(self, point_rows, &point, values);
-            }
-            let context = self.domain_context(x, d);
-            zero_dynamics::values(self, &context, rows, x, values);
-            fibres::values(self, &context, rows, x, values);
-            transitions::values(self, d, rows, x, values);
-        }
-        stride::values(self, x, values);
-    }
-
-    fn jacobian(&self, x: &[f64], values: &mut [f64]) {
-        let structure = &self.structure.jacobian;
-        self.write_jacobian(x, &mut Entries::values(&self.layout.scale, &structure.slots, values));
-    }
-
-    fn hessian(&self, x: &[f64], sigma: f64, multipliers: &[f64], values: &mut [f64]) {
-        let structure = &self.structure.hessian;
-        let mut out = Entries::values(&self.layout.scale, &structure.slots, values);
-        self.write_hessian(x, sigma, multipliers, &mut out);
-    }
-
-    fn elimination_blocks(&self) -> Option<&EliminationBlocks> {
-        Some(&self.structure.blocks)
     }
 }

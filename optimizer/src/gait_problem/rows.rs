@@ -1,7 +1,7 @@
 //! The rows of the gait problem: names, bounds, and the index of each group of rows.
 
 use super::layout::Layout;
-use crate::gait::{Axis, FootPoint, Side};
+use crate::body::{Axis, FootPoint, Side};
 use crate::muscle::{MUSCLE_COUNT, MUSCLES};
 use crate::walking::{CYCLE, ContactRow, DomainKind};
 
@@ -115,7 +115,7 @@ impl RowKind {
 
 /// Place of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Place {
+pub enum RowPlace {
     /// Node `point` of domain `domain`.
     Point {
         /// 0..8.
@@ -136,7 +136,7 @@ pub enum Place {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct RowName {
     /// Place.
-    pub place: Place,
+    pub place: RowPlace,
     /// Kind.
     pub kind: RowKind,
     /// Component; its meaning depends on the kind.
@@ -166,8 +166,8 @@ impl RowName {
     pub fn component_name(&self) -> String {
         let component = usize::from(self.component);
         let domain = match self.place {
-            Place::Point { domain, .. } | Place::Transition { domain } => CYCLE.get(usize::from(domain)).copied(),
-            Place::Stride => None,
+            RowPlace::Point { domain, .. } | RowPlace::Transition { domain } => CYCLE.get(usize::from(domain)).copied(),
+            RowPlace::Stride => None,
         };
         match self.kind {
             RowKind::Dynamics | RowKind::PositionReset | RowKind::VelocityReset | RowKind::Impact => {
@@ -202,12 +202,12 @@ impl RowName {
     /// `SS1_R point 3, C3 swing-foot clearance, heel_L`.
     pub fn label(&self) -> String {
         let place = match self.place {
-            Place::Point { domain, point } => format!("{} point {point}", CYCLE[usize::from(domain).min(7)].name()),
-            Place::Transition { domain } => {
+            RowPlace::Point { domain, point } => format!("{} point {point}", CYCLE[usize::from(domain).min(7)].name()),
+            RowPlace::Transition { domain } => {
                 let from = usize::from(domain).min(7);
                 format!("{} to {}", CYCLE[from].name(), CYCLE[(from + 1) % 8].name())
             }
-            Place::Stride => "stride".to_owned(),
+            RowPlace::Stride => "stride".to_owned(),
         };
         let component = self.component_name();
         let separator = if component.is_empty() { "" } else { ", " };
@@ -316,7 +316,7 @@ pub fn foot_point_index(point: FootPoint, side: Side) -> usize {
 }
 
 impl RowTable {
-    fn add(&mut self, place: Place, kind: RowKind, count: usize, lower: f64, upper: f64) -> usize {
+    fn add(&mut self, place: RowPlace, kind: RowKind, count: usize, lower: f64, upper: f64) -> usize {
         let first = self.names.len();
         for component in 0..count {
             let component = u8::try_from(component).unwrap_or(u8::MAX);
@@ -327,14 +327,14 @@ impl RowTable {
         first
     }
 
-    fn add_one(&mut self, place: Place, kind: RowKind, component: usize, lower: f64, upper: f64) -> usize {
+    fn add_one(&mut self, place: RowPlace, kind: RowKind, component: usize, lower: f64, upper: f64) -> usize {
         let row = self.add(place, kind, 1, lower, upper);
         self.names[row].component = u8::try_from(component).unwrap_or(u8::MAX);
         row
     }
 
-    /// The rows of a layout. Inequality rows are `>= 0`; [`super::limits`] later sets the limits of speed, steps, touchdown and phase
-    /// rate.
+    /// The rows of a layout. Inequality rows are `>= 0`; [`super::variable_bounds`] later sets the limits of speed,
+    /// steps, touchdown and phase rate.
     pub fn new(layout: &Layout) -> Self {
         let mut table = Self::default();
         for (d, domain_layout) in layout.domains.iter().enumerate() {
@@ -344,9 +344,11 @@ impl RowTable {
                 rows.points.push(point);
             }
             let domain = u8::try_from(d).unwrap_or(0);
-            let last = Place::Point { domain, point: u16::try_from(domain_layout.last()).unwrap_or(u16::MAX) };
-            let interval_end = |i: usize| Place::Point { domain, point: u16::try_from(2 * i + 2).unwrap_or(u16::MAX) };
-            let interval_mid = |i: usize| Place::Point { domain, point: u16::try_from(2 * i + 1).unwrap_or(u16::MAX) };
+            let last = RowPlace::Point { domain, point: u16::try_from(domain_layout.last()).unwrap_or(u16::MAX) };
+            let interval_end =
+                |i: usize| RowPlace::Point { domain, point: u16::try_from(2 * i + 2).unwrap_or(u16::MAX) };
+            let interval_mid =
+                |i: usize| RowPlace::Point { domain, point: u16::try_from(2 * i + 1).unwrap_or(u16::MAX) };
             if domain_layout.domain.kind == DomainKind::Ss1 {
                 rows.zero_dynamics = Some(table.names.len());
                 for i in 0..domain_layout.intervals {
@@ -364,7 +366,7 @@ impl RowTable {
                     table.add(interval_end(i), RowKind::EndpointFibre, MUSCLE_COUNT, 0.0, 0.0);
                 }
             }
-            let transition = Place::Transition { domain };
+            let transition = RowPlace::Transition { domain };
             rows.position_reset = table.add(transition, RowKind::PositionReset, 9, 0.0, 0.0);
             let next = CYCLE[(d + 1) % CYCLE.len()];
             if next.opens_with_impact() {
@@ -380,8 +382,8 @@ impl RowTable {
             }
             table.domains.push(rows);
         }
-        table.step_length = table.add(Place::Stride, RowKind::StepLength, 2, 0.0, f64::INFINITY);
-        table.speed = table.add(Place::Stride, RowKind::Speed, 1, 0.0, f64::INFINITY);
+        table.step_length = table.add(RowPlace::Stride, RowKind::StepLength, 2, 0.0, f64::INFINITY);
+        table.speed = table.add(RowPlace::Stride, RowKind::Speed, 1, 0.0, f64::INFINITY);
         table
     }
 
@@ -389,7 +391,8 @@ impl RowTable {
         let domain_layout = &layout.domains[d];
         let domain = domain_layout.domain;
         let (nc, ny) = (domain_layout.contacts, domain_layout.outputs.len());
-        let place = Place::Point { domain: u8::try_from(d).unwrap_or(0), point: u16::try_from(k).unwrap_or(u16::MAX) };
+        let place =
+            RowPlace::Point { domain: u8::try_from(d).unwrap_or(0), point: u16::try_from(k).unwrap_or(u16::MAX) };
         let first = k == 0;
         let mut equality = |kind, count| self.add(place, kind, count, 0.0, 0.0);
         let mut rows = PointRows {
@@ -431,8 +434,8 @@ impl RowTable {
         rows.friction_edges = 2 * feet;
         rows.friction = self.add(place, RowKind::Friction, rows.friction_edges, 0.0, f64::INFINITY);
         if domain.kind == DomainKind::Ds3 && k == domain_layout.last() {
-            // At lift-off the friction cone of the trailing foot degenerates to its vertex. Bounds of the forces impose it,
-            // because rows without an interior would have unbounded multipliers.
+            // At lift-off the friction cone of the trailing foot degenerates to its vertex. Bounds of the forces
+            // impose it, because rows without an interior would have unbounded multipliers.
             self.lower[rows.friction + 2..].fill(f64::NEG_INFINITY);
         }
         self.height_rows(domain_layout, place, k, &mut rows);
@@ -457,7 +460,7 @@ impl RowTable {
     fn height_rows(
         &mut self,
         domain_layout: &super::layout::DomainLayout,
-        place: Place,
+        place: RowPlace,
         k: usize,
         rows: &mut PointRows,
     ) {

@@ -1,6 +1,6 @@
 //! Muscle parameters of a subject: the published table, scaled to the subject or overridden by measured values.
 
-use super::unit::{MUSCLE_COUNT, MUSCLES, Muscle};
+use super::unit::{Joint, MUSCLE_COUNT, MUSCLES, Muscle};
 use crate::subject::{ModelError, Subject};
 use serde::{Deserialize, Serialize};
 
@@ -225,24 +225,6 @@ impl MuscleParameters {
 impl MuscleOverride {
     fn levers(&self) -> [(Joint, Option<f64>); 3] {
         [(Joint::Hip, self.hip_lever_m), (Joint::Knee, self.knee_lever_m), (Joint::Ankle, self.ankle_lever_m)]
-    }
-}
-
-/// Joints that muscles span.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Joint {
-    Hip,
-    Knee,
-    Ankle,
-}
-
-impl Joint {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Hip => "hip",
-            Self::Knee => "knee",
-            Self::Ankle => "ankle",
-        }
     }
 }
 

@@ -5,12 +5,29 @@
 //! published, length changes use `rho r0` and torques `r0`, where rho accounts for pennation. Muscle power therefore
 //! differs slightly from joint power.
 
-use super::parameters::Joint;
-use crate::gait::Side;
+use crate::body::Side;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Number of muscles.
 pub const MUSCLE_COUNT: usize = 10;
+
+/// Joints that muscles span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Joint {
+    Hip,
+    Knee,
+    Ankle,
+}
+
+impl Joint {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Hip => "hip",
+            Self::Knee => "knee",
+            Self::Ankle => "ankle",
+        }
+    }
+}
 
 /// The attachment of a muscle at one joint that it spans.
 #[derive(Debug, Clone, Copy, PartialEq)]

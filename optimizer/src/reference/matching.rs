@@ -1,6 +1,6 @@
 //! The reference gait nearest to a subject in height and body mass.
 
-use super::ReferenceGait;
+use super::reference_gait::ReferenceGait;
 use crate::subject::Subject;
 
 /// Unit of the difference in height, m: about one standard deviation of adults.

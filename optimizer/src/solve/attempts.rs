@@ -1,27 +1,28 @@
-//! The attempts of a solve: a warm start, then initial guesses in parallel, the choice of an attempt, and tightened bounds
-//! between nodes.
+//! The attempts of a solve: a warm start, then initial guesses in parallel, the choice of an attempt, and tightened
+//! bounds between nodes.
 
-use super::cold_guesses::ColdGuess;
-use super::run::{Context, Run};
-use super::warm_start::Start;
-use super::{Attempt, BasinChoice, IterationRecord, LinearAlgebra, Phase, SolveError, SolveStatus};
+use super::error::SolveError;
+use super::multi_start::InitialGuess;
+use super::options::BasinChoice;
+use super::phases::{AttemptRun, SolveContext};
+use super::progress::{IterationRecord, SolvePhase};
+use super::report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
+use super::warm_start::MeshStart;
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
-use crate::gait_problem::margins::{Margins, excess_between_points};
+use crate::gait_problem::inter_node_check::inter_node_excess;
+use crate::gait_problem::margins::Margins;
 use crate::metrics::gait_rmse;
-use crate::nlp::{NlpResult, NonlinearProgram};
+use interior_point::{NlpResult, NonlinearProgram};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
-
-/// Largest scaled violation of a converged gait.
-pub const CONVERGED_VIOLATION: f64 = 1e-6;
 
 /// Largest differences of objective and Gait RMSE within a local optimum, at the tolerance of a solve.
 const SAME_OBJECTIVE: f64 = 1e-4;
 const SAME_RMSE_RAD: f64 = 5e-3;
 
 /// A result with the quantities that decide the choice.
-pub(super) struct Choice {
+pub(super) struct Candidate {
     pub(super) result: NlpResult,
     pub(super) gait: Gait,
     pub(super) status: SolveStatus,
@@ -30,9 +31,9 @@ pub(super) struct Choice {
     violation: f64,
 }
 
-impl Choice {
+impl Candidate {
     /// Measures the residuals after projection into the bounds, because the solver relaxes bounds by 1e-8.
-    pub(super) fn new(context: &Context<'_>, mut result: NlpResult) -> Self {
+    pub(super) fn new(context: &SolveContext<'_>, mut result: NlpResult) -> Self {
         let programme = context.programme;
         programme.project_into_bounds(&mut result.x);
         let gait = gait_of(context.problem, programme, &result.x);
@@ -52,8 +53,8 @@ impl Choice {
         }
     }
 
-    pub(super) fn attempt(&self, strategy: &str, run: &Run<'_>) -> Attempt {
-        Attempt {
+    pub(super) fn attempt(&self, strategy: &str, run: &AttemptRun<'_>) -> SolveAttempt {
+        SolveAttempt {
             strategy: strategy.to_owned(),
             status: self.status,
             iterations: run.iterations,
@@ -69,8 +70,8 @@ impl Choice {
 
 /// A finished attempt.
 pub(super) struct Tried {
-    pub(super) choice: Choice,
-    pub(super) attempt: Attempt,
+    pub(super) candidate: Candidate,
+    pub(super) attempt: SolveAttempt,
     /// Tightened bounds.
     pub(super) margins: Margins,
     pub(super) evaluation_s: f64,
@@ -80,37 +81,43 @@ pub(super) struct Tried {
 impl Tried {
     /// Whether no further attempt is needed: it converged or was stopped.
     pub(super) fn is_final(&self) -> bool {
-        matches!(self.choice.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
+        matches!(self.candidate.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
 
-    fn new(context: &Context<'_>, result: NlpResult, strategy: &str, margins: Margins, run: &Run<'_>) -> Self {
-        let choice = Choice::new(context, result);
+    fn new(
+        context: &SolveContext<'_>,
+        result: NlpResult,
+        strategy: &str,
+        margins: Margins,
+        run: &AttemptRun<'_>,
+    ) -> Self {
+        let candidate = Candidate::new(context, result);
         Self {
-            attempt: choice.attempt(strategy, run),
+            attempt: candidate.attempt(strategy, run),
             margins,
             evaluation_s: run.evaluation_s,
             linear_algebra: run.linear_algebra,
-            choice,
+            candidate,
         }
     }
 }
 
-/// Tries a warm start with its tightened bounds. It has the same iteration limit as other attempts, because slow progress does
-/// not predict failure (docs/benchmarks/optimizer.md, warm starts that fail).
+/// Tries a warm start with its tightened bounds. It has the same iteration limit as other attempts, because slow
+/// progress does not predict failure (docs/benchmarks/optimizer.md, warm starts that fail).
 pub(super) fn try_warm(
-    context: &Context<'_>,
-    start: Start,
+    context: &SolveContext<'_>,
+    start: MeshStart,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Tried, SolveError> {
-    let mut run = Run::new(context, context.options.threads, observer);
-    let Start { point, mut margins, strategy } = start;
+    let mut run = AttemptRun::new(context, context.options.threads, observer);
+    let MeshStart { point, mut margins, strategy } = start;
     if context.options.tightening_rounds == 0 {
         margins = Margins::default();
     }
     let result = if margins.is_empty() {
-        run.warm(Phase::Cost, context.programme, point)
+        run.warm(SolvePhase::Cost, context.programme, point)
     } else {
-        run.warm(Phase::BetweenPoints, &context.programme.tightened(&margins), point)
+        run.warm(SolvePhase::InterNode, &context.programme.tightened(&margins), point)
     }?;
     Ok(Tried::new(context, result, strategy, margins, &run))
 }
@@ -131,32 +138,32 @@ pub(super) fn number_basins(tried: &mut [Tried]) {
     }
 }
 
-/// Tightens the bounds that the chosen gait violates between its nodes and continues the solve, until there is no violation or
-/// the rounds are used up. Returns the index of the last converged attempt, or of a cancelled one.
-pub(super) fn keep_between_points(
-    context: &Context<'_>,
+/// Tightens the bounds that the chosen gait violates between its nodes and continues the solve, until there is no
+/// violation or the rounds are used up. Returns the index of the last converged attempt, or of a cancelled one.
+pub(super) fn enforce_between_nodes(
+    context: &SolveContext<'_>,
     tried: &mut Vec<Tried>,
     mut chosen: usize,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<usize, SolveError> {
     for _ in 0..context.options.tightening_rounds {
         let now = &tried[chosen];
-        if now.choice.status != SolveStatus::Converged {
+        if now.candidate.status != SolveStatus::Converged {
             break;
         }
-        let excess = excess_between_points(context.programme, &now.choice.gait, &now.choice.result.x);
+        let excess = inter_node_excess(context.programme, &now.candidate.gait, &now.candidate.result.x);
         if excess.worst <= 1.0 {
             break;
         }
         let mut margins = now.margins.clone();
-        margins.grow(&excess);
-        let point = now.choice.result.warm_point();
-        let mut run = Run::new(context, context.options.threads, observer);
+        margins.grow(&excess.margins);
+        let point = now.candidate.result.warm_point();
+        let mut run = AttemptRun::new(context, context.options.threads, observer);
         run.guess = tried.len();
-        let result = run.warm(Phase::BetweenPoints, &context.programme.tightened(&margins), point)?;
+        let result = run.warm(SolvePhase::InterNode, &context.programme.tightened(&margins), point)?;
         let mut next = Tried::new(context, result, "bounds tightened between nodes", margins, &run);
-        next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.choice.status == SolveStatus::Converged);
-        let status = next.choice.status;
+        next.attempt.basin = tried[chosen].attempt.basin.filter(|_| next.candidate.status == SolveStatus::Converged);
+        let status = next.candidate.status;
         tried.push(next);
         if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {
             break;
@@ -167,13 +174,13 @@ pub(super) fn keep_between_points(
 }
 
 fn try_guess(
-    context: &Context<'_>,
+    context: &SolveContext<'_>,
     index: usize,
-    guess: &ColdGuess,
+    guess: &InitialGuess,
     threads: usize,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Tried, SolveError> {
-    let mut run = Run::new(context, threads, observer);
+    let mut run = AttemptRun::new(context, threads, observer);
     run.guess = index;
     let result = run.cold(guess)?;
     Ok(Tried::new(context, result, &guess.label(), Margins::default(), &run))
@@ -186,11 +193,11 @@ enum Message {
     Done(usize, Result<Tried, SolveError>),
 }
 
-/// Tries all guesses, as many in parallel as there are threads. The results have the order of the guesses, the first of which
-/// has the number `first`, and do not depend on the number of threads.
+/// Tries all guesses, as many in parallel as there are threads. The results have the order of the guesses, the first
+/// of which has the number `first`, and do not depend on the number of threads.
 pub(super) fn try_guesses(
-    context: &Context<'_>,
-    guesses: &[ColdGuess],
+    context: &SolveContext<'_>,
+    guesses: &[InitialGuess],
     first: usize,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Vec<Tried>, SolveError> {
@@ -229,22 +236,22 @@ pub(super) fn try_guesses(
     done.into_iter().flatten().collect()
 }
 
-/// Number of attempts at a stationary point of the violation after which no further guess is tried. With feasible bounds, so
-/// many guesses rarely end there.
+/// Number of attempts at a stationary point of the violation after which no further guess is tried. With feasible
+/// bounds, so many guesses rarely end there.
 const MOST_INFEASIBLE: usize = 3;
 
 /// Tries the requested guesses in parallel, then further guesses until one converges.
-pub(super) fn try_catalogue(
-    context: &Context<'_>,
+pub(super) fn try_multi_start(
+    context: &SolveContext<'_>,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<Vec<Tried>, SolveError> {
     let muscles = context.problem.muscles;
-    let asked_for = context.options.cold_guesses;
-    let guesses = ColdGuess::first(asked_for.max(ColdGuess::CATALOGUE.len()), muscles);
+    let asked_for = context.options.initial_guesses;
+    let guesses = InitialGuess::first(asked_for.max(InitialGuess::MULTI_START.len()), muscles);
     let (first, others) = guesses.split_at(asked_for);
     let mut tried = try_guesses(context, first, 0, observer)?;
-    for guess in others.iter().filter(|guess| context.options.retry && ColdGuess::CATALOGUE.contains(guess)) {
-        let infeasible = tried.iter().filter(|t| t.choice.status == SolveStatus::Infeasible).count();
+    for guess in others.iter().filter(|guess| context.options.retry && InitialGuess::MULTI_START.contains(guess)) {
+        let infeasible = tried.iter().filter(|t| t.candidate.status == SolveStatus::Infeasible).count();
         if tried.iter().any(Tried::is_final) || infeasible >= MOST_INFEASIBLE {
             break;
         }
@@ -253,22 +260,23 @@ pub(super) fn try_catalogue(
     Ok(tried)
 }
 
-/// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the smallest
-/// violation. Among the latter, stationary points of the violation come first, because they show which constraints conflict.
+/// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the
+/// smallest violation. Among the latter, stationary points of the violation come first, because they show which
+/// constraints conflict.
 pub(super) fn choose(tried: &[Tried], choice: BasinChoice) -> usize {
-    if let Some(cancelled) = tried.iter().position(|t| t.choice.status == SolveStatus::Cancelled) {
+    if let Some(cancelled) = tried.iter().position(|t| t.candidate.status == SolveStatus::Cancelled) {
         return cancelled;
     }
-    let converged = || tried.iter().enumerate().filter(|(_, t)| t.choice.status == SolveStatus::Converged);
-    let least = |key: &dyn Fn(&Choice) -> f64, limit: f64| {
+    let converged = || tried.iter().enumerate().filter(|(_, t)| t.candidate.status == SolveStatus::Converged);
+    let least = |key: &dyn Fn(&Candidate) -> f64, limit: f64| {
         converged()
-            .filter(|(_, t)| t.choice.objective <= limit)
-            .min_by(|a, b| key(&a.1.choice).total_cmp(&key(&b.1.choice)))
-            .map(|(index, t)| (index, t.choice.objective))
+            .filter(|(_, t)| t.candidate.objective <= limit)
+            .min_by(|a, b| key(&a.1.candidate).total_cmp(&key(&b.1.candidate)))
+            .map(|(index, t)| (index, t.candidate.objective))
     };
     let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
-        let gave_up = |t: &Tried| t.choice.status != SolveStatus::Infeasible;
-        let violation = |t: &Tried| t.choice.violation;
+        let gave_up = |t: &Tried| t.candidate.status != SolveStatus::Infeasible;
+        let violation = |t: &Tried| t.candidate.violation;
         return tried
             .iter()
             .enumerate()

@@ -1,9 +1,9 @@
 //! Options of a solve.
 
-use super::cold_guesses::ColdGuess;
+use super::multi_start::InitialGuess;
 use super::solver_settings;
-use crate::nlp::NlpSettings;
 use crate::subject::ModelError;
+use interior_point::NlpSettings;
 use serde::{Deserialize, Serialize};
 
 /// Options of a solve.
@@ -16,20 +16,21 @@ pub struct SolveOptions {
     pub max_iterations: usize,
     /// Largest wall time of the whole solve, s; `None` for no limit.
     pub time_limit_s: Option<f64>,
-    /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result does not
-    /// depend on it.
+    /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result
+    /// does not depend on it.
     pub threads: usize,
-    /// Number of initial guesses that a cold start always tries ([`ColdGuess::first`]), 1 to [`ColdGuess::MOST`].
-    pub cold_guesses: usize,
+    /// Number of initial guesses that a cold start always tries ([`InitialGuess::first`]), 1 to [`InitialGuess::MOST`].
+    #[serde(alias = "cold_guesses")] // the name in plans of older records
+    pub initial_guesses: usize,
     /// Whether further guesses follow until one converges.
     pub retry: bool,
     /// The choice among converged attempts.
     pub basin_choice: BasinChoice,
-    /// Largest number of rounds in which bounds are tightened if the gait violates them between nodes by more than half of the
-    /// limit of the certificate. 0 disables the check.
+    /// Largest number of rounds in which bounds are tightened if the gait violates them between nodes by more than
+    /// half of the limit of the certificate. 0 disables the check.
     pub tightening_rounds: usize,
-    /// Settings of the interior-point solver, except those that the phases of a solve determine. In JSON, missing fields have
-    /// their defaults.
+    /// Settings of the interior-point solver, except those that the phases of a solve determine. In JSON, missing
+    /// fields have their defaults.
     #[serde(with = "solver_settings", skip_serializing_if = "solver_settings::are_default")]
     pub solver: NlpSettings,
 }
@@ -41,7 +42,7 @@ impl Default for SolveOptions {
             max_iterations: 1000,
             time_limit_s: None,
             threads: 1,
-            cold_guesses: 2,
+            initial_guesses: 2,
             retry: true,
             basin_choice: BasinChoice::default(),
             tightening_rounds: 4,
@@ -59,7 +60,7 @@ impl SolveOptions {
         ModelError::check_range("tolerance", self.tolerance, 1e-10, 1e-2)?;
         ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
-        ModelError::check_range("cold_guesses", self.cold_guesses as f64, 1.0, ColdGuess::MOST as f64)?;
+        ModelError::check_range("initial_guesses", self.initial_guesses as f64, 1.0, InitialGuess::MOST as f64)?;
         self.basin_choice.validate()?;
         ModelError::check_range("tightening_rounds", self.tightening_rounds as f64, 0.0, 20.0)?;
         solver_settings::validate(&self.solver)?;
@@ -96,5 +97,19 @@ impl BasinChoice {
                 ModelError::check_range("basin_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
             }
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::progress::SolvePhase;
+    use super::SolveOptions;
+
+    #[test]
+    fn names_in_older_records_are_read() {
+        let options: SolveOptions = serde_json::from_str(r#"{"cold_guesses": 3}"#).unwrap();
+        assert_eq!(options.initial_guesses, 3);
+        assert_eq!(serde_json::from_str::<SolvePhase>("\"between_points\"").unwrap(), SolvePhase::InterNode);
     }
 }

@@ -10,7 +10,7 @@ pub struct IterationRecord {
     /// Number of the iteration over all phases of the solve.
     pub iteration: usize,
     /// Phase of the solve: `tracking`, `muscle_tracking`, `cost`, ...
-    pub phase: Phase,
+    pub phase: SolvePhase,
     /// Objective of the phase.
     pub objective: f64,
     /// Largest violation of a scaled constraint row.
@@ -29,7 +29,7 @@ pub struct IterationRecord {
 /// Phase of a solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Phase {
+pub enum SolvePhase {
     /// Tracking of the reference gait without muscles, in a cold start.
     Tracking,
     /// Tracking of the reference gait with muscles, in a cold start.
@@ -39,7 +39,8 @@ pub enum Phase {
     /// Minimisation of the cost of transport.
     Cost,
     /// Minimisation of the cost of transport with tightened bounds.
-    BetweenPoints,
+    #[serde(alias = "between_points")] // the name in progress of older records
+    InterNode,
 }
 
 /// Cancels a solve from another thread, within one iteration.

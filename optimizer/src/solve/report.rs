@@ -1,15 +1,12 @@
 //! The outcome of a solve: report, gait and violations.
 
-use super::attempts::Choice;
-use super::run::Context;
 use super::warm_start::WarmStart;
 use crate::gait::Gait;
-use crate::gait_problem::GaitProgramme;
-use crate::gait_problem::margins::Margins;
-use crate::gait_problem::programme::RowViolation;
-use crate::metrics::gait_rmse;
-use crate::nlp::{NlpResult, NlpStatus, NonlinearProgram};
+use interior_point::{NlpResult, NlpStatus};
 use serde::{Deserialize, Serialize};
+
+/// Largest scaled violation of a converged gait.
+pub const CONVERGED_VIOLATION: f64 = 1e-6;
 
 /// Status of a solve. Only a `Converged` gait satisfies every constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,7 +53,7 @@ pub enum StartedFrom {
 
 /// An attempt of a solve.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Attempt {
+pub struct SolveAttempt {
     /// Label of the start.
     pub strategy: String,
     /// Status of the attempt.
@@ -72,16 +69,16 @@ pub struct Attempt {
     /// The reason why the attempt could not be completed; empty otherwise.
     #[serde(default)]
     pub reason: String,
-    /// Number of its local optimum, from 1 in the order of the attempts. Attempts with the same number have the same gait. `None`
-    /// if it did not converge.
+    /// Number of its local optimum, from 1 in the order of the attempts. Attempts with the same number have the same
+    /// gait. `None` if it did not converge.
     #[serde(default)]
     pub basin: Option<usize>,
     /// Whether it is the outcome of the solve.
     pub chosen: bool,
 }
 
-/// Residuals of the first-order conditions at the result, computed independently with the scaling of Wächter and Biegler
-/// (2006, eq. 5), for the problem with tightened bounds.
+/// Residuals of the first-order conditions at the result, computed independently with the scaling of Wächter and
+/// Biegler (2006, eq. 5), for the problem with tightened bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Optimality {
     /// Largest entry of the gradient of the Lagrangian.
@@ -132,7 +129,7 @@ impl LinearAlgebra {
         self.fallbacks += other.fallbacks;
     }
 
-    fn seconds(&self) -> f64 {
+    pub(super) fn seconds(&self) -> f64 {
         self.seconds_analysis + self.seconds_factorisation + self.seconds_solves
     }
 }
@@ -164,8 +161,8 @@ pub struct SolveReport {
     pub tightened_bounds: usize,
     /// Wall time, s.
     pub seconds_total: f64,
-    /// Time of function and derivative evaluations, s. This and the following times are sums over attempts, which may exceed the
-    /// wall time.
+    /// Time of function and derivative evaluations, s. This and the following times are sums over attempts, which may
+    /// exceed the wall time.
     pub seconds_evaluation: f64,
     /// Time of the linear algebra, s.
     pub seconds_linear_algebra: f64,
@@ -188,7 +185,7 @@ pub struct SolveReport {
     pub vhip_m_s: [f64; 4],
     /// The attempts in order. Iterations and times above are sums, the other values are those of the chosen attempt.
     #[serde(default)]
-    pub attempts: Vec<Attempt>,
+    pub attempts: Vec<SolveAttempt>,
 }
 
 /// A violated constraint row or bound.
@@ -231,100 +228,6 @@ pub struct SolveOutcome {
     /// The other local optima, with one gait for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub other_basins: Vec<OtherBasin>,
-}
-
-/// Total cost of the attempts of a solve.
-#[derive(Default)]
-pub(super) struct Tally {
-    pub(super) iterations: usize,
-    pub(super) evaluation_s: f64,
-    pub(super) linear_algebra: LinearAlgebra,
-    pub(super) attempts: Vec<Attempt>,
-}
-
-/// Largest number of reported violations.
-const MAX_VIOLATIONS: usize = 20;
-
-/// The outcome of the chosen attempt.
-pub(super) fn outcome(
-    context: &Context<'_>,
-    choice: Choice,
-    margins: &Margins,
-    tally: Tally,
-    started_from: StartedFrom,
-) -> SolveOutcome {
-    let (problem, programme) = (context.problem, context.programme);
-    let Choice { result, gait, status, .. } = choice;
-    let x = &result.x;
-    let rmse = gait_rmse(&gait, &problem.reference);
-    let margins = margins.bearing_on(programme, x);
-    let violations = programme.violations(x);
-    let parts = programme.objective_parts(x);
-    let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
-    let report = SolveReport {
-        status,
-        started_from,
-        iterations: tally.iterations,
-        objective: programme.objective(x),
-        cost_of_transport: parts.cost_of_transport,
-        gait_rmse_rad: rmse.total,
-        gait_rmse_parts_rad: rmse.parts,
-        max_violation: violations.first().map_or(0.0, |v| v.amount),
-        optimality: Some(Optimality {
-            dual_infeasibility: result.scaled_residuals.dual_infeasibility,
-            complementarity: result.scaled_residuals.complementarity,
-            barrier: result.mu,
-        })
-        .filter(|o| o.dual_infeasibility.is_finite() && o.complementarity.is_finite()),
-        tightened_bounds: margins.count(),
-        seconds_total: context.started.elapsed().as_secs_f64(),
-        seconds_evaluation: tally.evaluation_s,
-        seconds_linear_algebra: tally.linear_algebra.seconds(),
-        linear_algebra: Some(tally.linear_algebra),
-        variables: programme.variables(),
-        equalities,
-        inequalities: programme.rows() - equalities,
-        speed_m_s: gait.speed_m_s,
-        stride_length_m: gait.stride_length_m,
-        durations_s: std::array::from_fn(|d| gait.domains[d].duration_s),
-        vhip_m_s: gait.hip_velocity_m_s,
-        attempts: tally.attempts,
-    };
-    let violations = if status == SolveStatus::Converged {
-        Vec::new()
-    } else {
-        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
-    };
-    let warm_start = warm_start(context, &result, margins);
-    SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
-}
-
-/// The gait of another local optimum.
-pub(super) fn other_basin(context: &Context<'_>, choice: Choice, attempt: &Attempt, basin: usize) -> OtherBasin {
-    OtherBasin {
-        basin,
-        objective: attempt.objective,
-        gait_rmse_rad: attempt.gait_rmse_rad,
-        warm_start: warm_start(context, &choice.result, Margins::default()),
-        gait: choice.gait,
-    }
-}
-
-fn warm_start(context: &Context<'_>, result: &NlpResult, margins: Margins) -> WarmStart {
-    let problem = context.problem;
-    WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point(), margins }
-}
-
-fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {
-    if let Some(row) = violation.row {
-        let name = &programme.rows.names[row];
-        let (_, unit, scale) = name.kind.description();
-        Violation { row: name.label(), amount: violation.amount * scale, unit: unit.to_owned() }
-    } else {
-        let variable = violation.variable.unwrap_or(0);
-        let (label, unit) = programme.layout.variable_label(variable);
-        Violation { row: label, amount: violation.amount * programme.layout.scale[variable], unit: unit.to_owned() }
-    }
 }
 
 #[cfg(test)]

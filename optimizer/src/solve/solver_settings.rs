@@ -1,10 +1,10 @@
 //! The settings of the interior-point solver that a caller can choose for gait problems.
 //!
-//! The phases of a solve determine the others from the options and the initial guess: tolerances, limits, barrier parameter and
-//! strategy, distance of the first point from its bounds, threshold of the curvature, and threads.
+//! The phases of a solve determine the others from the options and the initial guess: tolerances, limits, barrier
+//! parameter and strategy, distance of the first point from its bounds, threshold of the curvature, and threads.
 
-use crate::nlp::{BoundMultiplierStart, NlpSettings};
 use crate::subject::ModelError;
+use interior_point::{BoundMultiplierStart, NlpSettings};
 use serde::de::Error as _;
 use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -28,9 +28,9 @@ const DECIDED_BY_PHASES: [&str; 14] = [
     "threads",
 ];
 
-/// Defaults for gait problems. Cold starts keep a distance from their bounds, and bound multipliers start on the central path.
-/// After a wrong inertia the unregularised matrix is not tried again immediately, and an unsuccessful second-order correction is
-/// not repeated.
+/// Defaults for gait problems. Cold starts keep a distance from their bounds, and bound multipliers start on the
+/// central path. After a wrong inertia the unregularised matrix is not tried again immediately, and an unsuccessful
+/// second-order correction is not repeated.
 pub(super) fn default() -> NlpSettings {
     NlpSettings {
         bound_push: 0.1,
@@ -76,7 +76,8 @@ pub(super) fn serialize<S: Serializer>(settings: &NlpSettings, serializer: S) ->
     own.serialize(serializer)
 }
 
-/// Deserialises settings. Missing fields have the defaults for gait problems; fields that the phases determine must be missing.
+/// Deserialises settings. Missing fields have the defaults for gait problems; fields that the phases determine must
+/// be missing.
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<NlpSettings, D::Error> {
     let mut all = fields(&default()).map_err(D::Error::custom)?;
     let given = Map::deserialize(deserializer)?;

@@ -1,10 +1,10 @@
 //! Warm starts: the result of a solve as a starting point.
 
-use super::{GaitProblem, SolveError};
+use super::error::SolveError;
 use crate::gait_problem::margins::Margins;
-use crate::gait_problem::{GaitProgramme, mesh_transfer};
-use crate::nlp::{NonlinearProgram, WarmPoint};
+use crate::gait_problem::{GaitProblem, GaitProgramme, mesh_transfer};
 use crate::settings::Mesh;
+use interior_point::{NonlinearProgram, WarmPoint};
 use serde::{Deserialize, Serialize};
 
 /// The primal-dual point of a solve of the same variant, on any mesh.
@@ -23,7 +23,7 @@ pub struct WarmStart {
 }
 
 /// A starting point on the mesh of a problem.
-pub(super) struct Start {
+pub(super) struct MeshStart {
     pub(super) point: WarmPoint,
     pub(super) margins: Margins,
     pub(super) strategy: &'static str,
@@ -37,7 +37,7 @@ pub(super) fn on_mesh_of(
     problem: &GaitProblem,
     programme: &GaitProgramme,
     warm: &WarmStart,
-) -> Result<Start, SolveError> {
+) -> Result<MeshStart, SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
             "it is {} muscles, but the problem is {} muscles",
@@ -47,13 +47,13 @@ pub(super) fn on_mesh_of(
     }
     if warm.mesh == problem.settings.mesh {
         check_shape(programme, warm)?;
-        return Ok(Start { point: warm.point.clone(), margins: warm.margins.clone(), strategy: "warm start" });
+        return Ok(MeshStart { point: warm.point.clone(), margins: warm.margins.clone(), strategy: "warm start" });
     }
     let mut of_its_mesh = problem.clone();
     of_its_mesh.settings.mesh = warm.mesh;
     let own = of_its_mesh.programme(problem.muscles)?;
     check_shape(&own, warm)?;
-    Ok(Start {
+    Ok(MeshStart {
         point: mesh_transfer::transfer(&own, programme, &warm.point),
         margins: Margins::default(),
         strategy: "warm start from another mesh",

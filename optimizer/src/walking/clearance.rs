@@ -3,8 +3,8 @@
 
 use super::domain::{CYCLE, DomainKind};
 use super::stick_figure::stick_figure;
-use crate::body::WalkerModel;
-use crate::gait::{Gait, Side};
+use crate::body::{Side, WalkerModel};
+use crate::gait::Gait;
 use crate::subject::ModelError;
 
 /// The profile `(4 w (1 - w))^2` with its first two derivatives.

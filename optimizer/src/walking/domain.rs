@@ -7,7 +7,7 @@
 //! - SS2 to SS1: the force of the stance heel vanishes (identity)
 //! - SS1 to DS2: the swing heel lands (impact, the legs exchange roles)
 
-use crate::gait::{Axis, FootPoint, Side};
+use crate::body::{Axis, FootPoint, Side};
 
 /// The contact configuration of a domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

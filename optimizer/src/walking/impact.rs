@@ -1,8 +1,7 @@
 //! The plastic impact: velocities after a landing, and contact impulses.
 
 use super::domain::Domain;
-use crate::body::{InverseDynamics, PointState, WalkerModel};
-use crate::gait::Axis;
+use crate::body::{Axis, InverseDynamics, PointState, WalkerModel};
 use nalgebra::{DMatrix, DVector};
 
 /// Velocities after an impact and the impulses of the contact rows.

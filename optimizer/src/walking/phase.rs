@@ -1,8 +1,7 @@
 //! The phase variable: the linearised forward position of the hip relative to the stance toe.
 
 use crate::body::coordinates::to_generalised;
-use crate::body::{WalkerModel, point::first_link};
-use crate::gait::Side;
+use crate::body::{Side, WalkerModel, point::first_link};
 
 /// Gradient of the phase variable `dp(q) = gradient . q[2..]` in m, the linearisation of hip minus stance toe:
 /// `-(L_shank psi_shank + L_thigh psi_thigh + h psi_foot)` of the stance leg.

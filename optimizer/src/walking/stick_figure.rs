@@ -1,7 +1,7 @@
 //! Joint positions, for drawings of a gait.
 
-use crate::body::{PointState, WalkerModel};
-use crate::gait::{FootPoint, Gait, Side};
+use crate::body::{FootPoint, PointState, Side, WalkerModel};
+use crate::gait::Gait;
 use crate::subject::ModelError;
 use serde::{Deserialize, Serialize};
 

@@ -6,11 +6,11 @@ use crate::random::Random;
 use crate::rows::{self, Problem};
 use crate::walker::Walker;
 use crate::{Scalar, domains, muscles, variables};
-use gait_optimizer::gait_problem::rows::Place;
+use gait_optimizer::gait_problem::rows::RowPlace;
 use gait_optimizer::gait_problem::{GaitProgramme, RowKind, RowName};
-use gait_optimizer::nlp::{NonlinearProgram, SparsityPattern};
 use gait_optimizer::settings::Regularisation;
 use gait_optimizer::{Device, GaitSettings, Mesh, ReferenceGait, Subject, TunedBounds};
+use interior_point::{NonlinearProgram, SparsityPattern};
 use num_dual::{Dual64, HyperDual64};
 use std::collections::{BTreeMap, HashMap};
 
@@ -275,8 +275,8 @@ fn curvature(
 /// The domain of a group of rows, for messages and for parts of the Hessian.
 fn group(name: RowName) -> (String, u8) {
     let domain = match name.place {
-        Place::Point { domain, .. } | Place::Transition { domain } => domain,
-        Place::Stride => 8,
+        RowPlace::Point { domain, .. } | RowPlace::Transition { domain } => domain,
+        RowPlace::Stride => 8,
     };
     (format!("{:?}", name.kind), domain)
 }

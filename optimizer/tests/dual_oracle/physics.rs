@@ -3,10 +3,10 @@
 use crate::random::Random;
 use crate::walker::{GRAVITY, State, Walker};
 use gait_optimizer::body::{InverseDynamics, PointState, WalkerModel};
-use gait_optimizer::gait_problem::rows::Place;
+use gait_optimizer::gait_problem::rows::RowPlace;
 use gait_optimizer::gait_problem::{GaitProgramme, PointVariables, RowKind};
-use gait_optimizer::nlp::NonlinearProgram;
 use gait_optimizer::{Device, GaitSettings, ReferenceGait, Subject, TunedBounds};
+use interior_point::NonlinearProgram;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use num_dual::Dual64;
 
@@ -242,7 +242,7 @@ fn standing() -> PointVariables {
 }
 
 /// The (row, component) of a kind at a point or transition.
-fn rows_of(programme: &GaitProgramme, place: Place, kind: RowKind) -> Vec<(usize, usize)> {
+fn rows_of(programme: &GaitProgramme, place: RowPlace, kind: RowKind) -> Vec<(usize, usize)> {
     let names = programme.rows.names.iter().enumerate();
     names.filter(|(_, n)| n.place == place && n.kind == kind).map(|(i, n)| (i, usize::from(n.component))).collect()
 }
@@ -305,8 +305,8 @@ fn impacts_are_plastic_lose_energy_and_balance_momentum() {
             }
             let mut g = vec![0.0; programme.rows()];
             programme.constraints(&x, &mut g);
-            let impact = rows_of(&programme, Place::Transition { domain: 7 }, RowKind::Impact);
-            let at_rest = rows_of(&programme, Place::Point { domain: 0, point: 0 }, RowKind::ContactVelocity);
+            let impact = rows_of(&programme, RowPlace::Transition { domain: 7 }, RowKind::Impact);
+            let at_rest = rows_of(&programme, RowPlace::Point { domain: 0, point: 0 }, RowKind::ContactVelocity);
             assert_eq!((impact.len(), at_rest.len()), (9, 4));
             for &(row, _) in impact.iter().chain(&at_rest) {
                 close("row", g[row], 0.0, 1e-9);
@@ -362,7 +362,7 @@ fn ground_carries_the_weight_in_upright_standing() {
         layout.set_point_variables(&mut x, 2, 1, &point);
         let mut g = vec![0.0; programme.rows()];
         programme.constraints(&x, &mut g);
-        let rows = rows_of(&programme, Place::Point { domain: 2, point: 1 }, RowKind::Dynamics);
+        let rows = rows_of(&programme, RowPlace::Point { domain: 2, point: 1 }, RowKind::Dynamics);
         assert_eq!(rows.len(), 9);
         for &(row, _) in &rows {
             close("equation of motion", g[row], 0.0, 1e-10);

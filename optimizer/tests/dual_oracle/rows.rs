@@ -5,7 +5,7 @@ use crate::muscles::{self, Muscle};
 use crate::variables::{DomainVariables, GaitVariables, Point};
 use crate::walker::{GRAVITY, State, Walker};
 use crate::{Scalar, constant};
-use gait_optimizer::gait_problem::rows::Place;
+use gait_optimizer::gait_problem::rows::RowPlace;
 use gait_optimizer::gait_problem::{RowKind, RowName};
 
 /// Parameters of the rows.
@@ -21,7 +21,7 @@ pub(crate) struct Problem {
 /// Rows in the order of this implementation.
 pub(crate) struct Rows<D> {
     pub(crate) list: Vec<(RowName, D)>,
-    place: Place,
+    place: RowPlace,
 }
 
 impl<D: Scalar> Rows<D> {
@@ -31,13 +31,13 @@ impl<D: Scalar> Rows<D> {
     }
 
     fn at(&mut self, domain: usize, point: usize) {
-        self.place = Place::Point { domain: u8::try_from(domain).unwrap(), point: u16::try_from(point).unwrap() };
+        self.place = RowPlace::Point { domain: u8::try_from(domain).unwrap(), point: u16::try_from(point).unwrap() };
     }
 }
 
 /// All rows.
 pub(crate) fn all<D: Scalar>(problem: &Problem, gait: &GaitVariables<D>) -> Vec<(RowName, D)> {
-    let mut rows = Rows { list: Vec::new(), place: Place::Stride };
+    let mut rows = Rows { list: Vec::new(), place: RowPlace::Stride };
     for d in 0..8 {
         for k in 0..problem.domains[d].points() {
             rows.at(d, k);
@@ -46,7 +46,7 @@ pub(crate) fn all<D: Scalar>(problem: &Problem, gait: &GaitVariables<D>) -> Vec<
         integration_rows(problem, gait, d, &mut rows);
         transition_rows(problem, gait, d, &mut rows);
     }
-    rows.place = Place::Stride;
+    rows.place = RowPlace::Stride;
     rows.add(RowKind::StepLength, 0, gait.right_step);
     rows.add(RowKind::StepLength, 1, gait.stride - gait.right_step);
     let mut time = constant::<D>(0.0);
@@ -337,7 +337,7 @@ fn transition_rows<D: Scalar>(problem: &Problem, gait: &GaitVariables<D>, d: usi
     let next = (d + 1) % 8;
     let before = &gait.domains[d].points[problem.domains[d].points() - 1];
     let after = &gait.domains[next].points[0];
-    rows.place = Place::Transition { domain: u8::try_from(d).unwrap() };
+    rows.place = RowPlace::Transition { domain: u8::try_from(d).unwrap() };
     for i in 0..9 {
         let shift = if i == 0 && next == 0 { gait.stride } else { constant(0.0) };
         rows.add(RowKind::PositionReset, i, after.q[i] - (before.q[i] - shift));

@@ -2,7 +2,7 @@
 
 use crate::gait_series::{MUSCLES, Point, points};
 use crate::{Chart, Figure, Span, Stroke, band_in_words, over_reference};
-use gait_optimizer::solve::Phase;
+use gait_optimizer::solve::SolvePhase;
 use gait_optimizer::walking::stick_figure::StickFigure;
 use gait_optimizer::walking::{Progress, progress};
 use gait_optimizer::{Gait, IterationRecord, ModelError, ReferenceGait};
@@ -296,13 +296,13 @@ fn stroke(place: usize) -> Stroke {
 }
 
 /// In words.
-fn phase_in_words(phase: Phase) -> &'static str {
+fn phase_in_words(phase: SolvePhase) -> &'static str {
     match phase {
-        Phase::Tracking => "tracking",
-        Phase::MuscleTracking => "tracking with muscles",
-        Phase::PlainCost => "cost without muscles",
-        Phase::Cost => "cost",
-        Phase::BetweenPoints => "bounds tightened between nodes",
+        SolvePhase::Tracking => "tracking",
+        SolvePhase::MuscleTracking => "tracking with muscles",
+        SolvePhase::PlainCost => "cost without muscles",
+        SolvePhase::Cost => "cost",
+        SolvePhase::InterNode => "bounds tightened between nodes",
     }
 }
 
@@ -319,7 +319,7 @@ fn solve_phases(iterations: &[&IterationRecord]) -> Vec<(f64, String)> {
         }
         last = Some((r.guess, r.phase));
         let phase = phase_in_words(r.phase);
-        let of_guess = several && r.phase != Phase::BetweenPoints;
+        let of_guess = several && r.phase != SolvePhase::InterNode;
         let name = if of_guess { format!("guess {}: {phase}", r.guess + 1) } else { phase.to_owned() };
         starts.push((i as f64, name));
     }

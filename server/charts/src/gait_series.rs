@@ -1,7 +1,7 @@
 //! A gait as one series of nodes over the stride, for tables and charts.
 
 use gait_optimizer::Gait;
-use gait_optimizer::gait::{Axis, FootPoint, Side};
+use gait_optimizer::body::{Axis, FootPoint, Side};
 
 /// Ground force components: point, side, axis.
 pub const FORCE_NAMES: [&str; 8] = [

@@ -118,7 +118,7 @@ pub(super) fn basin_of_answer(report: &SolveReport) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gait_optimizer::nlp::WarmPoint;
+    use gait_optimizer::WarmPoint;
     use gait_optimizer::{Margins, Mesh};
 
     fn end(x: &[f64]) -> WarmStart {

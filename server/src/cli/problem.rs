@@ -6,7 +6,7 @@ use super::numbers::iterations;
 use super::output::tell;
 use super::serve::interrupted;
 use clap::Args;
-use gait_optimizer::nlp::NlpSettings;
+use gait_optimizer::NlpSettings;
 use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, Mesh, OtherBasin, ReferenceGait, SolveOptions, SolveOutcome,
     TunedBounds,

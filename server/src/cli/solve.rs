@@ -11,8 +11,8 @@ use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::{
-    BasinChoice, ColdGuess, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
-    TunedBounds, solve,
+    BasinChoice, GaitProblem, InitialGuess, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus,
+    StartedFrom, TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
@@ -24,8 +24,8 @@ use std::path::{Path, PathBuf};
 /// Maximum number of threads of a solve.
 const MOST_THREADS: usize = 16;
 
-fn cold_guesses(text: &str) -> Result<usize, String> {
-    whole(text, 1, ColdGuess::MOST)
+fn initial_guesses(text: &str) -> Result<usize, String> {
+    whole(text, 1, InitialGuess::MOST)
 }
 
 #[derive(Debug, Args)]
@@ -48,16 +48,16 @@ pub(super) struct Solve {
         value_name = "FILE",
         conflicts_with_all = [
             "subject", "height_m", "mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
-            "max_iterations", "time_limit_s", "solver_settings", "bounds", "cold_guesses", "nearest_within"
+            "max_iterations", "time_limit_s", "solver_settings", "bounds", "initial_guesses", "nearest_within"
         ]
     )]
     problem: Option<PathBuf>,
     /// Basin in the file of --warm to start from (default: that of its gait).
     #[arg(long, value_name = "NUMBER", requires = "warm")]
     warm_basin: Option<usize>,
-    /// So many cold guesses are tried whatever becomes of them; --out keeps a gait of every basin that they reach.
-    #[arg(long, value_name = "NUMBER", value_parser = cold_guesses, allow_negative_numbers = true)]
-    cold_guesses: Option<usize>,
+    /// Number of initial guesses to try in any case; --out keeps a gait of every basin that they reach.
+    #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true)]
+    initial_guesses: Option<usize>,
     /// Take the gait nearest to the reference among those whose objective is within so many per cent of the lowest; default:
     /// the lowest.
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
@@ -110,7 +110,7 @@ impl Solve {
 
     fn options(&self) -> Result<SolveOptions, Error> {
         let mut options = self.flags.options()?;
-        options.cold_guesses = self.cold_guesses.unwrap_or(options.cold_guesses);
+        options.initial_guesses = self.initial_guesses.unwrap_or(options.initial_guesses);
         if let Some(within_percent) = self.nearest_within {
             options.basin_choice = BasinChoice::NearestToReference { within_percent };
         }

@@ -93,8 +93,8 @@ pub struct Conflict {
     pub bounds: Vec<GivenBound>,
     /// Bounds of other conflicts that were relaxed when this one was found.
     pub without: Option<Vec<String>>,
-    /// Wishes that are part of what is fixed, where that contradicts itself; absent: none.
-    pub wishes: Option<Vec<String>>,
+    /// Naturalness terms that take part, if fixed constraints conflict; absent: none.
+    pub naturalness_terms: Option<Vec<String>>,
     /// What is violated where the search for a gait came nearest, all other tuned bounds at their loosest, worst first.
     pub violations: Vec<Violation>,
     /// Number of starting points of the search.
@@ -170,6 +170,6 @@ pub struct Iteration {
     pub barrier: f64,
     /// Primal step length.
     pub step: f64,
-    /// Cold guess it belongs to.
+    /// Initial guess it belongs to.
     pub guess: u64,
 }

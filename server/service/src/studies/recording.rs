@@ -3,7 +3,7 @@
 
 use crate::error::Error;
 use crate::printable;
-use gait_optimizer::reference::{AngleUnit, HeelStrikes, Recording, Walker, distance};
+use gait_optimizer::reference::{AngleUnit, HeelStrikes, MotionRecording, Walker, distance};
 use gait_optimizer::{ReferenceGait as Definition, Subject};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
@@ -114,10 +114,10 @@ impl NewReferenceGait {
             Form::Opensim => {
                 let unit = self.unit.map(AngleUnit::from);
                 let here = self.force_column.as_deref().filter(|_| self.forces.is_none());
-                Recording::from_opensim(what, &self.recording, unit, here)?
+                MotionRecording::from_opensim(what, &self.recording, unit, here)?
             }
-            Form::Camargo => Recording::from_camargo_csv(what, &self.recording)?,
-            Form::Csv => Recording::from_csv(what, &self.recording)?,
+            Form::Camargo => MotionRecording::from_camargo_csv(what, &self.recording)?,
+            Form::Csv => MotionRecording::from_csv(what, &self.recording)?,
         };
         let recording = match &self.forces {
             Some(text) => {

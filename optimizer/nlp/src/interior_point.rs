@@ -1,0 +1,156 @@
+//! The interior-point iteration on one formulation (WB06 algorithm A): the problem itself, or its restoration phase
+//! with elastic variables.
+
+use crate::barrier;
+use crate::formulation::Objective;
+use crate::iterate::{Ending, Iterate, SolveSession, StepRecord};
+use crate::optimality::OptimalityError;
+use crate::primal_dual::largest;
+use crate::restoration;
+use crate::settings::NlpSettings;
+use crate::status::{NlpIteration, NlpPhase};
+
+/// Whether a restoration phase ends at this w.
+pub(crate) type Leave<'f> = &'f mut dyn FnMut(&[f64]) -> bool;
+
+/// A primal step below this is short (`NlpSettings::short_step_limit`).
+const SHORT_STEP: f64 = 0.05;
+
+impl Iterate<'_> {
+    fn is_converged(&self, settings: &NlpSettings, now: &OptimalityError) -> bool {
+        let scale = self.form.objective_scale;
+        now.error() <= settings.tolerance
+            && self.largest_violation() <= settings.violation_tolerance
+            && now.dual / scale <= settings.dual_tolerance
+            && now.complementarity / scale <= settings.complementarity_tolerance
+    }
+
+    fn report(&mut self, session: &mut SolveSession, now: &OptimalityError) {
+        let objective = match self.form.objective {
+            Objective::Program => self.objective / self.form.objective_scale,
+            Objective::Restoration { .. } => self.form.program.objective(&self.point.w[..self.form.n]),
+        };
+        let step = session.last_step;
+        (session.observer)(&NlpIteration {
+            number: session.iterations,
+            phase: self.phase(),
+            objective,
+            violation: self.program_violation(),
+            dual_infeasibility: now.dual,
+            complementarity: now.complementarity,
+            mu: self.mu,
+            alpha_primal: step.alpha_primal,
+            alpha_dual: step.alpha_dual,
+            delta_w: step.delta_w,
+            delta_c: step.delta_c,
+            trials: step.trials,
+        });
+    }
+
+    /// Largest |dw| relative to the point.
+    fn relative_step(&self) -> f64 {
+        self.direction.w.iter().zip(&self.point.w).fold(0.0, |a: f64, (d, w)| a.max(d.abs() / (1.0 + w.abs())))
+    }
+
+    /// Runs the restoration phase from the current point. `None` if it reaches an acceptable point; otherwise the
+    /// ending of the solve, at the last point of the phase.
+    fn restore(&mut self, session: &mut SolveSession) -> Option<Ending> {
+        let theta = self.theta();
+        let Some(mut phase) = restoration::begin(self, session) else { return Some(Ending::Stalled) };
+        let ending = {
+            let mut leave = restoration::may_leave(self, session.settings, theta);
+            phase.iterate(session, Some(&mut leave))
+        };
+        restoration::finish(self, session, &phase, theta, ending)
+    }
+
+    /// Iterates until an ending. `leave` is called after each step of a restoration phase.
+    pub(crate) fn iterate(&mut self, session: &mut SolveSession, mut leave: Option<Leave>) -> Ending {
+        session.newton.fit(&self.form);
+        let settings = session.settings;
+        let mut tiny_steps = 0usize;
+        let mut rescues = 0usize;
+        let mut short_steps = 0usize;
+        let mut soft_steps = 0usize;
+        let mut elastic_resets = 0usize;
+        loop {
+            let now = self.current_optimality();
+            self.report(session, &now);
+            if self.is_converged(settings, &now) {
+                return Ending::Converged;
+            }
+            if (session.cancel)() {
+                return Ending::Cancelled;
+            }
+            if session.iterations >= settings.max_iterations {
+                return Ending::IterationLimit;
+            }
+            if session.started.elapsed().as_secs_f64() >= settings.max_seconds {
+                return Ending::TimeLimit;
+            }
+            if largest(&self.point.w[..self.form.n]) > settings.divergence_limit {
+                return Ending::Unbounded;
+            }
+            if tiny_steps > 1 && self.mu <= barrier::smallest_mu(settings, self.form.objective_scale) {
+                return Ending::Stalled;
+            }
+            self.update_mu(settings, &now, tiny_steps > 0);
+            session.iterations += 1;
+            match self.phase() {
+                NlpPhase::Regular => session.counts.regular_iterations += 1,
+                NlpPhase::Restoration => session.counts.restoration_iterations += 1,
+            }
+
+            let found = self.compute_direction(session);
+            let tiny = found && self.relative_step() < 10.0 * f64::EPSILON && self.theta() < 1e-4;
+            tiny_steps = if tiny { tiny_steps + 1 } else { 0 };
+            if found && self.line_search(session, tiny) {
+                rescues = 0;
+                elastic_resets = 0;
+                soft_steps = 0;
+                if leave.as_mut().is_some_and(|leave| leave(&self.point.w)) {
+                    return Ending::Left;
+                }
+                short_steps = if session.last_step.alpha_primal < SHORT_STEP { short_steps + 1 } else { 0 };
+                let crawls = settings.short_step_limit > 0
+                    && short_steps >= settings.short_step_limit
+                    && self.phase() == NlpPhase::Regular
+                    && largest(&self.c) > settings.tolerance
+                    && session.counts.restoration_phases < settings.max_restoration_phases;
+                if !crawls {
+                    continue;
+                }
+            } else if found && soft_steps < settings.max_soft_steps && self.soft_step(session) {
+                soft_steps += 1;
+                continue;
+            }
+            short_steps = 0;
+            soft_steps = 0;
+            self.search.end_watch();
+            session.last_step = StepRecord::default();
+            match self.phase() {
+                NlpPhase::Restoration => {
+                    elastic_resets += 1;
+                    if elastic_resets > 2 {
+                        return Ending::Stalled;
+                    }
+                    if elastic_resets > 1 || !restoration::reset_elastics(self) {
+                        self.recentre(session);
+                    }
+                }
+                NlpPhase::Regular => {
+                    let nearly_feasible = largest(&self.c) <= 1e-2 * settings.tolerance;
+                    if nearly_feasible || session.counts.restoration_phases >= settings.max_restoration_phases {
+                        rescues += 1;
+                        if rescues > 1 {
+                            return Ending::Stalled;
+                        }
+                        self.recentre(session);
+                    } else if let Some(ending) = self.restore(session) {
+                        return ending;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,510 @@
+//! The primal-dual Newton system and its solution with iterative refinement.
+//!
+//! ```text
+//! (W + delta_w) dw + A^T dy - dz_L + dz_U = r_w
+//!        A dw      - delta_c dy           = r_y
+//!      Z_L dw      + S_L dz_L             = r_L
+//!     -Z_U dw      + S_U dz_U             = r_U
+//! ```
+//!
+//! with S_L = w - l, S_U = u - w. Eliminating the bound multipliers and the row variables leaves the matrix of `kkt`.
+//! The residual is always that of the full system above, which is not scaled by the eliminated slacks (WB06 section
+//! 3.10).
+
+use std::iter::repeat;
+use std::time::Instant;
+
+use crate::factorisation::{Inertia, KktSolver, MatrixChange};
+use crate::formulation::{Formulation, RowForm};
+use crate::kkt::KktMatrix;
+use crate::primal_dual::{Linearisation, PrimalDual, largest};
+use crate::settings::NlpSettings;
+
+/// |r| / (|rhs| + min(|d|, 1e6 |rhs|)); infinite when the solution d is not finite.
+fn relative(residual: f64, size: f64, length: f64) -> f64 {
+    let scale = size + length.min(1e6 * size);
+    if !length.is_finite() {
+        f64::INFINITY
+    } else if scale > 0.0 {
+        residual / scale
+    } else {
+        0.0
+    }
+}
+
+/// Relative residuals of a solution.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Solved {
+    /// Before refinement.
+    pub unrefined: f64,
+    pub refined: f64,
+}
+
+/// Times and counts of the linear algebra.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct LinearTally {
+    /// Assembly and factorisation.
+    pub factor_seconds: f64,
+    /// Substitutions, residuals and refinement.
+    pub solve_seconds: f64,
+    pub factorisations: usize,
+    pub backsolves: usize,
+}
+
+/// KKT matrix, factorisation and workspace.
+pub(crate) struct NewtonSystem {
+    matrix: KktMatrix,
+    solver: Box<dyn KktSolver>,
+    /// Diagonal of the w block: Sigma + curvature + delta_w.
+    diagonal: Vec<f64>,
+    delta_w: f64,
+    delta_c: f64,
+    /// Indices whose regularisation the factorisation neglected.
+    unregularised: Vec<bool>,
+    rhs: Vec<f64>,
+    residual: PrimalDual,
+    correction: PrimalDual,
+    pub tally: LinearTally,
+}
+
+impl NewtonSystem {
+    pub(crate) fn new(matrix: KktMatrix, solver: Box<dyn KktSolver>) -> Self {
+        let rhs = vec![0.0; matrix.order];
+        Self {
+            matrix,
+            solver,
+            diagonal: Vec::new(),
+            delta_w: 0.0,
+            delta_c: 0.0,
+            unregularised: vec![false; rhs.len()],
+            rhs,
+            residual: PrimalDual::default(),
+            correction: PrimalDual::default(),
+            tally: LinearTally::default(),
+        }
+    }
+
+    pub(crate) fn factor_entries(&self) -> usize {
+        self.solver.factor_entries()
+    }
+
+    pub(crate) fn solver_fallbacks(&self) -> usize {
+        self.solver.fallbacks()
+    }
+
+    /// delta_c of a row in the last factorisation.
+    pub(crate) fn row_regularisation(&self, form: &Formulation, row: usize) -> f64 {
+        if self.unregularised[form.n + row] { 0.0 } else { self.delta_c }
+    }
+
+    /// See [`KktSolver::distrust`].
+    pub(crate) fn distrust(&mut self) -> bool {
+        self.solver.distrust()
+    }
+
+    /// Resizes the work vectors for a formulation; that of the restoration phase is longer.
+    pub(crate) fn fit(&mut self, form: &Formulation) {
+        self.diagonal = vec![0.0; form.length()];
+        self.residual = PrimalDual::zeros(form);
+        self.correction = PrimalDual::zeros(form);
+    }
+
+    /// Factorises the Newton matrix with the given regularisation.
+    pub(crate) fn factor(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        (delta_w, delta_c): (f64, f64),
+        change: MatrixChange,
+    ) -> Option<Inertia> {
+        let lower = point.zl.iter().zip(&at.slack_lower);
+        let upper = point.zu.iter().zip(&at.slack_upper);
+        for ((d, (zl, sl)), (zu, su)) in self.diagonal.iter_mut().zip(lower).zip(upper) {
+            *d = zl / sl + zu / su + delta_w;
+        }
+        form.add_curvature(&mut self.diagonal);
+        self.delta_w = delta_w;
+        self.delta_c = delta_c;
+        self.factor_with(form, Some(&at.hessian), &at.jacobian, change)
+    }
+
+    fn factor_with(
+        &mut self,
+        form: &Formulation,
+        hessian: Option<&[f64]>,
+        jacobian: &[f64],
+        change: MatrixChange,
+    ) -> Option<Inertia> {
+        let clock = Instant::now();
+        if change == MatrixChange::Any {
+            self.matrix.assemble(hessian, jacobian);
+        }
+        let finite = self.matrix.set_diagonal(form, &self.diagonal, self.delta_c);
+        let inertia = if finite { self.solver.factor(&self.matrix.values, change) } else { None };
+        self.unregularised.fill(false);
+        self.solver.mark_neglected(&mut self.unregularised);
+        self.tally.factor_seconds += clock.elapsed().as_secs_f64();
+        self.tally.factorisations += 1;
+        inertia
+    }
+
+    /// min |grad F + A^T y - z_L + z_U|^2 over y, by the regularised augmented system with H = I (WB06 section 3.6).
+    /// The inertia of that matrix is known, so a factorisation with another inertia is distrusted like one with a large
+    /// residual. `None` when no method solves the system or the result exceeds the limit of the multipliers.
+    pub(crate) fn least_squares_multipliers(
+        &mut self,
+        form: &Formulation,
+        settings: &NlpSettings,
+        gradient: &[f64],
+        point: &PrimalDual,
+        jacobian: &[f64],
+    ) -> Option<Vec<f64>> {
+        self.diagonal.fill(1.0);
+        self.delta_w = 0.0;
+        self.delta_c = settings.dual_regularisation_value;
+        let b: Vec<f64> = (0..form.length()).map(|j| -(gradient[j] - point.zl[j] + point.zu[j])).collect();
+        let zero = vec![0.0; form.m];
+        let (mut dw, mut y) = (vec![0.0; form.length()], vec![0.0; form.m]);
+        let mut change = MatrixChange::Any;
+        loop {
+            let inertia = self.factor_with(form, None, jacobian, change)?;
+            change = MatrixChange::Diagonal;
+            if inertia.negative == form.m && inertia.zero == 0 {
+                let clock = Instant::now();
+                self.reduced_solve(form, &b, &zero, &mut dw, &mut y);
+                let residual = self.least_squares_residual(form, jacobian, &b, &dw, &y);
+                self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+                if residual <= settings.residual_limit {
+                    return (largest(&y) <= settings.multiplier_limit).then_some(y);
+                }
+            }
+            if !self.solver.distrust() {
+                return None;
+            }
+        }
+    }
+
+    /// Relative residual of dw + A^T y = b, A dw - delta_c y = 0, measured as that of the full system.
+    fn least_squares_residual(
+        &mut self,
+        form: &Formulation,
+        jacobian: &[f64],
+        b: &[f64],
+        dw: &[f64],
+        y: &[f64],
+    ) -> f64 {
+        let r = &mut self.residual;
+        r.w.copy_from_slice(dw);
+        r.y.fill(0.0);
+        form.add_both_products(jacobian, y, &mut r.w, dw, &mut r.y);
+        // Fixed variables do not move, whatever their gradient.
+        let mut size: f64 = 0.0;
+        for ((r, b), fixed) in r.w.iter_mut().zip(b).zip(form.fixed.iter().map(Option::is_some).chain(repeat(false))) {
+            *r = if fixed { 0.0 } else { b - *r };
+            size = size.max(if fixed { 0.0 } else { b.abs() });
+        }
+        for (i, r) in r.y.iter_mut().enumerate() {
+            let delta_c = if self.unregularised[form.n + i] { 0.0 } else { self.delta_c };
+            *r = if form.rows[i] == RowForm::Free { 0.0 } else { *r - delta_c * y[i] };
+        }
+        let error = largest(&r.w).max(largest(&r.y));
+        let length = largest(dw).max(largest(y));
+        relative(error, size, length)
+    }
+
+    /// Solves (W + d) dw + A^T dy = b, A dw - delta_c dy = c with the last factorisation.
+    fn reduced_solve(&mut self, form: &Formulation, b: &[f64], c: &[f64], dw: &mut [f64], dy: &mut [f64]) {
+        let n = form.n;
+        for j in 0..n {
+            self.rhs[j] = if form.fixed[j].is_some() { 0.0 } else { b[j] };
+        }
+        self.rhs[n..].copy_from_slice(c);
+        for (k, a) in form.row_variables.iter().enumerate() {
+            self.rhs[n + a.row] -= a.sign * b[n + k] / self.diagonal[n + k];
+        }
+        self.solver.solve(&mut self.rhs);
+        dw[..n].copy_from_slice(&self.rhs[..n]);
+        dy.copy_from_slice(&self.rhs[n..]);
+        for (k, a) in form.row_variables.iter().enumerate() {
+            dw[n + k] = (b[n + k] - a.sign * dy[a.row]) / self.diagonal[n + k];
+        }
+        self.tally.backsolves += 1;
+    }
+
+    /// Solves the full system by elimination with the last factorisation.
+    fn full_solve(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+    ) {
+        // out.zl is the workspace of the eliminated right-hand side.
+        let mut b = std::mem::take(&mut out.zl);
+        let lower = rhs.zl.iter().zip(&at.slack_lower);
+        let upper = rhs.zu.iter().zip(&at.slack_upper);
+        for (((b, w), (rl, sl)), (ru, su)) in b.iter_mut().zip(&rhs.w).zip(lower).zip(upper) {
+            *b = w + rl / sl - ru / su;
+        }
+        self.reduced_solve(form, &b, &rhs.y, &mut out.w, &mut out.y);
+        out.zl = b;
+        let lower = rhs.zl.iter().zip(&point.zl).zip(&at.slack_lower);
+        for ((out, dw), ((r, z), s)) in out.zl.iter_mut().zip(&out.w).zip(lower) {
+            *out = (r - z * dw) / s;
+        }
+        let upper = rhs.zu.iter().zip(&point.zu).zip(&at.slack_upper);
+        for ((out, dw), ((r, z), s)) in out.zu.iter_mut().zip(&out.w).zip(upper) {
+            *out = (r + z * dw) / s;
+        }
+    }
+
+    /// rhs - (matrix)(direction) of the full system, into `self.residual`.
+    fn full_residual(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        d: &PrimalDual,
+    ) {
+        let r = &mut self.residual;
+        r.w.fill(0.0);
+        r.y.fill(0.0);
+        form.add_hessian_product(&at.hessian, &d.w, &mut r.w);
+        form.add_both_products(&at.jacobian, &d.y, &mut r.w, &d.w, &mut r.y);
+        form.add_curvature_product(&d.w, &mut r.w);
+        let bounds = d.zl.iter().zip(&d.zu);
+        for (((r, rhs), dw), (dzl, dzu)) in r.w.iter_mut().zip(&rhs.w).zip(&d.w).zip(bounds) {
+            *r = rhs - (*r + self.delta_w * dw - dzl + dzu);
+        }
+        for (r, _) in r.w.iter_mut().zip(&form.fixed).filter(|(_, fixed)| fixed.is_some()) {
+            *r = 0.0;
+        }
+        // Without a bound all terms are zero except the slack, which is infinite.
+        let finite = |slack: f64| if slack < f64::INFINITY { slack } else { 0.0 };
+        let lower = point.zl.iter().zip(&at.slack_lower);
+        for ((((r, rhs), dw), dz), (z, s)) in r.zl.iter_mut().zip(&rhs.zl).zip(&d.w).zip(&d.zl).zip(lower) {
+            *r = rhs - (z * dw + finite(*s) * dz);
+        }
+        let upper = point.zu.iter().zip(&at.slack_upper);
+        for ((((r, rhs), dw), dz), (z, s)) in r.zu.iter_mut().zip(&rhs.zu).zip(&d.w).zip(&d.zu).zip(upper) {
+            *r = rhs - (finite(*s) * dz - z * dw);
+        }
+        for i in 0..form.m {
+            r.y[i] = if form.rows[i] == RowForm::Free {
+                0.0
+            } else {
+                let delta_c = if self.unregularised[form.n + i] { 0.0 } else { self.delta_c };
+                rhs.y[i] - (r.y[i] - delta_c * d.y[i])
+            };
+        }
+    }
+
+    /// Solves the full system without refinement. Returns the relative residual |r| / (|rhs| + min(|d|, 1e6 |rhs|)),
+    /// a measure of the accuracy of the factorisation; infinite when the solution is not finite.
+    pub(crate) fn unrefined_residual(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+    ) -> f64 {
+        let clock = Instant::now();
+        self.full_solve(form, point, at, rhs, out);
+        let residual = self.relative_residual(form, point, at, rhs, out);
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        residual
+    }
+
+    /// Relative residual of a solution; the residual itself is in `self.residual` afterwards.
+    fn relative_residual(
+        &mut self,
+        form: &Formulation,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &PrimalDual,
+    ) -> f64 {
+        self.full_residual(form, point, at, rhs, out);
+        relative(self.residual.largest(), rhs.largest(), out.largest())
+    }
+
+    /// Solves the full system with iterative refinement; returns the relative residuals.
+    pub(crate) fn solve(
+        &mut self,
+        form: &Formulation,
+        settings: &NlpSettings,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+    ) -> Solved {
+        let unrefined = self.unrefined_residual(form, point, at, rhs, out);
+        let clock = Instant::now();
+        let refined = self.refine(form, settings, point, at, rhs, out, unrefined);
+        self.tally.solve_seconds += clock.elapsed().as_secs_f64();
+        Solved { unrefined, refined }
+    }
+
+    /// Refines a solution whose residual is in `self.residual`; returns its relative residual.
+    #[allow(clippy::too_many_arguments)] // the system, its right-hand side, its solution
+    fn refine(
+        &mut self,
+        form: &Formulation,
+        settings: &NlpSettings,
+        point: &PrimalDual,
+        at: &Linearisation,
+        rhs: &PrimalDual,
+        out: &mut PrimalDual,
+        unrefined: f64,
+    ) -> f64 {
+        let (mut best, mut ratio) = (f64::INFINITY, unrefined);
+        let mut refinements = 0;
+        loop {
+            if ratio >= best && refinements > 0 {
+                // The last correction did not reduce the residual: undo it.
+                for (a, b) in out.parts_mut().into_iter().zip(self.correction.parts()) {
+                    for (x, y) in a.iter_mut().zip(b) {
+                        *x -= y;
+                    }
+                }
+                return best;
+            }
+            let stagnates = refinements > 0 && ratio > 0.5 * best;
+            best = ratio;
+            if ratio <= settings.residual_target || !ratio.is_finite() || stagnates {
+                return best;
+            }
+            if refinements == settings.max_refinements {
+                return best;
+            }
+            let residual = std::mem::take(&mut self.residual);
+            let mut correction = std::mem::take(&mut self.correction);
+            self.full_solve(form, point, at, &residual, &mut correction);
+            self.residual = residual;
+            self.correction = correction;
+            out.add(&self.correction);
+            refinements += 1;
+            ratio = self.relative_residual(form, point, at, rhs, out);
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::factorisation;
+    use crate::nonlinear_program::{NonlinearProgram, SparsityPattern};
+
+    /// min x_1 + 2 x_2, x_1 + x_2 = 1.
+    struct Line {
+        jacobian: SparsityPattern,
+        hessian: SparsityPattern,
+    }
+
+    impl NonlinearProgram for Line {
+        fn variables(&self) -> usize {
+            2
+        }
+        fn rows(&self) -> usize {
+            1
+        }
+        fn variable_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+            lower.fill(f64::NEG_INFINITY);
+            upper.fill(f64::INFINITY);
+        }
+        fn row_bounds(&self, lower: &mut [f64], upper: &mut [f64]) {
+            lower.fill(1.0);
+            upper.fill(1.0);
+        }
+        fn jacobian_pattern(&self) -> &SparsityPattern {
+            &self.jacobian
+        }
+        fn hessian_pattern(&self) -> &SparsityPattern {
+            &self.hessian
+        }
+        fn objective(&self, x: &[f64]) -> f64 {
+            x[0] + 2.0 * x[1]
+        }
+        fn gradient(&self, _x: &[f64], gradient: &mut [f64]) {
+            gradient.copy_from_slice(&[1.0, 2.0]);
+        }
+        fn constraints(&self, x: &[f64], values: &mut [f64]) {
+            values[0] = x[0] + x[1];
+        }
+        fn jacobian(&self, _x: &[f64], values: &mut [f64]) {
+            values.fill(1.0);
+        }
+        fn hessian(&self, _x: &[f64], _sigma: f64, _multipliers: &[f64], _values: &mut [f64]) {}
+    }
+
+    /// A factorisation that is wrong until it is distrusted.
+    struct Faulty {
+        exact: Box<dyn KktSolver>,
+        /// Factor on its solutions.
+        factor: f64,
+        /// Negative eigenvalues that it counts too many.
+        miscounted: usize,
+        has_another_method: bool,
+    }
+
+    impl KktSolver for Faulty {
+        fn factor(&mut self, values: &[f64], change: MatrixChange) -> Option<Inertia> {
+            let inertia = self.exact.factor(values, change)?;
+            Some(Inertia { negative: inertia.negative + self.miscounted, ..inertia })
+        }
+        fn solve(&mut self, rhs: &mut [f64]) {
+            self.exact.solve(rhs);
+            for x in rhs {
+                *x *= self.factor;
+            }
+        }
+        fn factor_entries(&self) -> usize {
+            self.exact.factor_entries()
+        }
+        fn distrust(&mut self) -> bool {
+            (self.factor, self.miscounted) = (1.0, 0);
+            std::mem::take(&mut self.has_another_method)
+        }
+    }
+
+    /// Multipliers by a faulty factorisation, and how often was factorised.
+    fn multipliers(factor: f64, miscounted: usize, has_another_method: bool) -> (Option<Vec<f64>>, usize) {
+        let pattern = |rows, column_starts: &[usize], row_indices: &[usize]| SparsityPattern {
+            rows,
+            columns: 2,
+            column_starts: column_starts.to_vec(),
+            row_indices: row_indices.to_vec(),
+        };
+        let line = Line { jacobian: pattern(1, &[0, 1, 2], &[0, 0]), hessian: pattern(2, &[0, 0, 0], &[]) };
+        let settings = NlpSettings::default();
+        let form = Formulation::new(&line, &settings).unwrap();
+        let matrix = KktMatrix::new(&form);
+        let exact = factorisation::choose(&form, &matrix, &settings).unwrap();
+        let faulty = Faulty { exact, factor, miscounted, has_another_method };
+        let mut newton = NewtonSystem::new(matrix, Box::new(faulty));
+        newton.fit(&form);
+        let y = newton.least_squares_multipliers(&form, &settings, &[1.0, 2.0], &PrimalDual::zeros(&form), &[1.0, 1.0]);
+        (y, newton.tally.factorisations)
+    }
+
+    #[test]
+    fn least_squares_multipliers_come_from_a_factorisation_with_the_right_inertia() {
+        for (factor, miscounted, factorisations) in [(1.0, 0, 1), (1.001, 0, 2), (f64::NAN, 0, 2), (1.0, 1, 2)] {
+            let (y, times) = multipliers(factor, miscounted, true);
+            assert!((y.unwrap()[0] + 1.5).abs() < 1e-7, "{factor} {miscounted}");
+            assert_eq!(times, factorisations, "{factor} {miscounted}");
+        }
+    }
+
+    #[test]
+    fn no_least_squares_multipliers_if_every_factorisation_has_the_wrong_inertia() {
+        for (factor, miscounted) in [(1.001, 0), (f64::NAN, 0), (1.0, 1)] {
+            assert_eq!(multipliers(factor, miscounted, false), (None, 1), "{factor} {miscounted}");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Sides of the body, contact points of a foot, and components in the sagittal plane.
+
+use serde::{Deserialize, Serialize};
+
+/// A contact point of a foot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FootPoint {
+    /// Heel.
+    Heel,
+    /// Toe (ball of the foot).
+    Toe,
+}
+
+/// A side of the body. The prosthesis is on the right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Intact leg.
+    Left,
+    /// Prosthetic leg.
+    Right,
+}
+
+/// A component in the sagittal plane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// Forward.
+    X,
+    /// Up.
+    Z,
+}

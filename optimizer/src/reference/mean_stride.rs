@@ -1,0 +1,125 @@
+//! From a recording to a reference gait: strides of 101 points, their mean and standard deviation.
+
+use super::heel_strikes::{HeelStrikes, ROUNDING_S};
+use super::motion_recording::MotionRecording;
+use super::plausibility::{no_walker, unlike_builtin};
+use super::reference_gait::{REFERENCE_ROWS, ReferenceGait, Walker};
+use crate::subject::ModelError;
+
+/// Durations of valid strides, s.
+pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
+/// Longest gap between two rows of a valid stride, s.
+const LONGEST_GAP_S: f64 = 0.1;
+/// Index of the left knee among the angles of a reference gait.
+const LEFT_KNEE: usize = 2;
+/// Smallest angle by which one thigh is clearly behind the other, rad.
+const BEHIND_RAD: f64 = 0.05;
+/// Largest plausible excess of knee flexion in stance over that in swing, rad. Some people walk with a nearly straight
+/// swing leg.
+const STANCE_FLEXION_RAD: f64 = 0.26;
+/// Largest number of heel strikes that the provenance lists one by one.
+const MANY_STRIKES: usize = 200;
+/// The reason why a mean stride does not begin with a right heel strike, if any. At right heel strike the right thigh
+/// is ahead of the left one, and the left leg swings in the first half of the stride.
+fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
+    let [_, hip_l, _, _, hip_r] = mean[0];
+    let cause = "check sides, the signs of the hip angles, and that the heel strikes are those of the right foot";
+    if hip_l - hip_r > BEHIND_RAD {
+        let behind = (hip_l - hip_r).to_degrees();
+        return Some(format!("at right heel strike the right thigh is {behind:.0}° behind the left one; {cause}"));
+    }
+    let highest = |rows: &[[f64; 5]]| rows.iter().map(|row| row[LEFT_KNEE]).fold(f64::NEG_INFINITY, f64::max);
+    let (first, second) = mean.split_at(REFERENCE_ROWS / 2 + 1);
+    (highest(second) > highest(first) + STANCE_FLEXION_RAD).then(|| {
+        let (first, second) = (highest(first).to_degrees(), highest(second).to_degrees());
+        format!(
+            "the left leg swings in the first half of the stride from right heel strike, but the left knee bends to {first:.0}° \
+             there and to {second:.0}° in the second half; {cause}"
+        )
+    })
+}
+
+/// Formats times in s; only the first and last one if there are many.
+fn in_words(times: &[f64]) -> String {
+    match times {
+        [first, .., last] if times.len() > MANY_STRIKES => format!("{first:.4} to {last:.4}"),
+        few => few.iter().map(|time| format!("{time:.4}")).collect::<Vec<_>>().join(", "),
+    }
+}
+
+impl MotionRecording {
+    /// The angles at a time, interpolated linearly.
+    fn at(&self, time: f64) -> [f64; 5] {
+        let after = self.time_s.partition_point(|&t| t < time).clamp(1, self.time_s.len() - 1);
+        let (t0, t1) = (self.time_s[after - 1], self.time_s[after]);
+        let share = ((time - t0) / (t1 - t0)).clamp(0.0, 1.0);
+        let (a, b) = (&self.angles_rad[after - 1], &self.angles_rad[after]);
+        std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
+    }
+
+    /// Whether there is no gap between two times.
+    fn is_whole(&self, start: f64, end: f64) -> bool {
+        self.time_s
+            .windows(2)
+            .all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S + ROUNDING_S)
+    }
+
+    /// The mean stride with its standard deviation, as a reference gait.
+    ///
+    /// # Errors
+    /// [`ModelError`] if no stride is valid, or if the mean stride is implausible.
+    pub fn reference(&self, name: &str, how: &HeelStrikes, walker: Walker) -> Result<ReferenceGait, ModelError> {
+        walker.validate()?;
+        let strikes = self.heel_strikes(how)?;
+        let strides: Vec<(f64, f64)> = strikes
+            .windows(2)
+            .map(|pair| (pair[0], pair[1]))
+            .filter(|(start, end)| (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start)))
+            .filter(|(start, end)| self.is_whole(*start, *end))
+            .collect();
+        let kept = format!("{} to {} s, without a gap of {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+        if strides.is_empty() {
+            let reason = format!("none of the {} strides lasts {kept}", strikes.len() - 1);
+            return Err(ModelError::Malformed { what: self.what.clone(), reason });
+        }
+        let count = strides.len() as f64;
+        let mut mean = vec![[0.0; 5]; REFERENCE_ROWS];
+        let mut deviation = vec![[0.0; 5]; REFERENCE_ROWS];
+        for row in 0..REFERENCE_ROWS {
+            let fraction = row as f64 / (REFERENCE_ROWS - 1) as f64;
+            let samples: Vec<[f64; 5]> = strides.iter().map(|(a, b)| self.at(a + fraction * (b - a))).collect();
+            for i in 0..5 {
+                mean[row][i] = samples.iter().map(|s| s[i]).sum::<f64>() / count;
+                let squares: f64 = samples.iter().map(|s| (s[i] - mean[row][i]).powi(2)).sum();
+                deviation[row][i] = if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
+            }
+        }
+        if let Some(reason) = no_walker(&mean).or_else(|| not_from_right_heel_strike(&mean)) {
+            return Err(ModelError::Malformed { what: self.what.clone(), reason });
+        }
+        let found = match how {
+            HeelStrikes::Given(_) => "given",
+            HeelStrikes::Ends => "at the ends of the recording",
+            HeelStrikes::Force => "by the vertical force under the right foot (above 20 N for 50 ms)",
+            HeelStrikes::Kinematics => "by the right heel farthest ahead of the pelvis (Zeni et al. 2008)",
+        };
+        let mut steps = self.steps.clone();
+        steps.push(format!("{} right heel strikes {found}: {} s", strikes.len(), in_words(&strikes)));
+        steps.push(format!(
+            "mean of {} strides of {kept} ({} dropped), {REFERENCE_ROWS} points each, interpolated linearly",
+            strides.len(),
+            strikes.len() - 1 - strides.len()
+        ));
+        steps.extend(unlike_builtin(&mean)?);
+        let reference = ReferenceGait {
+            name: name.to_owned(),
+            provenance: steps.join("\n"),
+            angles_rad: mean,
+            standard_deviation_rad: (strides.len() > 1).then_some(deviation),
+            height_m: walker.height_m,
+            body_mass_kg: walker.body_mass_kg,
+        };
+        reference.validate()?;
+        Ok(reference)
+    }
+}

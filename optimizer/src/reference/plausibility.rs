@@ -1,0 +1,96 @@
+//! Plausibility of a mean stride: impossible curves are errors, unusual ones are warnings in the provenance.
+
+use super::reference_gait::{REFERENCE_COLUMNS, ReferenceGait};
+use crate::statistics::{average, correlation, extremes};
+use crate::subject::ModelError;
+
+/// Indices among the angles of a reference gait.
+const TRUNK: usize = 0;
+const KNEE: usize = 2;
+const ANKLE: usize = 3;
+/// Largest magnitude of the mean trunk lean, degrees.
+const LARGEST_LEAN_DEG: f64 = 45.0;
+/// Smallest peak of knee flexion, degrees. Nearly straight swing legs reach 30.
+const SMALLEST_KNEE_PEAK_DEG: f64 = 20.0;
+/// Largest minimum of knee flexion, degrees.
+const LARGEST_LEAST_FLEXION_DEG: f64 = 40.0;
+/// Largest magnitude of the mean ankle angle, degrees.
+const LARGEST_ANKLE_MEAN_DEG: f64 = 30.0;
+/// Smallest range of motion of the ankle, degrees. Radians taken for degrees give about 0.5.
+const SMALLEST_ANKLE_RANGE_DEG: f64 = 2.0;
+/// Curves that are compared with the built-in reference gait. The shape of the trunk curve differs between people.
+const COMPARED: [(usize, &str); 4] = [(1, "left hip"), (KNEE, "left knee"), (ANKLE, "left ankle"), (4, "right hip")];
+/// Smallest usual correlation with the built-in curves. Means of 24 young adults reach 0.88 or more, ankles of single
+/// strides 0.7; a shift by a tenth of a stride gives 0.4 for the ankle.
+const LEAST_CORRELATION: f64 = 0.5;
+
+/// The reason why a mean stride is impossible, if any.
+pub(super) fn no_walker(mean: &[[f64; 5]]) -> Option<String> {
+    trunk(&curve(mean, TRUNK))
+        .map(|reason| (TRUNK, reason))
+        .or_else(|| knee(&curve(mean, KNEE)).map(|reason| (KNEE, reason)))
+        .or_else(|| ankle(&curve(mean, ANKLE)).map(|reason| (ANKLE, reason)))
+        .map(|(place, reason)| format!("{} {reason}", REFERENCE_COLUMNS[place]))
+}
+
+fn trunk(degrees: &[f64]) -> Option<String> {
+    let lean = average(degrees);
+    (lean.abs() > LARGEST_LEAN_DEG).then(|| {
+        let reason = format!(
+            "is {lean:.0}° on average over the stride; at most {LARGEST_LEAN_DEG}° in either direction is plausible"
+        );
+        format!("{reason}; check the sign and the upright position")
+    })
+}
+
+fn knee(degrees: &[f64]) -> Option<String> {
+    let (least, peak) = extremes(degrees);
+    if peak < SMALLEST_KNEE_PEAK_DEG {
+        let reason =
+            format!("bends to at most {peak:.1}° in the stride; at least {SMALLEST_KNEE_PEAK_DEG}° is plausible");
+        return Some(format!("{reason}; check sign and unit"));
+    }
+    (least > LARGEST_LEAST_FLEXION_DEG).then(|| {
+        let straight = format!("its minimum must be at most {LARGEST_LEAST_FLEXION_DEG}°");
+        format!("is bent by at least {least:.0}° in the whole stride; {straight}")
+    })
+}
+
+fn ankle(degrees: &[f64]) -> Option<String> {
+    let (lowest, highest) = extremes(degrees);
+    let (mean, range) = (average(degrees), highest - lowest);
+    if mean.abs() > LARGEST_ANKLE_MEAN_DEG {
+        let reason = format!(
+            "is {mean:.0}° on average over the stride; at most {LARGEST_ANKLE_MEAN_DEG}° in either direction is plausible"
+        );
+        return Some(format!("{reason}; check that 0° is the right angle between foot and shank"));
+    }
+    (range < SMALLEST_ANKLE_RANGE_DEG).then(|| {
+        format!("moves by only {range:.2}° in the stride, less than {SMALLEST_ANKLE_RANGE_DEG}°; check the unit")
+    })
+}
+
+/// A warning if curves differ in shape from those of the built-in reference gait.
+pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelError> {
+    let builtin = ReferenceGait::builtin()?.angles_rad;
+    let unlike: Vec<String> = COMPARED
+        .into_iter()
+        .filter_map(|(place, name)| match correlation(&curve(mean, place), &curve(&builtin, place)) {
+            Some(correlation) if correlation >= LEAST_CORRELATION => None,
+            Some(correlation) => Some(format!("{name} (correlation {:.2})", hundredths(correlation))),
+            None => Some(format!("{name} (constant)")),
+        })
+        .collect();
+    let remark = || format!("unlike the built-in reference: {}; check sign, side and heel strikes", unlike.join(", "));
+    Ok((!unlike.is_empty()).then(remark))
+}
+
+/// One angle over the stride, in degrees.
+fn curve(mean: &[[f64; 5]], place: usize) -> Vec<f64> {
+    mean.iter().map(|row| row[place].to_degrees()).collect()
+}
+
+/// Rounds to hundredths, without a negative zero.
+fn hundredths(value: f64) -> f64 {
+    (100.0 * value).round() / 100.0 + 0.0
+}

@@ -1,0 +1,111 @@
+//! The outcome of a solve from its attempts.
+
+use super::attempts::Candidate;
+use super::phases::SolveContext;
+use super::report::{
+    LinearAlgebra, Optimality, OtherBasin, SolveAttempt, SolveOutcome, SolveReport, SolveStatus, StartedFrom, Violation,
+};
+use super::warm_start::WarmStart;
+use crate::gait_problem::margins::Margins;
+use crate::gait_problem::{GaitProgramme, RowViolation};
+use crate::metrics::gait_rmse;
+use interior_point::{NlpResult, NonlinearProgram};
+
+/// Total cost of the attempts of a solve.
+#[derive(Default)]
+pub(super) struct SolveTally {
+    pub(super) iterations: usize,
+    pub(super) evaluation_s: f64,
+    pub(super) linear_algebra: LinearAlgebra,
+    pub(super) attempts: Vec<SolveAttempt>,
+}
+
+/// Largest number of reported violations.
+const MAX_VIOLATIONS: usize = 20;
+
+/// The outcome of the chosen attempt.
+pub(super) fn outcome(
+    context: &SolveContext<'_>,
+    candidate: Candidate,
+    margins: &Margins,
+    tally: SolveTally,
+    started_from: StartedFrom,
+) -> SolveOutcome {
+    let (problem, programme) = (context.problem, context.programme);
+    let Candidate { result, gait, status, .. } = candidate;
+    let x = &result.x;
+    let rmse = gait_rmse(&gait, &problem.reference);
+    let margins = margins.bearing_on(programme, x);
+    let violations = programme.violations(x);
+    let parts = programme.objective_parts(x);
+    let equalities = (0..programme.rows()).filter(|&r| programme.rows.lower[r] == programme.rows.upper[r]).count();
+    let report = SolveReport {
+        status,
+        started_from,
+        iterations: tally.iterations,
+        objective: programme.objective(x),
+        cost_of_transport: parts.cost_of_transport,
+        gait_rmse_rad: rmse.total,
+        gait_rmse_parts_rad: rmse.parts,
+        max_violation: violations.first().map_or(0.0, |v| v.amount),
+        optimality: Some(Optimality {
+            dual_infeasibility: result.scaled_residuals.dual_infeasibility,
+            complementarity: result.scaled_residuals.complementarity,
+            barrier: result.mu,
+        })
+        .filter(|o| o.dual_infeasibility.is_finite() && o.complementarity.is_finite()),
+        tightened_bounds: margins.count(),
+        seconds_total: context.started.elapsed().as_secs_f64(),
+        seconds_evaluation: tally.evaluation_s,
+        seconds_linear_algebra: tally.linear_algebra.seconds(),
+        linear_algebra: Some(tally.linear_algebra),
+        variables: programme.variables(),
+        equalities,
+        inequalities: programme.rows() - equalities,
+        speed_m_s: gait.speed_m_s,
+        stride_length_m: gait.stride_length_m,
+        durations_s: std::array::from_fn(|d| gait.domains[d].duration_s),
+        vhip_m_s: gait.hip_velocity_m_s,
+        attempts: tally.attempts,
+    };
+    let violations = if status == SolveStatus::Converged {
+        Vec::new()
+    } else {
+        violations.iter().take(MAX_VIOLATIONS).map(|v| describe(programme, v)).collect()
+    };
+    let warm_start = warm_start(context, &result, margins);
+    SolveOutcome { report, gait, warm_start, violations, other_basins: Vec::new() }
+}
+
+/// The gait of another local optimum.
+pub(super) fn other_basin(
+    context: &SolveContext<'_>,
+    candidate: Candidate,
+    attempt: &SolveAttempt,
+    basin: usize,
+) -> OtherBasin {
+    OtherBasin {
+        basin,
+        objective: attempt.objective,
+        gait_rmse_rad: attempt.gait_rmse_rad,
+        warm_start: warm_start(context, &candidate.result, Margins::default()),
+        gait: candidate.gait,
+    }
+}
+
+fn warm_start(context: &SolveContext<'_>, result: &NlpResult, margins: Margins) -> WarmStart {
+    let problem = context.problem;
+    WarmStart { muscles: problem.muscles, mesh: problem.settings.mesh, point: result.warm_point(), margins }
+}
+
+fn describe(programme: &GaitProgramme, violation: &RowViolation) -> Violation {
+    if let Some(row) = violation.row {
+        let name = &programme.rows.names[row];
+        let (_, unit, scale) = name.kind.description();
+        Violation { row: name.label(), amount: violation.amount * scale, unit: unit.to_owned() }
+    } else {
+        let variable = violation.variable.unwrap_or(0);
+        let (label, unit) = programme.layout.variable_label(variable);
+        Violation { row: label, amount: violation.amount * programme.layout.scale[variable], unit: unit.to_owned() }
+    }
+}
