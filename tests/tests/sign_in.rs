@@ -12,10 +12,11 @@ use gaitwright_service::access::sign_in::Limits;
 use gaitwright_service::access::tokens::{self as making, NewToken};
 use gaitwright_service::access::{Caller, Clock, Right, Role};
 use gaitwright_store::audit::{self, Actor, AuditRow};
+use gaitwright_store::members::MemberKind;
 use gaitwright_store::{Instant, SessionId, Store, UserId, commit, now, seals, sign_in_failures};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{
-    As, FORM, cookie_of, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
+    As, FORM, cookie_of, member, send, service, session_of, sign_in_from, signed_in, token, user, with_password,
 };
 use gaitwright_tests::service::Service;
 use gaitwright_tests::sources;
@@ -458,6 +459,8 @@ async fn event_streams_end_with_what_allowed_them() {
         let session = session_of(&sign_in_from(&service, OWNER, None, name, RIGHT).await);
         listening.push((listen(&service, &session, &path).await, session));
     }
+    // Raters reach the studies that they are assigned to: this one loses the right to read alone.
+    member(&service, study, MemberKind::User, "demoted").await;
     let script = token_by(&service, admin, "Ada", Role::Admin).await;
     let by_token = listen(&service, &script, &path).await;
     let (mut streams, sessions): (Vec<_>, Vec<_>) = listening.into_iter().unzip();
