@@ -16,6 +16,8 @@ use std::time::Duration;
 use tempfile::TempDir;
 
 const V1: &[u8] = include_bytes!("../records/v1.db.zst");
+/// Tables that sign-in alone fills, and the example does not.
+const OF_SIGN_IN: [&str; 3] = ["clock", "sign_in_failures", "sign_in_sources"];
 /// The records that are kept, by the form in which they were written.
 const RECORDS: [(i64, &[u8]); 2] = [(1, V1), (7, include_bytes!("../records/v7.db.zst"))];
 
@@ -69,7 +71,7 @@ async fn assert_upgraded(database: &Path, old: &Path) {
     let old_layout = layout(old).await;
     let (before, after) = (rows(old, &old_layout).await, rows(database, &old_layout).await);
     for (table, rows) in &before {
-        assert!(!rows.is_empty(), "{table} has rows");
+        assert!(!rows.is_empty() || OF_SIGN_IN.contains(&table.as_str()), "{table} has rows");
         let missing: Vec<_> = rows.iter().filter(|row| !after[table].contains(row)).collect();
         // What the new version adds at start, and how far the database has counted.
         assert!(missing.is_empty() || table == "sqlite_sequence", "{table}: {missing:?}");
