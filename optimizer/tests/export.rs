@@ -17,7 +17,9 @@ fn controller_file_reproduces_the_gait_at_domain_ends() {
         let text = serde_json::to_string_pretty(&ControllerFile::new(&gait, 200.0).unwrap()).unwrap();
         let file = ControllerFile::from_json(&text).unwrap();
         let angles = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+        assert_eq!(file.domains.len(), gait.domains.len());
         for (domain, planned) in file.domains.iter().zip(&gait.domains) {
+            assert!(!domain.outputs.is_empty(), "{}", domain.name);
             for (q, s) in [(&planned.q[0], 0.0), (planned.q.last().unwrap(), 1.0)] {
                 let position: f64 =
                     angles.iter().enumerate().map(|(i, name)| domain.phase_gradient_m_per_rad[*name] * q[2 + i]).sum();

@@ -57,6 +57,7 @@ fn every_variant_of_opensim_files_gives_the_same_recording() {
     let whole = read(&opensim(2)).unwrap();
     let same = |form: &str, text: &str, unit: Option<AngleUnit>| {
         let found = MotionRecording::from_opensim(form, text, unit, Some("right_vy")).unwrap();
+        assert_eq!(found.angles_rad.len(), whole.angles_rad.len(), "{form}");
         for (ours, theirs) in found.angles_rad.iter().flatten().zip(whole.angles_rad.iter().flatten()) {
             assert!((ours - theirs).abs() < 1e-7, "{form}: {ours} {theirs}");
         }

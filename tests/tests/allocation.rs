@@ -11,7 +11,7 @@ use gaitwright_store::audit::Actor;
 use gaitwright_store::presentations::{self, Kind, NewPresentation};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, LabSessionId, Store, StudyId, TokenId, TrialId, commit, lab_sessions};
+use gaitwright_store::{Connection, LabSessionId, Store, StudyId, TokenId, TrialId, UserId, commit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::callers::{self, As, FORM, rater_of, send, send_accepting, signed_in, token};
@@ -643,6 +643,30 @@ async fn a_person_who_takes_a_controller_file_is_recorded_as_knowing_and_the_dev
     ] {
         let answer = get(&service, who, &file).await;
         assert_eq!(answer.status != StatusCode::FORBIDDEN, may, "{who:?}: {}", answer.text);
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn file_that_a_token_fetched_leaves_nobody_blind_and_the_devices_own_leaves_everybody_so() {
+    let (_folder, service) = one_service().await;
+    let (study, trials) = finished(&service).await;
+    let person = gaitwright_service::access::Caller::person(UserId::fresh(), "Ada", Role::Clinician);
+    let script = gaitwright_service::access::Caller::token(TokenId::fresh(), "script", &[Right::Device, Right::Read]);
+    let device = gaitwright_service::access::Caller::token(TokenId::fresh(), "rig", &[Right::Device]);
+    for (fetched_by, could_have_known) in [(&script, true), (&device, false)] {
+        let new = NewSession { gait_one: trials[0].id, gait_two: trials[1].id, notes: String::new() };
+        let mut writer = service.store.write().await.unwrap();
+        let id = lab::plan(&mut writer, &Actor::program(), study, &new).await.unwrap().id;
+        lab::for_device(&mut writer, fetched_by, id, 2).await.unwrap();
+        for walk in 1..=3 {
+            let walked = lab::RecordedWalk { walk, note: String::new() };
+            lab::record_walk(&mut writer, &person.actor, id, &walked).await.unwrap();
+        }
+        let answer = lab::NewAnswer { number: 1, answer: presentations::Judgement::First, note: String::new() };
+        let seen = lab::answer(&mut writer, &person, id, &answer).await.unwrap();
+        assert_eq!(seen.answer.unwrap().could_have_known, could_have_known, "{}", fetched_by.name);
+        commit(writer).await.unwrap();
     }
     service.stop().await;
 }

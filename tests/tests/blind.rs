@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::{Method, StatusCode};
+use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::access::{Right, Role};
+use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::members::MemberKind;
 use gaitwright_store::presentations::{self, Kind, Presentation};
 use gaitwright_store::studies::{FeedbackMode, StudyState};
@@ -177,6 +179,63 @@ async fn an_answer_is_heard_of_the_gait_that_was_shown_on_that_side() {
         }
     }
     assert_eq!(swapped.len(), 2, "both orders were drawn");
+    service.stop().await;
+}
+
+/// An analytic solver whose hip is higher the worse the gait: a motion to the millimetre tells its trial.
+struct Tall(Analytic);
+
+/// Height of the hip in the gait of such a trial, m.
+fn hip_m(rmse: f64) -> f64 {
+    0.9 + 0.2 * rmse
+}
+
+impl Evaluate for Tall {
+    fn evaluate(
+        &self,
+        assignment: &Assignment,
+        observer: &mut dyn FnMut(&IterationRecord),
+        cancel: &CancelToken,
+    ) -> Result<SolveOutcome, String> {
+        let mut outcome = self.0.evaluate(assignment, observer, cancel)?;
+        let height = hip_m(outcome.report.gait_rmse_rad);
+        for q in outcome.gait.domains.iter_mut().flat_map(|domain| &mut domain.q) {
+            q[1] = height;
+        }
+        Ok(outcome)
+    }
+}
+
+#[tokio::test]
+async fn each_side_of_a_pair_is_the_motion_of_the_gait_that_was_drawn_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Tall(Analytic::default()), 1).await;
+    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 24)).await;
+    let mut orders = std::collections::BTreeSet::new();
+    for _ in 0..4000 {
+        let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
+        if present.state == StudyState::Finished {
+            break;
+        }
+        let pair = next(&service, study).await;
+        let Some(token) = pair["token"].as_str() else {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+            continue;
+        };
+        let trials = service.trials(study).await;
+        let of = |id| hip_m(trials.iter().find(|trial| trial.id == id).unwrap().gait_rmse_rad.unwrap());
+        let (first, second) = *sides(&service.store, study).await.last().unwrap();
+        for (side, trial) in [("first", first), ("second", second)] {
+            let motion = service.fetch(&format!("/api/v1/blind/{token}/{side}")).await.json();
+            let hip = motion[0][0][1].as_f64().unwrap();
+            assert!((hip - of(trial)).abs() < 6e-4, "{side}: {hip} m, drawn: {} m", of(trial));
+        }
+        if (of(first) - of(second)).abs() > 2e-3 {
+            orders.insert(of(first) > of(second));
+        }
+        assert_eq!(say(&service, &pair, "first").await, StatusCode::CREATED);
+    }
+    assert_eq!(orders.len(), 2, "both orders were drawn of gaits that can be told apart");
     service.stop().await;
 }
 

@@ -8,7 +8,7 @@
 use axum::http::StatusCode;
 use gaitwright_http::openapi;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
-use gaitwright_store::trials::TrialState;
+use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{StudyId, TrialId, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::{Answer, Service};
@@ -509,20 +509,25 @@ async fn a_recommendation_names_no_gait_that_was_reported_unsafe_or_has_no_certi
 }
 
 #[test]
-fn every_writer_of_the_learners_log_is_the_one_door() {
+fn learners_log_and_new_trials_are_each_written_at_one_door() {
     let mut writers = Vec::new();
     let mut appenders = Vec::new();
+    let mut planners = Vec::new();
     for (name, text) in sources::of_server() {
         let flat = text.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
         if flat.contains("into feedback ") || flat.contains("into feedback(") {
             writers.push(name.clone());
         }
         if text.contains("feedback::append(") || text.contains("feedback::{append") {
-            appenders.push(name);
+            appenders.push(name.clone());
+        }
+        if text.contains("trials::insert(") || text.contains("trials::{insert") {
+            planners.push(name);
         }
     }
     assert_eq!(writers, ["store/src/feedback.rs"], "SQL that writes the table");
     assert_eq!(appenders, ["service/src/studies/preference.rs"], "callers of the function that writes it");
+    assert_eq!(planners, ["service/src/studies/snapshot.rs"], "callers of the function that writes trials");
 }
 
 #[tokio::test]
@@ -535,14 +540,24 @@ async fn a_plan_made_before_a_safety_report_is_not_written() {
     )
     .await
     .unwrap();
-    let current = async || {
-        let mut writer = scene.service.store.write().await.unwrap();
-        snapshot.is_current(&mut writer).await.unwrap()
+    let last = snapshot.trials.last().unwrap();
+    let new = NewTrial {
+        number: last.number + 1,
+        action_index: last.action_index,
+        action: last.action,
+        reason: "as asked".to_owned(),
+        best_before: None,
+        warm_started_from: None,
     };
-    assert!(current().await);
+    // Dropped, so that it leaves no trace.
+    let is_written = async || {
+        let mut writer = scene.service.store.write().await.unwrap();
+        snapshot.write_trial(&mut writer, &new).await.unwrap().is_some()
+    };
+    assert!(is_written().await);
     let feedback = scene.service.feedback(scene.study).await.len();
     scene.close(Rule::Safety).await;
     assert_eq!(scene.service.feedback(scene.study).await.len(), feedback, "both unsafe: the learner hears nothing");
-    assert!(!current().await, "and the plan is made anew all the same");
+    assert!(!is_written().await, "and the plan is made anew all the same");
     scene.service.stop().await;
 }

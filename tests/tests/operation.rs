@@ -8,8 +8,10 @@ use gait_optimizer::SolveStatus;
 use gaitwright::cli::study::prune;
 use gaitwright_service::studies::archive::file::read_through;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, backup, certificates, commit, explanations, gaits, members, studies};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
@@ -126,7 +128,19 @@ async fn old_trajectories_are_dropped_and_the_best_kept() {
     let started_from =
         service.trials(study).await.into_iter().find(|trial| trial.id == best).unwrap().warm_started_from;
     assert_eq!(prune(&mut service.store.clone(), 0).await.unwrap(), 5 - u64::from(started_from.is_some()));
-    assert!(gaits::get(&mut service.store.read().await.unwrap(), best).await.is_ok());
+    let mut reader = service.store.read().await.unwrap();
+    assert!(gaits::get(&mut reader, best).await.is_ok());
+    // Nobody can certify what was dropped, so nobody walks with it.
+    let mut dropped = 0;
+    for trial in trials.iter().filter(|trial| trial.id != best && trial.state == TrialState::Converged) {
+        if gaits::find(&mut reader, trial.id).await.unwrap().is_none() {
+            let found = walkable::admit(&mut reader, trial.id).await.unwrap();
+            assert_eq!(found, Err(NotWalkable::Pruned { number: trial.number }));
+            dropped += 1;
+        }
+    }
+    assert!(dropped > 0);
+    drop(reader);
     service.stop().await;
 }
 

@@ -1,5 +1,7 @@
 //! JSON or CSV, as the Accept header asks; a `.csv` address is CSV always.
 
+use crate::AppState;
+use crate::problem::Refusal;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 use gaitwright_charts::csv_table::CsvTable;
@@ -16,9 +18,14 @@ pub(crate) fn wants_csv(headers: &HeaderMap) -> bool {
     }
 }
 
-/// A table as a CSV answer that a browser saves under `name`.
-pub(crate) fn csv_answer(name: &str, table: CsvTable) -> Response {
-    csv_file(name, table.into_text())
+/// A table as a CSV answer that a browser saves under `name`; written on the pool, because it has up to ten thousand rows.
+pub(crate) async fn csv_answer(
+    app: &mut AppState,
+    name: &str,
+    write: impl FnOnce() -> CsvTable + Send + 'static,
+) -> Result<Response, Refusal> {
+    let text = app.compute(move |_| write().into_text()).await?;
+    Ok(csv_file(name, text))
 }
 
 /// A response with CSV text, which a browser saves as `name`.

@@ -35,8 +35,10 @@ pub(super) async fn of_study(
     Shown(id, _): Shown<StudyId, Read>,
     headers: HeaderMap,
 ) -> Result<Response, Refusal> {
-    let history = read(&mut app, id).await?;
-    if wants_csv(&headers) { Ok(table(id, &history)) } else { Ok(Json(history).into_response()) }
+    if wants_csv(&headers) {
+        return table(&mut app, id).await;
+    }
+    Ok(Json(read(&mut app, id).await?).into_response())
 }
 
 /// `GET /studies/{id}/history.csv`.
@@ -54,7 +56,7 @@ pub(super) async fn of_study_csv(
     State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Refusal> {
-    Ok(table(id, &read(&mut app, id).await?))
+    table(&mut app, id).await
 }
 
 async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Refusal> {
@@ -70,10 +72,15 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Refusal
     app.compute(compute).await?.map_err(Error::Learner).map_err(Refusal)
 }
 
-fn table(study: StudyId, history: &[Milestone]) -> Response {
+async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
+    let history = read(app, id).await?;
+    csv_answer(app, &format!("history-{}.csv", id.short()), move || written(&history)).await
+}
+
+fn written(history: &[Milestone]) -> CsvTable {
     let mut table = CsvTable::new(["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"]);
     for m in history {
         table.row(cells![m.iteration, m.number, m.gait_rmse_rad, m.cost_of_transport]);
     }
-    csv_answer(&format!("history-{}.csv", study.short()), table)
+    table
 }

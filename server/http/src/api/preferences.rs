@@ -34,7 +34,7 @@ use utoipa::ToSchema;
 )]
 pub(super) async fn of_study(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Params(page): Params<After<i64>>,
     headers: HeaderMap,
@@ -42,14 +42,16 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     if wants_csv(&headers) {
-        return Ok(table(id, &feedback::comparisons(&mut reader, id, 0, u32::MAX).await?));
+        let rows = feedback::comparisons(&mut reader, id, 0, u32::MAX).await?;
+        drop(reader);
+        return csv_answer(&mut app, &format!("preferences-{}.csv", id.short()), move || table(&rows)).await;
     }
     let limit = page.limit(1000)?;
     let rows = feedback::comparisons(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
     Ok(linked_after(&format!("/api/v1/studies/{id}/preferences"), rows, limit, |row| row.seq.to_string()))
 }
 
-fn table(study: StudyId, rows: &[FeedbackRow]) -> Response {
+fn table(rows: &[FeedbackRow]) -> CsvTable {
     let mut table = CsvTable::new([
         "seq",
         "id",
@@ -84,7 +86,7 @@ fn table(study: StudyId, rows: &[FeedbackRow]) -> Response {
             retraction.map(|r| &r.reason),
         ]);
     }
-    csv_answer(&format!("preferences-{}.csv", study.short()), table)
+    table
 }
 
 /// `GET /preferences/{id}`.

@@ -109,13 +109,18 @@ pub(super) async fn of_study_csv(
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     let Recommendation { best, certificate, .. } = read(&mut app, id).await?;
-    let bounds = TunedBounds::NAMES.iter().zip(best.bounds.to_array()).zip(TunedBounds::MEANINGS);
+    let name = format!("bounds-trial-{}.csv", best.number);
+    csv_answer(&mut app, &name, move || written(&best.bounds, certificate)).await
+}
+
+fn written(bounds: &TunedBounds, certificate: CertificateState) -> CsvTable {
+    let bounds = TunedBounds::NAMES.iter().zip(bounds.to_array()).zip(TunedBounds::MEANINGS);
     let mut table = CsvTable::new(["bound", "value", "unit", "limits", "certificate_of_the_gait"]);
     for ((name, value), meaning) in bounds {
         let (limited, unit) = meaning.rsplit_once(", ").unwrap_or((meaning, ""));
         table.row(cells![*name, value, unit, limited, certificate.as_str()]);
     }
-    Ok(csv_answer(&format!("bounds-trial-{}.csv", best.number), table))
+    table
 }
 
 async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal> {

@@ -19,7 +19,7 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::command;
 use gaitwright_store::results::{self, AttemptResult};
 use gaitwright_store::trials::{self, Trial};
-use gaitwright_store::{Connection, StudyId, TrialId, gaits, schema, studies};
+use gaitwright_store::{StudyId, TrialId, gaits, schema, studies};
 use serde::Serialize;
 use std::collections::HashMap;
 use utoipa::ToSchema;
@@ -45,16 +45,16 @@ pub(super) struct TrialPage {
 )]
 pub(super) async fn of_study(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
     Params(page): Params<After<u32>>,
     headers: HeaderMap,
 ) -> Result<Response, Refusal> {
+    if wants_csv(&headers) {
+        return table(&mut app, id).await;
+    }
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    if wants_csv(&headers) {
-        return table(&mut reader, id).await;
-    }
     let limit = page.limit_or(200, 1000)?;
     let mut found = trials::page(&mut reader, id, page.after.unwrap_or(0), limit + 1).await?;
     let more = found.len() > limit as usize;
@@ -75,12 +75,10 @@ pub(super) async fn of_study(
 )]
 pub(super) async fn of_study_csv(
     _: May<Read>,
-    State(app): State<AppState>,
+    State(mut app): State<AppState>,
     Shown(id, _): Shown<StudyId, Read>,
 ) -> Result<Response, Refusal> {
-    let mut reader = app.read().await?;
-    studies::get(&mut reader, id).await?;
-    table(&mut reader, id).await
+    table(&mut app, id).await
 }
 
 /// `GET /trials/{id}`.
@@ -189,7 +187,15 @@ pub(super) async fn attempts(
     Ok(Json(results::of_trial(&mut *app.read().await?, id).await?))
 }
 
-async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Refusal> {
+async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
+    let mut reader = app.read().await?;
+    studies::get(&mut reader, id).await?;
+    let all = trials::of_study(&mut reader, id).await?;
+    drop(reader);
+    csv_answer(app, &format!("trials-{}.csv", id.short()), move || written(&all)).await
+}
+
+fn written(all: &[Trial]) -> CsvTable {
     let mut header = vec!["number", "trial_id"];
     header.extend(TunedBounds::NAMES);
     header.extend([
@@ -203,10 +209,9 @@ async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Refusal>
         "reason",
         "message",
     ]);
-    let all = trials::of_study(db, study).await?;
     let numbers: HashMap<TrialId, u32> = all.iter().map(|trial| (trial.id, trial.number)).collect();
     let mut table = CsvTable::new(header);
-    for trial in &all {
+    for trial in all {
         let mut row = cells![trial.number, trial.id.to_string()];
         row.extend(trial.action.to_array().iter().map(Cell::from));
         row.extend(cells![
@@ -222,5 +227,5 @@ async fn table(db: &mut Connection, study: StudyId) -> Result<Response, Refusal>
         ]);
         table.row(row);
     }
-    Ok(csv_answer(&format!("trials-{}.csv", study.short()), table))
+    table
 }

@@ -416,11 +416,14 @@ impl Scheduler {
             return Ok(false);
         }
         let current = studies::get(&mut writer, study).await?;
-        if current.state != StudyState::Running || !snapshot.is_current(&mut writer).await? {
+        let written = match current.state {
+            StudyState::Running => snapshot.write_trial(&mut writer, new).await?,
+            _ => None,
+        };
+        let Some(trial) = written else {
             self.0.wake.notify_one();
             return Ok(false);
-        }
-        let trial = trials::insert(&mut writer, study, new).await?;
+        };
         jobs::insert(&mut writer, trial).await?;
         let payload = json!({ "trial_id": trial, "number": new.number, "state": TrialState::Queued });
         events::append(&mut writer, study, "trial_queued", &payload).await?;

@@ -112,7 +112,7 @@ pub async fn give_out(
     if !is_current(writer, snapshot).await? {
         return Ok(None);
     }
-    let id = trials::insert(writer, study, new).await?;
+    let Some(id) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
     trials::give_to(writer, id, worker).await?;
     let payload = json!({ "trial_id": id, "number": new.number, "state": TrialState::Running });
     events::append(writer, study, "trial_started", &payload).await?;

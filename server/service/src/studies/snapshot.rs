@@ -5,7 +5,7 @@ use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
 use gaitwright_store::studies::{FeedbackMode, Study};
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::{NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, trials};
 use std::collections::{HashMap, HashSet};
 
@@ -49,6 +49,18 @@ impl StudySnapshot {
         let study = self.study.id;
         Ok(feedback::version(writer, study).await? == self.version
             && safety_reviews::version(writer, study).await? == self.safety)
+    }
+
+    /// Writes a trial that was chosen from this snapshot: the one way to a new trial. `None` when an answer or a safety report
+    /// came since.
+    ///
+    /// # Errors
+    /// A violated constraint or trigger, or errors of the database.
+    pub async fn write_trial(&self, writer: &mut Writer, new: &NewTrial) -> StoreResult<Option<TrialId>> {
+        if !self.is_current(writer).await? {
+            return Ok(None);
+        }
+        trials::insert(writer, self.study.id, new).await.map(Some)
     }
 
     /// The newest trials and the best one of a large study, for pages. Not for the learner.

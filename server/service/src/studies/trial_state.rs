@@ -106,14 +106,20 @@ mod tests {
     }
 
     #[test]
-    fn failing_job_is_given_up_after_two_retries() {
-        let mut runs = 0;
-        let mut state = TrialState::Queued;
-        while state == TrialState::Queued {
-            state = after(state, Happening::Leased).unwrap();
-            state = after(state, Happening::Broke(Troubles { failures: runs, losses: 0 })).unwrap();
-            runs += 1;
+    fn failing_or_lost_job_is_given_up_after_two_retries() {
+        let broke = |failures| Happening::Broke(Troubles { failures, losses: 0 });
+        let silent = |losses| Happening::Silent(Troubles { failures: 0, losses });
+        let cases: [(&dyn Fn(u32) -> Happening, TrialState); 2] =
+            [(&broke, TrialState::Failed), (&silent, TrialState::Lost)];
+        for (happening, end) in cases {
+            let mut runs = 0;
+            let mut state = TrialState::Queued;
+            while state == TrialState::Queued && runs < 10 {
+                state = after(state, Happening::Leased).unwrap();
+                state = after(state, happening(runs)).unwrap();
+                runs += 1;
+            }
+            assert_eq!((state, runs), (end, 3));
         }
-        assert_eq!((state, runs), (TrialState::Failed, 3));
     }
 }
